@@ -1,0 +1,3 @@
+//! Identifies the geometric and elastic parameters of robot arms from measured end-point positions.
+
+pub mod fit;

@@ -1,0 +1,3 @@
+//! The flexcal command line.
+
+fn main() {}

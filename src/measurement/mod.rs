@@ -1,0 +1,66 @@
+//! Measured poses, as columns in SI units.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+
+/// Measured poses, a column for each quantity, in the order of the files.
+#[derive(Debug, Clone)]
+pub struct Measurements {
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
+    /// File index and line of each row, for messages.
+    pub origin: Vec<(u32, u32)>,
+    /// Number of joints of the arm, fixed ones included.
+    pub joints: usize,
+    /// Configurations, shape = (rows, joints), row after row [rad] or [m]; 0 at fixed joints.
+    pub configurations: Vec<f64>,
+    /// Measured positions in the measuring frame [m].
+    pub positions: Vec<Vector3<f64>>,
+    /// 1 σ of each coordinate from the column `sigma_mm` [m].
+    pub sigma: Option<Vec<f64>>,
+    /// Payload [kg].
+    pub payload: Option<Vec<f64>>,
+    /// Hoist force [N].
+    pub hoist: Option<Vec<f64>>,
+    /// Temperature [°C].
+    pub temperature: Option<Vec<f64>>,
+    /// Time [s]; the row's order where there is no column.
+    pub time: Vec<f64>,
+    /// Whether `time` was measured, not counted.
+    pub time_measured: bool,
+    /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints without a column.
+    pub approach: Option<Vec<f64>>,
+    /// Session of each row; one unnamed label where there is no column.
+    pub session: Labels,
+    /// Target of each row; `None` where there is no column.
+    pub target: Option<Labels>,
+    /// Whether the row is marked `validation`, where the problem names such a column.
+    pub marked_held_out: Option<Vec<bool>>,
+}
+
+/// A word per row, stored as an index into the distinct words in order of appearance.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Labels {
+    /// Distinct words.
+    pub names: Vec<String>,
+    /// Word of each row.
+    pub of_row: Vec<usize>,
+}
+
+impl Measurements {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Configuration of a row, shape = (joints) [rad] or [m].
+    pub fn configuration(&self, row: usize) -> &[f64] {
+        &self.configurations[row * self.joints..(row + 1) * self.joints]
+    }
+}
