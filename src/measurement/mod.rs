@@ -1,8 +1,16 @@
 //! Measured poses, as columns in SI units.
 
+mod columns;
+mod lines;
+mod read;
+mod split;
+mod table;
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+
+pub use split::Split;
 
 /// Measured poses, a column for each quantity, in the order of the files.
 #[derive(Debug, Clone)]
@@ -35,7 +43,7 @@ pub struct Measurements {
     pub session: Labels,
     /// Target of each row; `None` where there is no column.
     pub target: Option<Labels>,
-    /// Whether the row is marked `validation`, where the problem names such a column.
+    /// Whether the row is marked `validation`, where the problem names such a column, or says nothing and there is a `split`.
     pub marked_held_out: Option<Vec<bool>>,
 }
 

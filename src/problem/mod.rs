@@ -3,6 +3,13 @@
 //! Everything here is plain data in SI units (m, rad, N, kg, s; temperatures in °C), read once from `problem.toml`
 //! and never changed afterwards.
 
+mod arm;
+mod effects;
+mod item;
+mod parameters;
+mod read;
+mod section;
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
@@ -97,9 +104,9 @@ pub struct Beam {
     pub mass: f64,
     /// Axial rigidity EA [N]; `None`: does not stretch.
     pub ea: Option<f64>,
-    /// Flexural rigidity about y, EI_y [N·m²]: bends in the x-z plane; `None`: rigid there.
+    /// Flexural rigidity about y, `EI_y` [N·m²]: bends in the x-z plane; `None`: rigid there.
     pub ei_y: Option<f64>,
-    /// Flexural rigidity about z, EI_z [N·m²]: bends in the x-y plane; `None`: rigid there.
+    /// Flexural rigidity about z, `EI_z` [N·m²]: bends in the x-y plane; `None`: rigid there.
     pub ei_z: Option<f64>,
     /// Torsional rigidity GJ [N·m²]; `None`: does not twist.
     pub gj: Option<f64>,
@@ -236,6 +243,10 @@ pub struct Data {
     pub held_out: Option<HeldOut>,
     /// T₀ [°C].
     pub reference_temperature: Option<f64>,
+    /// Where `files` stands, or `[data]`, for errors.
+    pub files_location: Location,
+    /// Where `held_out` stands, or `[data]`, for errors.
+    pub held_out_location: Location,
     /// Where `[data]` stands, for errors.
     pub location: Location,
 }

@@ -1,0 +1,183 @@
+//! The kinds of mistakes, and what each says.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// What is wrong with the input.
+///
+/// The message of a variant says what it stands for and how to mend it; the place comes from [`Location`](super::Location).
+#[derive(Debug, Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum InputErrorKind {
+    // Files.
+    #[error("no such file; give a problem.toml or the folder that holds one")]
+    ProblemMissing,
+    #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
+    DataFileMissing { path: PathBuf },
+    #[error("cannot be read: {source}")]
+    Unreadable { source: io::Error },
+    #[error("not UTF-8 text; save the file as UTF-8")]
+    NotUtf8,
+    #[error("not valid TOML: {message}{}", near(near_text))]
+    Syntax { message: String, near_text: String },
+
+    // Keys.
+    #[error("unknown key; known here: {}", known.join(", "))]
+    UnknownKey { known: Vec<String> },
+    #[error("missing; write {write}")]
+    MissingKey { write: String },
+    #[error("expected {expected}, found {found}")]
+    WrongType { expected: &'static str, found: &'static str },
+    #[error("{noun} needs a unit; write {write}")]
+    NeedsUnit { noun: &'static str, write: String },
+    #[error("{noun} is not given in {suffix}; write {write}")]
+    WrongUnit { noun: &'static str, suffix: String, write: String },
+    #[error("given already as {first}; keep one of the two")]
+    GivenTwice { first: String },
+    #[error("\"{word}\" is none of {}", known.join(", "))]
+    UnknownWord { word: String, known: &'static [&'static str] },
+
+    // Values.
+    #[error("{value} is not a finite number")]
+    NotFinite { value: String },
+    #[error("{value} is not a whole number of at least {least}")]
+    NotWhole { value: String, least: u64 },
+    #[error("{value} is too large; at most {most}")]
+    TooLarge { value: u64, most: u64 },
+    #[error("a vector has 3 numbers, found {found}")]
+    NotAVector { found: usize },
+    #[error("{value} is below zero")]
+    Negative { value: f64 },
+    #[error("{value} is not above zero")]
+    NotPositive { value: f64 },
+    #[error("{value} is not above zero; leave the key out where nothing gives way")]
+    NotStiff { value: f64 },
+    #[error("{value} is not between 0 and 1")]
+    NotAFraction { value: f64 },
+    #[error("a direction has a length; [0, 0, 0] has none")]
+    NoDirection,
+    #[error("empty; write at least one character")]
+    Empty,
+
+    // The arm.
+    #[error("\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at either end")]
+    NotAFolderName { name: String },
+    #[error("an arm has at least one joint; add a section [[joint]]")]
+    NoJoints,
+    #[error("a beam lies along its joint's a, which is 0 here; give a_m or a_mm")]
+    BeamWithoutLength,
+    #[error("\"{name}\" cannot name a beam, for parameters go by it; leave out . * [ ] and spaces")]
+    NotABeamName { name: String },
+    #[error("\"{name}\" names other parameters; choose another name")]
+    ReservedName { name: String },
+    #[error("another beam is called \"{name}\"; choose another name")]
+    RepeatedBeamName { name: String },
+
+    // Effects.
+    #[error("an effect is one key, as in `payload-mass = {{}}`; found {found}")]
+    NotOneEffect { found: usize },
+    #[error("unknown effect; known: {}", known.join(", "))]
+    UnknownEffect { known: &'static [&'static str] },
+    #[error("no joint {joint}; the arm has {joints}, counted from 1")]
+    UnknownJoint { joint: u64, joints: usize },
+    #[error("no beam is called \"{link}\"; there {}", list("is", links, "are none"))]
+    UnknownLink { link: String, links: Vec<String> },
+    #[error("a joint is coupled to another one; for joint {joint} alone write gear-ratio")]
+    CoupledToItself { joint: usize },
+    #[error("no order; write at least one, as in [1]")]
+    NoOrders,
+    #[error("order {order} stands twice")]
+    RepeatedOrder { order: u32 },
+    #[error("declared already on line {line}")]
+    RepeatedEffect { line: usize },
+
+    // Rules of [parameters].
+    #[error("a name with dots stands in quotes: \"{name}\" = {{ … }}")]
+    UnquotedName { name: String },
+    #[error("says nothing; write free = true, fixed = true, or a sigma, min or max")]
+    EmptyRule,
+    #[error("a fixed parameter takes nothing else; leave out {other}")]
+    FixedAndMore { other: String },
+    #[error("min {min} is above max {max} (in SI units)")]
+    MinAboveMax { min: f64, max: f64 },
+    #[error("bounds hold the nominal value, at {nominal}: a min is not above it")]
+    MinAboveNominal { nominal: f64 },
+    #[error("bounds hold the nominal value, at {nominal}: a max is not below it")]
+    MaxBelowNominal { nominal: f64 },
+
+    // Held-out rows.
+    #[error("give one of column, fraction (with seed) or session")]
+    NotOneHeldOut,
+    #[error("no row is said to be held out; add held_out here or a column split")]
+    NoHeldOut,
+    #[error("no rows are left to fit: {cause}")]
+    NoIdentificationRows { cause: NoRows },
+    #[error("no rows are held out: {cause}")]
+    NoHeldOutRows { cause: NoRows },
+    #[error("no session is called \"{session}\"; there {}", list("is", sessions, "is no column session"))]
+    UnknownSession { session: String, sessions: Vec<String> },
+
+    // Tables of measurements.
+    #[error("no measurements; name them in `files` or with --data")]
+    NoDataFiles,
+    #[error("named twice; its rows would count twice")]
+    RepeatedFile,
+    #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
+    EmptyTable,
+    #[error("no rows below the header")]
+    NoRowsBelowHeader,
+    #[error("columns are set apart by commas, not by {found:?}")]
+    NotCommas { found: char },
+    #[error("missing; add {write}")]
+    MissingColumn { write: String },
+    #[error("given already as column {first}; keep one of the two")]
+    RepeatedColumn { first: String },
+    #[error("{} {}; give every file the same columns", other.display(), if *has { "has it, this file does not" } else { "does not have it" })]
+    ColumnsDiffer { other: PathBuf, has: bool },
+    #[error("the row has {found} fields, the header {expected}")]
+    RowLength { expected: usize, found: usize },
+    #[error("the cell is empty")]
+    EmptyCell,
+    #[error("\"{value}\" is not a number")]
+    NotANumber { value: String },
+    #[error("{value} is not a direction; write -1, 0 or 1")]
+    NotADirection { value: f64 },
+    #[error("\"{word}\" is neither identification nor validation")]
+    UnknownSplit { word: String },
+}
+
+/// Why one side of the split is empty.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum NoRows {
+    #[error("column {column} says {word} in every row")]
+    Column { column: String, word: &'static str },
+    #[error("every row is of session \"{session}\"")]
+    Session { session: String },
+    #[error("the {rows} rows have {configurations} joint configurations, too few for fraction {fraction}")]
+    Fraction { rows: usize, configurations: usize, fraction: String },
+}
+
+/// What was passed over.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum WarningKind {
+    #[error("not a column that is known; ignored")]
+    ColumnIgnored,
+    #[error("joint {joint} takes no q; ignored")]
+    JointIgnored { joint: usize },
+    #[error("not a column that is known; ignored (write {write})")]
+    UnitIgnored { write: String },
+}
+
+fn near(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!(", near `{text}`") }
+}
+
+fn list(verb: &str, names: &[String], none: &str) -> String {
+    if names.is_empty() { none.to_owned() } else { format!("{verb} {}", names.join(", ")) }
+}

@@ -1,0 +1,222 @@
+//! What the columns of a table stand for.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::convert::identity;
+
+use super::table::Table;
+use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
+use crate::problem::{HeldOut, JointKind, Problem};
+use crate::units::{self, ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
+
+/// What a column stands for; joints and axes count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Role {
+    Joint(usize),
+    Position(usize),
+    Sigma,
+    Payload,
+    Hoist,
+    Temperature,
+    Time,
+    Approach(usize),
+    Orientation(usize),
+    Split,
+    Session,
+    Target,
+    Pose,
+}
+
+/// A column that is read.
+#[derive(Clone, Copy)]
+pub(super) struct Column {
+    pub role: Role,
+    /// Place in the row, from 0.
+    pub place: usize,
+    /// Conversion to the SI unit.
+    pub to_si: fn(f64) -> f64,
+}
+
+/// The columns of one file.
+pub(super) struct Columns {
+    /// Columns in the order of their roles.
+    pub read: Vec<Column>,
+    /// Place of the column that marks held-out rows.
+    pub marked: Option<usize>,
+}
+
+impl Columns {
+    /// Finds the columns in a header; what nobody knows is a warning.
+    pub fn find(table: &Table, problem: &Problem, warnings: &mut Vec<Warning>) -> Result<Self, InputError> {
+        let marked_name = match &problem.data.held_out {
+            Some(HeldOut::Column(name)) => Some(name.as_str()),
+            None => Some("split"),
+            Some(_) => None,
+        };
+        let numbering = Numbering::of(&table.header, problem);
+        let mut found: BTreeMap<Role, &str> = BTreeMap::new();
+        let mut names = BTreeSet::new();
+        let mut columns = Self { read: Vec::new(), marked: None };
+        for (place, name) in table.header.iter().enumerate() {
+            let error = |kind| table.column(name).error(kind);
+            if !name.is_empty() && !names.insert(name) {
+                return Err(error(InputErrorKind::RepeatedColumn { first: name.clone() }));
+            }
+            let is_marked = marked_name == Some(name);
+            if is_marked {
+                columns.marked = Some(place);
+            }
+            match numbering.recognise(name, problem).map_err(error)? {
+                Meaning::Read(role, to_si) => {
+                    if let Some(first) = found.insert(role, name) {
+                        return Err(error(InputErrorKind::RepeatedColumn { first: first.to_owned() }));
+                    }
+                    columns.read.push(Column { role, place, to_si });
+                }
+                Meaning::Ignored(_) if is_marked => {}
+                Meaning::Ignored(kind) => warnings.push(Warning { location: table.column(name), kind }),
+            }
+        }
+        columns.read.sort_by_key(|column| column.role);
+        columns.require(table, problem, &numbering)?;
+        Ok(columns)
+    }
+
+    /// Whether every column is there that has to be.
+    fn require(&self, table: &Table, problem: &Problem, numbering: &Numbering) -> Result<(), InputError> {
+        let missing = |base: &str, kind: &Kind| {
+            let write = kind.spelled(base);
+            Err(table.column(base).error(InputErrorKind::MissingColumn { write }))
+        };
+        for (index, joint) in problem.joints.iter().enumerate() {
+            if let Some(kind) = kind_of(joint.kind)
+                && !self.has(Role::Joint(index))
+            {
+                return missing(&format!("q{}", numbering.number(index)), kind);
+            }
+        }
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            if !self.has(Role::Position(axis)) {
+                return missing(name, &LENGTH);
+            }
+        }
+        if let Some(HeldOut::Column(name)) = &problem.data.held_out
+            && self.marked.is_none()
+        {
+            let write = format!("it, or change held_out in {}", problem.data.held_out_location);
+            return Err(table.column(name).error(InputErrorKind::MissingColumn { write }));
+        }
+        Ok(())
+    }
+
+    pub fn has(&self, role: Role) -> bool {
+        self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+    }
+}
+
+/// What the name of a column means.
+enum Meaning {
+    Read(Role, fn(f64) -> f64),
+    Ignored(WarningKind),
+}
+
+/// Which joint a number in the name of a column means.
+struct Numbering {
+    /// Joint of each number, from 0.
+    joints: Vec<usize>,
+}
+
+impl Numbering {
+    /// Columns go by the joint's number, or else by its place among the joints that move.
+    fn of(header: &[String], problem: &Problem) -> Self {
+        let numbers: Vec<usize> = header.iter().filter_map(|name| numbered(split_unit(name).0, "q")).collect();
+        let all = || (0..problem.joints.len()).collect::<Vec<_>>();
+        let moving: Vec<usize> =
+            all().into_iter().filter(|&index| problem.joints[index].kind != JointKind::Fixed).collect();
+        let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
+        let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
+            && numbers.iter().all(|number| (1..=moving.len()).contains(number));
+        Self { joints: if !by_number && by_order { moving } else { all() } }
+    }
+
+    fn joint(&self, number: usize) -> Option<usize> {
+        self.joints.get(number.checked_sub(1)?).copied()
+    }
+
+    fn number(&self, joint: usize) -> usize {
+        self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
+    }
+
+    /// What the name of a column means.
+    fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
+        let plain = |role| Ok(Meaning::Read(role, identity));
+        match name {
+            "split" => return plain(Role::Split),
+            "session" => return plain(Role::Session),
+            "target" => return plain(Role::Target),
+            "pose" => return plain(Role::Pose),
+            _ => {}
+        }
+        if let Some(number) = numbered(name, "approach") {
+            return match self.joint(number).filter(|&joint| problem.joints[joint].kind != JointKind::Fixed) {
+                Some(joint) => plain(Role::Approach(joint)),
+                None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
+            };
+        }
+        let (base, suffix) = split_unit(name);
+        // Lengths and angles need a unit; a column such as `time` may be about something else.
+        let (role, kind, strict) = match base {
+            "x" => (Role::Position(0), &LENGTH, true),
+            "y" => (Role::Position(1), &LENGTH, true),
+            "z" => (Role::Position(2), &LENGTH, true),
+            "sigma" => (Role::Sigma, &LENGTH, true),
+            "rx" => (Role::Orientation(0), &ANGLE, true),
+            "ry" => (Role::Orientation(1), &ANGLE, true),
+            "rz" => (Role::Orientation(2), &ANGLE, true),
+            "payload" => (Role::Payload, &MASS, false),
+            "hoist" => (Role::Hoist, &FORCE, false),
+            "temperature" => (Role::Temperature, &TEMPERATURE, false),
+            "time" => (Role::Time, &TIME, false),
+            _ => {
+                let Some(number) = numbered(base, "q") else { return Ok(Meaning::Ignored(WarningKind::ColumnIgnored)) };
+                let joint = self.joint(number);
+                let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
+                else {
+                    return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
+                };
+                (Role::Joint(joint), kind, true)
+            }
+        };
+        let write = || kind.spelled(base);
+        match suffix {
+            Some(suffix) => match kind.unit(suffix) {
+                Some(unit) => Ok(Meaning::Read(role, unit.to_si)),
+                None if strict && units::suffixes().any(|known| known == suffix) => {
+                    Err(InputErrorKind::WrongUnit { noun: kind.noun, suffix: suffix.to_owned(), write: write() })
+                }
+                None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
+            },
+            None if strict => Err(InputErrorKind::NeedsUnit { noun: kind.noun, write: write() }),
+            None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
+        }
+    }
+}
+
+/// What q of a joint is measured in, where it takes one.
+fn kind_of(joint: JointKind) -> Option<&'static Kind> {
+    match joint {
+        JointKind::Revolute => Some(&ANGLE),
+        JointKind::Prismatic => Some(&LENGTH),
+        JointKind::Fixed => None,
+    }
+}
+
+/// `q1_deg` as `q1` and `deg`.
+fn split_unit(name: &str) -> (&str, Option<&str>) {
+    name.split_once('_').map_or((name, None), |(base, suffix)| (base, Some(suffix)))
+}
+
+/// The number in `q12`.
+fn numbered(name: &str, prefix: &str) -> Option<usize> {
+    let number = name.strip_prefix(prefix)?;
+    if number.bytes().all(|byte| byte.is_ascii_digit()) { number.parse().ok() } else { None }
+}

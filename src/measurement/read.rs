@@ -1,0 +1,226 @@
+//! From CSV files to [`Measurements`].
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+
+use super::columns::{Column, Columns, Role};
+use super::table::{Table, shortened};
+use super::{Labels, Measurements};
+use crate::error::{InputError, InputErrorKind, Location, Warning};
+use crate::problem::Problem;
+
+impl Measurements {
+    /// Reads the files, one after the other, and says which columns were passed over.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        let mut warnings = Vec::new();
+        let mut builder: Option<Builder> = None;
+        for (index, file) in files.iter().enumerate() {
+            if files[..index].contains(file) {
+                return Err(Location::file(file).error(InputErrorKind::RepeatedFile));
+            }
+            let mut table = Table::open(file, || missing(file, problem))?;
+            let columns = Columns::find(&table, problem, &mut warnings)?;
+            let rows = builder.get_or_insert_with(|| Builder::new(files, &table, &columns, problem));
+            rows.same_columns(&table, &columns)?;
+            let before = rows.measurements.len();
+            while table.next_row()? {
+                rows.push(index, &table, &columns)?;
+            }
+            if rows.measurements.len() == before {
+                let line = table.line();
+                return Err(Location::file(file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
+            }
+        }
+        match builder {
+            Some(builder) => Ok((builder.finish(), warnings)),
+            None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
+        }
+    }
+}
+
+/// The error of a file that is not there: at the line that names it, if the problem does.
+fn missing(file: &Path, problem: &Problem) -> InputError {
+    let path = file.to_owned();
+    let named = problem.data.files.iter().any(|known| known == file);
+    let location = if named { problem.data.files_location.clone() } else { Location::file(file) };
+    location.error(InputErrorKind::DataFileMissing { path })
+}
+
+/// Words of a column as they come.
+#[derive(Default)]
+struct LabelsBuilder {
+    labels: Labels,
+    places: HashMap<String, usize>,
+}
+
+impl LabelsBuilder {
+    fn push(&mut self, word: &str) {
+        let place = self.places.get(word).copied().unwrap_or_else(|| {
+            let place = self.labels.names.len();
+            self.labels.names.push(word.to_owned());
+            self.places.insert(word.to_owned(), place);
+            place
+        });
+        self.labels.of_row.push(place);
+    }
+}
+
+/// Measurements that grow row by row.
+struct Builder {
+    measurements: Measurements,
+    session: LabelsBuilder,
+    target: LabelsBuilder,
+    /// Roles of the first file and the names of their columns.
+    roles: Vec<(Role, String)>,
+}
+
+impl Builder {
+    fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
+        let list = |role| columns.has(role).then(Vec::new);
+        let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
+        let measurements = Measurements {
+            files: files.to_vec(),
+            origin: Vec::new(),
+            joints: problem.joints.len(),
+            configurations: Vec::new(),
+            positions: Vec::new(),
+            sigma: list(Role::Sigma),
+            payload: list(Role::Payload),
+            hoist: list(Role::Hoist),
+            temperature: list(Role::Temperature),
+            time: Vec::new(),
+            time_measured: columns.has(Role::Time),
+            approach: approach.then(Vec::new),
+            session: Labels::default(),
+            target: columns.has(Role::Target).then(Labels::default),
+            marked_held_out: columns.marked.map(|_| Vec::new()),
+        };
+        let roles = columns.read.iter().map(|column| (column.role, table.header[column.place].clone())).collect();
+        Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), roles }
+    }
+
+    /// Whether a file has the columns of the first one; `pose` alone may come and go.
+    fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
+        let differ = |name: &str, has| {
+            let other = self.measurements.files[0].clone();
+            Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
+        };
+        for (role, name) in self.roles.iter().filter(|(role, _)| *role != Role::Pose) {
+            if !columns.has(*role) {
+                return differ(name, true);
+            }
+        }
+        for column in columns.read.iter().filter(|column| column.role != Role::Pose) {
+            if !self.roles.iter().any(|(role, _)| *role == column.role) {
+                return differ(&table.header[column.place], false);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the row that the table is at.
+    fn push(&mut self, file: usize, table: &Table, columns: &Columns) -> Result<(), InputError> {
+        let measurements = &mut self.measurements;
+        let joints = measurements.joints;
+        let row = measurements.len();
+        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        measurements.origin.push((narrow(file), narrow(table.line())));
+        measurements.configurations.resize((row + 1) * joints, 0.0);
+        if let Some(approach) = &mut measurements.approach {
+            approach.resize((row + 1) * joints, 0.0);
+        }
+        if !measurements.time_measured {
+            measurements.time.push(row as f64);
+        }
+        let mut position = Vector3::zeros();
+        for column in &columns.read {
+            let number = || table.number(column.place).map(column.to_si);
+            match column.role {
+                Role::Joint(joint) => measurements.configurations[row * joints + joint] = number()?,
+                Role::Position(axis) => position[axis] = number()?,
+                Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
+                Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
+                Role::Hoist => add(&mut measurements.hoist, number()?),
+                Role::Temperature => add(&mut measurements.temperature, number()?),
+                Role::Time => measurements.time.push(number()?),
+                Role::Approach(joint) => {
+                    let direction = direction(table, column)?;
+                    if let Some(approach) = &mut measurements.approach {
+                        approach[row * joints + joint] = direction;
+                    }
+                }
+                // Kept for later: checked, not stored.
+                Role::Orientation(_) => _ = number()?,
+                Role::Split => _ = is_validation(table, column.place)?,
+                Role::Session => self.session.push(table.word(column.place)?),
+                Role::Target => self.target.push(table.word(column.place)?),
+                Role::Pose => {}
+            }
+        }
+        if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
+            marked.push(is_validation(table, place)?);
+        }
+        measurements.positions.push(position);
+        Ok(())
+    }
+
+    fn finish(self) -> Measurements {
+        let Self { mut measurements, session, target, .. } = self;
+        measurements.session = session.labels;
+        if measurements.session.names.is_empty() {
+            let of_row = vec![0; measurements.len()];
+            measurements.session = Labels { names: vec![String::new()], of_row };
+        }
+        measurements.target = measurements.target.map(|_| target.labels);
+        measurements
+    }
+}
+
+fn add(list: &mut Option<Vec<f64>>, value: f64) {
+    if let Some(list) = list {
+        list.push(value);
+    }
+}
+
+fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    // A tiny length in millimetres may become 0 in metres.
+    let converted = (column.to_si)(value);
+    if converted > 0.0 {
+        Ok(converted)
+    } else {
+        Err(table.cell_error(column.place, InputErrorKind::NotPositive { value }))
+    }
+}
+
+fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    if value < 0.0 {
+        Err(table.cell_error(column.place, InputErrorKind::Negative { value }))
+    } else {
+        Ok((column.to_si)(value))
+    }
+}
+
+fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    if [-1.0, 0.0, 1.0].contains(&value) {
+        Ok(value)
+    } else {
+        Err(table.cell_error(column.place, InputErrorKind::NotADirection { value }))
+    }
+}
+
+/// Whether a cell says `validation`; the other word is `identification`.
+fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
+    match table.word(place)? {
+        "validation" => Ok(true),
+        "identification" => Ok(false),
+        word => Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) })),
+    }
+}

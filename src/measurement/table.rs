@@ -1,0 +1,160 @@
+//! A CSV file, record by record, with its lines counted.
+
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use csv::{ByteRecord, Reader, ReaderBuilder};
+
+use super::lines::Lines;
+use crate::error::{Excerpt, InputError, InputErrorKind, Location, lines};
+
+/// An open CSV file.
+pub(super) struct Table {
+    pub file: PathBuf,
+    /// The names in the header line, without white space at their ends.
+    pub header: Vec<String>,
+    header_line: usize,
+    reader: Reader<Lines<BufReader<File>>>,
+    record: ByteRecord,
+    line: usize,
+}
+
+impl Table {
+    /// Opens a file and reads its header; `missing` makes the error where there is no such file.
+    pub fn open(file: &Path, missing: impl FnOnce() -> InputError) -> Result<Self, InputError> {
+        let input = File::open(file).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound => missing(),
+            _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
+        })?;
+        let reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .from_reader(Lines::new(BufReader::with_capacity(1 << 16, input)));
+        let mut table = Self {
+            file: file.to_owned(),
+            header: Vec::new(),
+            header_line: 1,
+            reader,
+            record: ByteRecord::new(),
+            line: 1,
+        };
+        if !table.advance()? {
+            return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
+        }
+        table.header_line = table.line;
+        for place in 0..table.record.len() {
+            let name = table.text(place)?.to_owned();
+            table.header.push(name);
+        }
+        if let [only] = table.header.as_slice()
+            && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
+        {
+            return Err(table.error(InputErrorKind::NotCommas { found }));
+        }
+        Ok(table)
+    }
+
+    /// Goes to the next row; false at the end.
+    pub fn next_row(&mut self) -> Result<bool, InputError> {
+        if !self.advance()? {
+            return Ok(false);
+        }
+        if self.record.len() != self.header.len() {
+            let (expected, found) = (self.header.len(), self.record.len());
+            return Err(self.error(InputErrorKind::RowLength { expected, found }));
+        }
+        if !self.record.as_slice().is_ascii() {
+            for place in 0..self.record.len() {
+                self.text(place)?;
+            }
+        }
+        Ok(true)
+    }
+
+    fn advance(&mut self) -> Result<bool, InputError> {
+        let found = self.reader.read_byte_record(&mut self.record).map_err(|error| {
+            let source = io::Error::from(error);
+            Location::file(&self.file).error(InputErrorKind::Unreadable { source })
+        })?;
+        if found {
+            // Every line ends in a line feed that belongs to its record, so the next line is the reader's.
+            let next = usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX);
+            self.line = next.saturating_sub(lines(self.record.as_slice()));
+        }
+        Ok(found)
+    }
+
+    /// Line of the row, counted from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    fn cell(&self, place: usize) -> &[u8] {
+        self.record.get(place).unwrap_or_default().trim_ascii()
+    }
+
+    /// A cell of the row as text, without white space at its ends.
+    pub fn text(&self, place: usize) -> Result<&str, InputError> {
+        std::str::from_utf8(self.cell(place)).map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
+    }
+
+    /// A cell of the row as a word that is not empty.
+    pub fn word(&self, place: usize) -> Result<&str, InputError> {
+        let word = self.text(place)?;
+        if word.is_empty() { Err(self.cell_error(place, InputErrorKind::EmptyCell)) } else { Ok(word) }
+    }
+
+    /// A cell of the row as a finite number.
+    pub fn number(&self, place: usize) -> Result<f64, InputError> {
+        let word = self.word(place)?;
+        let value = || shortened(word);
+        match word.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
+            Err(_) => Err(self.cell_error(place, InputErrorKind::NotANumber { value: value() })),
+        }
+    }
+
+    /// A mistake in a cell of the row.
+    pub fn cell_error(&self, place: usize, kind: InputErrorKind) -> InputError {
+        let name = self.header.get(place).map_or("", String::as_str);
+        self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
+    }
+
+    /// A place in the header line.
+    pub fn column(&self, name: &str) -> Location {
+        Location::file(&self.file).at_line(self.header_line).with_key(format!("column {}", shortened(name)))
+    }
+
+    fn error(&self, kind: InputErrorKind) -> InputError {
+        self.location(None).error(kind)
+    }
+
+    /// The row as text, with one of its cells marked.
+    fn location(&self, place: Option<usize>) -> Location {
+        let (mut text, mut span) = (String::new(), None);
+        for (index, cell) in self.record.iter().enumerate() {
+            if index > 0 {
+                text.push(',');
+            }
+            let start = text.len();
+            text.push_str(&String::from_utf8_lossy(cell));
+            if place == Some(index) {
+                span = Some(start..text.len());
+            }
+        }
+        let span = span.unwrap_or(0..text.len());
+        let excerpt = Excerpt { text: Arc::from(text), first_line: self.line, span };
+        Location { excerpt: Some(excerpt), ..Location::file(&self.file).at_line(self.line) }
+    }
+}
+
+/// At most 40 characters of a text.
+pub(super) fn shortened(text: &str) -> String {
+    match text.char_indices().nth(40) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}

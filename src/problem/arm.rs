@@ -1,0 +1,119 @@
+//! The sections `[[joint]]` and what hangs on them.
+
+use nalgebra::Vector3;
+
+use super::item::Item;
+use super::section::Section;
+use super::{Beam, Body, Hoist, Joint, JointKind, effects};
+use crate::error::{InputError, InputErrorKind};
+use crate::units::{ANGLE, FORCE, Kind, LENGTH, MASS, RIGIDITY, STIFFNESS};
+
+/// Every `[[joint]]`, at least one.
+pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputError> {
+    let mut joints = Vec::new();
+    let mut beams = Vec::new();
+    for section in root.sections("joint")? {
+        joints.push(joint(section, joints.len() + 1, &mut beams)?);
+    }
+    if joints.is_empty() {
+        return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
+    }
+    Ok(joints)
+}
+
+fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -> Result<Joint, InputError> {
+    let name = section.text("name")?.map_or_else(|| format!("joint {number}"), str::to_owned);
+    let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed];
+    let kind = section.word("kind", &["revolute", "prismatic", "fixed"], &kinds)?.unwrap_or(JointKind::Revolute);
+    let alpha = section.number("alpha", &ANGLE)?.unwrap_or(0.0);
+    let a = section.number("a", &LENGTH)?.unwrap_or(0.0);
+    let theta = section.number("theta", &ANGLE)?.unwrap_or(0.0);
+    let d = section.number("d", &LENGTH)?.unwrap_or(0.0);
+    let beta = section.number("beta", &ANGLE)?.unwrap_or(0.0);
+    let stiffness = stiff(&mut section, "stiffness", &STIFFNESS)?;
+    let beam = match section.section("beam")? {
+        Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
+        Some(section) => Some(beam(section, beams)?),
+        None => None,
+    };
+    let bodies = bodies(&mut section, "body", "com", false)?;
+    section.finish()?;
+    Ok(Joint { name, kind, alpha, a, theta, d, beta, stiffness, beam, bodies })
+}
+
+fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, InputError> {
+    let item = section.require("name", "name = \"…\"")?;
+    let name = beam_name(&item, beams)?;
+    beams.push(name.clone());
+    let mass = section.not_negative("mass", &MASS)?.unwrap_or(0.0);
+    let ea = stiff(&mut section, "EA", &FORCE)?;
+    let ei_y = stiff(&mut section, "EIy", &RIGIDITY)?;
+    let ei_z = stiff(&mut section, "EIz", &RIGIDITY)?;
+    let gj = stiff(&mut section, "GJ", &RIGIDITY)?;
+    let masses = bodies(&mut section, "mass", "at", true)?;
+    let hoist = section.section("hoist")?.map(hoist).transpose()?;
+    section.finish()?;
+    Ok(Beam { name, mass, ea, ei_y, ei_z, gj, masses, hoist })
+}
+
+/// The name of a beam, which begins the names of its parameters.
+fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError> {
+    let name = item.text()?.to_owned();
+    let reserved = name.strip_prefix("joint").is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
+        || ["tool", "base"].contains(&name.as_str())
+        || effects::NAMES.contains(&name.as_str());
+    if name.contains(|c: char| ".*[]\"".contains(c) || c.is_whitespace() || c.is_control()) {
+        Err(item.error(InputErrorKind::NotABeamName { name }))
+    } else if reserved {
+        Err(item.error(InputErrorKind::ReservedName { name }))
+    } else if beams.contains(&name) {
+        Err(item.error(InputErrorKind::RepeatedBeamName { name }))
+    } else {
+        Ok(name)
+    }
+}
+
+fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
+    let at = section.require_vector("at", &LENGTH)?;
+    let force = section.number("force", &FORCE)?.unwrap_or(0.0);
+    let direction = match section.get("direction") {
+        Some(item) => {
+            let given = item.vector()?;
+            // Scaled first, so that neither huge nor tiny numbers lose their direction.
+            let largest = given.amax();
+            let scaled = if largest > 0.0 { given.map(|value| value / largest) } else { given };
+            scaled.try_normalize(0.0).ok_or_else(|| item.error(InputErrorKind::NoDirection))?
+        }
+        None => Vector3::z(),
+    };
+    section.finish()?;
+    Ok(Hoist { at, force, direction })
+}
+
+/// Point masses; `base` is the key of their position.
+fn bodies(
+    section: &mut Section<'_, '_>,
+    key: &str,
+    base: &str,
+    position_needed: bool,
+) -> Result<Vec<Body>, InputError> {
+    let mut bodies = Vec::new();
+    for mut section in section.sections(key)? {
+        let number = bodies.len() + 1;
+        let name = section.text("name")?.map_or_else(|| format!("{key} {number}"), str::to_owned);
+        let mass = section.not_negative("mass", &MASS)?.ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
+        let position = if position_needed {
+            section.require_vector(base, &LENGTH)?
+        } else {
+            section.vector(base, &LENGTH)?.unwrap_or_default()
+        };
+        section.finish()?;
+        bodies.push(Body { name, mass, position });
+    }
+    Ok(bodies)
+}
+
+/// A stiffness or rigidity, above zero where it is given.
+fn stiff(section: &mut Section<'_, '_>, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
+    section.positive(base, kind, |value| InputErrorKind::NotStiff { value })
+}

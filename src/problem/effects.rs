@@ -1,0 +1,146 @@
+//! The tables `[[effect]]`: one effect each, with its arguments.
+
+use toml::de::DeTable;
+
+use super::item::Item;
+use super::section::Section;
+use super::{Effect, EffectDeclaration, Joint};
+use crate::error::{InputError, InputErrorKind};
+use crate::units::TIME;
+
+/// The effects by name.
+pub(super) const NAMES: [&str; 21] = [
+    "joint-compliance",
+    "joint-harmonic",
+    "gear-ratio",
+    "backlash",
+    "joint-nonlinear-stiffness",
+    "joint-lateral-compliance",
+    "joint-thermal-drift",
+    "joint-coupling",
+    "link-bending",
+    "link-thermal-bending",
+    "link-thermal-expansion",
+    "unmodelled-mass",
+    "payload-mass",
+    "hoist-force",
+    "hoist-direction",
+    "base-compliance",
+    "gravity-direction",
+    "deflected-equilibrium",
+    "tracker-scale",
+    "tracker-drift",
+    "station-shift",
+];
+
+/// Every `[[effect]]`.
+pub(super) fn read(root: &mut Section<'_, '_>, joints: &[Joint]) -> Result<Vec<EffectDeclaration>, InputError> {
+    let mut effects: Vec<EffectDeclaration> = Vec::new();
+    for section in root.sections("effect")? {
+        let entries = section.entries();
+        let [(name, item)] = entries.as_slice() else {
+            return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
+        };
+        let effect = effect(name, item, joints)?;
+        if let Some(first) = effects.iter().find(|known| known.effect == effect) {
+            let line = first.location.line.unwrap_or(0);
+            return Err(item.error(InputErrorKind::RepeatedEffect { line }));
+        }
+        effects.push(EffectDeclaration { effect, location: item.location() });
+    }
+    Ok(effects)
+}
+
+/// One effect; `true` stands for no arguments.
+fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Result<Effect, InputError> {
+    let empty = DeTable::new();
+    let section = match item.boolean() {
+        Ok(true) => item.section_of(&empty),
+        Ok(false) => return Err(item.wrong_type("a table of arguments, or true")),
+        Err(_) => item.section()?,
+    };
+    let mut arguments = Arguments { section, joints };
+    let effect = match name {
+        "joint-compliance" => Effect::JointCompliance { joint: arguments.joint("joint")? },
+        "joint-harmonic" => Effect::JointHarmonic { joint: arguments.joint("joint")?, orders: arguments.orders()? },
+        "gear-ratio" => Effect::GearRatio { joint: arguments.joint("joint")? },
+        "backlash" => Effect::Backlash { joint: arguments.joint("joint")? },
+        "joint-nonlinear-stiffness" => Effect::JointNonlinearStiffness { joint: arguments.joint("joint")? },
+        "joint-lateral-compliance" => Effect::JointLateralCompliance { joint: arguments.joint("joint")? },
+        "joint-thermal-drift" => Effect::JointThermalDrift { joint: arguments.joint("joint")? },
+        "joint-coupling" => arguments.coupling()?,
+        "link-bending" => Effect::LinkBending { joint: arguments.joint("joint")? },
+        "link-thermal-bending" => Effect::LinkThermalBending { link: arguments.link()? },
+        "link-thermal-expansion" => Effect::LinkThermalExpansion { link: arguments.link()? },
+        "unmodelled-mass" => Effect::UnmodelledMass { link: arguments.link()? },
+        "payload-mass" => Effect::PayloadMass,
+        "hoist-force" => Effect::HoistForce,
+        "hoist-direction" => Effect::HoistDirection,
+        "base-compliance" => Effect::BaseCompliance,
+        "gravity-direction" => Effect::GravityDirection,
+        "deflected-equilibrium" => Effect::DeflectedEquilibrium,
+        "tracker-scale" => Effect::TrackerScale,
+        "tracker-drift" => Effect::TrackerDrift,
+        "station-shift" => Effect::StationShift { at_time: arguments.time("at_time")? },
+        _ => return Err(item.error(InputErrorKind::UnknownEffect { known: &NAMES })),
+    };
+    arguments.section.finish()?;
+    Ok(effect)
+}
+
+/// The arguments of an effect, checked against the arm.
+struct Arguments<'s, 'a, 'i> {
+    section: Section<'a, 'i>,
+    joints: &'s [Joint],
+}
+
+impl Arguments<'_, '_, '_> {
+    /// A joint's number, counted from 1.
+    fn joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let item = self.section.require(key, &format!("{key} = …, a joint's number"))?;
+        let joint = item.whole(0)?;
+        match usize::try_from(joint) {
+            Ok(number) if (1..=self.joints.len()).contains(&number) => Ok(number),
+            _ => Err(item.error(InputErrorKind::UnknownJoint { joint, joints: self.joints.len() })),
+        }
+    }
+
+    fn coupling(&mut self) -> Result<Effect, InputError> {
+        let (joint, from) = (self.joint("joint")?, self.joint("from")?);
+        if joint == from {
+            return Err(self.section.error(InputErrorKind::CoupledToItself { joint }));
+        }
+        Ok(Effect::JointCoupling { joint, from })
+    }
+
+    /// The name of a beam.
+    fn link(&mut self) -> Result<String, InputError> {
+        let item = self.section.require("link", "link = \"…\", the name of a beam")?;
+        let link = item.text()?.to_owned();
+        let links = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone());
+        if links().any(|known| known == link) {
+            Ok(link)
+        } else {
+            Err(item.error(InputErrorKind::UnknownLink { link, links: links().collect() }))
+        }
+    }
+
+    /// Orders of harmonics, at least one, each once.
+    fn orders(&mut self) -> Result<Vec<u32>, InputError> {
+        let item = self.section.require("orders", "orders = [1], the harmonics")?;
+        let mut orders = Vec::new();
+        for element in item.list("a list of whole numbers")? {
+            let order = u32::from(element.small()?);
+            if orders.contains(&order) {
+                return Err(element.error(InputErrorKind::RepeatedOrder { order }));
+            }
+            orders.push(order);
+        }
+        if orders.is_empty() { Err(item.error(InputErrorKind::NoOrders)) } else { Ok(orders) }
+    }
+
+    /// A time [s].
+    fn time(&mut self, base: &str) -> Result<f64, InputError> {
+        self.section.number(base, &TIME)?.ok_or_else(|| self.section.missing(base, TIME.spelled(base)))
+    }
+}

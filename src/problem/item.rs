@@ -1,0 +1,176 @@
+//! A value of the problem file together with its place.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use toml::Spanned;
+use toml::de::{DeInteger, DeString, DeTable, DeValue};
+
+use super::section::Section;
+use crate::error::{InputError, InputErrorKind, Location};
+
+/// The text that is read, and its name.
+pub(super) struct Document {
+    pub file: PathBuf,
+    pub text: Arc<str>,
+}
+
+impl Document {
+    /// A part of the text.
+    pub fn locate(&self, span: Range<usize>) -> Location {
+        Location::in_text(&self.file, &self.text, span)
+    }
+}
+
+/// A value and its place.
+#[derive(Clone)]
+pub(super) struct Item<'a, 'i> {
+    document: &'a Document,
+    key: String,
+    value: &'a DeValue<'i>,
+    span: Range<usize>,
+}
+
+impl<'a, 'i> Item<'a, 'i> {
+    /// The value of a key in the section called `path`.
+    pub fn of_key(
+        document: &'a Document,
+        path: &str,
+        key: &Spanned<DeString<'i>>,
+        value: &'a Spanned<DeValue<'i>>,
+    ) -> Self {
+        let span = match value.get_ref() {
+            DeValue::Array(_) | DeValue::Table(_) => key.span(),
+            _ => key.span().start..value.span().end,
+        };
+        Self { document, key: join(path, key.get_ref()), value: value.get_ref(), span }
+    }
+
+    /// Where the value stands.
+    pub fn location(&self) -> Location {
+        self.document.locate(self.span.clone()).with_key(self.key.as_str())
+    }
+
+    /// A mistake in this value.
+    pub fn error(&self, kind: InputErrorKind) -> InputError {
+        self.location().error(kind)
+    }
+
+    /// The error of a value of another type.
+    pub fn wrong_type(&self, expected: &'static str) -> InputError {
+        let found = match self.value {
+            DeValue::String(_) => "text",
+            DeValue::Integer(_) | DeValue::Float(_) => "a number",
+            DeValue::Boolean(_) => "true or false",
+            DeValue::Datetime(_) => "a date",
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        };
+        self.error(InputErrorKind::WrongType { expected, found })
+    }
+
+    /// Whether it is a table, or a list that holds one.
+    pub fn holds_tables(&self) -> bool {
+        match self.value {
+            DeValue::Table(_) => true,
+            DeValue::Array(array) => array.iter().any(|element| element.get_ref().is_table()),
+            _ => false,
+        }
+    }
+
+    /// A finite number; integers are numbers too.
+    pub fn number(&self) -> Result<f64, InputError> {
+        let (number, written) = match self.value {
+            DeValue::Float(float) => (float.as_str().parse().ok(), float.as_str()),
+            DeValue::Integer(integer) => (integer_as_float(integer), integer.as_str()),
+            _ => return Err(self.wrong_type("a number")),
+        };
+        number
+            .filter(|number: &f64| number.is_finite())
+            .ok_or_else(|| self.error(InputErrorKind::NotFinite { value: written.to_owned() }))
+    }
+
+    /// A whole number of at least `least`.
+    pub fn whole(&self, least: u64) -> Result<u64, InputError> {
+        let written = match self.value {
+            DeValue::Integer(integer) => match u64::from_str_radix(integer.as_str(), integer.radix()) {
+                Ok(number) if number >= least => return Ok(number),
+                _ => integer.as_str(),
+            },
+            DeValue::Float(float) => float.as_str(),
+            _ => return Err(self.wrong_type("a whole number")),
+        };
+        Err(self.error(InputErrorKind::NotWhole { value: written.to_owned(), least }))
+    }
+
+    /// A whole number from 1 to 1000: of elements, of harmonics.
+    pub fn small(&self) -> Result<u16, InputError> {
+        let number = self.whole(1)?;
+        u16::try_from(number)
+            .ok()
+            .filter(|number| *number <= 1000)
+            .ok_or_else(|| self.error(InputErrorKind::TooLarge { value: number, most: 1000 }))
+    }
+
+    /// True or false.
+    pub fn boolean(&self) -> Result<bool, InputError> {
+        self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
+    }
+
+    /// Text that is not empty.
+    pub fn text(&self) -> Result<&'a str, InputError> {
+        let text = self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))?;
+        if text.trim().is_empty() { Err(self.error(InputErrorKind::Empty)) } else { Ok(text) }
+    }
+
+    /// The elements of a list, counted from 1 in messages.
+    pub fn list(&self, expected: &'static str) -> Result<Vec<Self>, InputError> {
+        let array = self.value.as_array().ok_or_else(|| self.wrong_type(expected))?;
+        let element = |(index, value): (usize, &'a Spanned<DeValue<'i>>)| Self {
+            document: self.document,
+            key: format!("{}[{}]", self.key, index + 1),
+            value: value.get_ref(),
+            span: value.span(),
+        };
+        Ok(array.iter().enumerate().map(element).collect())
+    }
+
+    /// Three numbers.
+    pub fn vector(&self) -> Result<Vector3<f64>, InputError> {
+        let elements = self.list("a list of 3 numbers")?;
+        if elements.len() != 3 {
+            return Err(self.error(InputErrorKind::NotAVector { found: elements.len() }));
+        }
+        let numbers = elements.iter().map(Self::number).collect::<Result<Vec<_>, _>>()?;
+        Ok(Vector3::from_column_slice(&numbers))
+    }
+
+    /// A table, as a section.
+    pub fn section(&self) -> Result<Section<'a, 'i>, InputError> {
+        let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        Ok(self.section_of(table))
+    }
+
+    /// A section with this item's place and a table from elsewhere.
+    pub fn section_of(&self, table: &'a DeTable<'i>) -> Section<'a, 'i> {
+        Section::new(self.document, self.key.clone(), self.span.clone(), table)
+    }
+}
+
+/// An integer of any size as a float.
+fn integer_as_float(integer: &DeInteger<'_>) -> Option<f64> {
+    if integer.radix() == 10 {
+        integer.as_str().parse().ok()
+    } else {
+        u64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|number| number as f64)
+    }
+}
+
+/// `path.key`, the key in quotes where it is not bare.
+pub(super) fn join(path: &str, key: &str) -> String {
+    let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    let dot = if path.is_empty() { "" } else { "." };
+    if bare { format!("{path}{dot}{key}") } else { format!("{path}{dot}\"{key}\"") }
+}

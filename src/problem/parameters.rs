@@ -1,0 +1,115 @@
+//! The rules of `[parameters]`.
+
+use super::item::Item;
+use super::section::Section;
+use super::{Freedom, ParameterRule, Quantities};
+use crate::error::{InputError, InputErrorKind};
+use crate::units::{ANGLE, Kind, LENGTH, RELATIVE};
+
+const KINDS: [&Kind; 3] = [&ANGLE, &LENGTH, &RELATIVE];
+/// Where the nominal value lies on the scale of each kind: no deviation, or once the nominal.
+const NOMINALS: [f64; 3] = [0.0, 0.0, 1.0];
+
+/// Every rule, in the order of the file.
+pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, InputError> {
+    let Some(section) = root.section("parameters")? else { return Ok(Vec::new()) };
+    section.entries().into_iter().map(|(pattern, item)| rule(pattern, &item)).collect()
+}
+
+fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError> {
+    if pattern.trim().is_empty() {
+        return Err(item.error(InputErrorKind::Empty));
+    }
+    let mut section = item.section()?;
+    // `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
+    if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {
+        let name = format!("{pattern}.{inner}");
+        return Err(item.error(InputErrorKind::UnquotedName { name }));
+    }
+    let fixed = flag(&mut section, "fixed")?;
+    let free = flag(&mut section, "free")?;
+    let sigma = Spread::read(&mut section, "sigma")?;
+    let min = Spread::read(&mut section, "min")?;
+    let max = Spread::read(&mut section, "max")?;
+    section.finish()?;
+
+    let held_by = match (fixed, free) {
+        (Some(true), _) => Some("fixed"),
+        (_, Some(false)) => Some("free"),
+        _ => None,
+    };
+    let freedom = if let Some(held_by) = held_by {
+        if let Some((other, _)) = section.entries().into_iter().find(|(key, _)| *key != held_by) {
+            return Err(item.error(InputErrorKind::FixedAndMore { other: other.to_owned() }));
+        }
+        Freedom::Fixed
+    } else if section.len() == 0 {
+        return Err(item.error(InputErrorKind::EmptyRule));
+    } else {
+        for (place, nominal) in NOMINALS.into_iter().enumerate() {
+            check(nominal, sigma.0[place].as_ref(), min.0[place].as_ref(), max.0[place].as_ref())?;
+        }
+        Freedom::Free { sigma: sigma.quantities(), min: min.quantities(), max: max.quantities() }
+    };
+    Ok(ParameterRule { pattern: pattern.to_owned(), freedom, location: item.location() })
+}
+
+fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputError> {
+    section.get(key).map(|item| item.boolean()).transpose()
+}
+
+/// A σ or bound [SI] and its place.
+type Value<'a, 'i> = (f64, Item<'a, 'i>);
+
+/// A σ or bound for each of [`KINDS`].
+struct Spread<'a, 'i>([Option<Value<'a, 'i>>; 3]);
+
+impl<'a, 'i> Spread<'a, 'i> {
+    fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
+        if let Some(bare) = section.peek(base) {
+            let write = KINDS.map(|kind| kind.spelled(base)).join(" or ");
+            return Err(bare.error(InputErrorKind::NeedsUnit { noun: "a spread or bound", write }));
+        }
+        let mut values = [None, None, None];
+        for (value, kind) in values.iter_mut().zip(KINDS) {
+            if let Some((item, unit)) = section.pick(base, kind)? {
+                *value = Some(((unit.to_si)(item.number()?), item));
+            }
+        }
+        Ok(Self(values))
+    }
+
+    fn quantities(&self) -> Quantities {
+        let [angle, length, relative] = self.0.each_ref().map(|value| value.as_ref().map(|(value, _)| *value));
+        Quantities { angle, length, relative }
+    }
+}
+
+/// Whether σ and bounds of one kind make sense together.
+fn check(
+    nominal: f64,
+    sigma: Option<&Value<'_, '_>>,
+    min: Option<&Value<'_, '_>>,
+    max: Option<&Value<'_, '_>>,
+) -> Result<(), InputError> {
+    if let Some((value, item)) = sigma.filter(|(value, _)| *value <= 0.0) {
+        return Err(item.error(InputErrorKind::NotPositive { value: *value }));
+    }
+    if let (Some((min, item)), Some((max, _))) = (min, max)
+        && min > max
+    {
+        return Err(item.error(InputErrorKind::MinAboveMax { min: *min, max: *max }));
+    }
+    if let Some((min, item)) = min {
+        if nominal > 0.0 && *min <= 0.0 {
+            return Err(item.error(InputErrorKind::NotPositive { value: *min }));
+        }
+        if *min > nominal {
+            return Err(item.error(InputErrorKind::MinAboveNominal { nominal }));
+        }
+    }
+    if let Some((_, item)) = max.filter(|(max, _)| *max < nominal) {
+        return Err(item.error(InputErrorKind::MaxBelowNominal { nominal }));
+    }
+    Ok(())
+}

@@ -1,0 +1,167 @@
+//! From the text of `problem.toml` to a [`Problem`].
+
+use std::path::Path;
+use std::sync::Arc;
+use std::{fs, io};
+
+use nalgebra::Vector3;
+use toml::de::DeTable;
+
+use super::item::Document;
+use super::section::Section;
+use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters};
+use crate::error::{InputError, InputErrorKind, Location, lines};
+use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
+
+impl Problem {
+    /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
+        let bytes = fs::read(&file).map_err(|source| {
+            Location::file(&file).error(match source.kind() {
+                io::ErrorKind::NotFound => InputErrorKind::ProblemMissing,
+                _ => InputErrorKind::Unreadable { source },
+            })
+        })?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            Location::file(&file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
+        })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
+        let document = Document { file: file.to_owned(), text: Arc::from(text) };
+        let table = DeTable::parse(text).map_err(|error| {
+            let span = error.span().unwrap_or(text.len()..text.len());
+            let near_text = text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
+            let message = error.message().to_owned();
+            document.locate(span).error(InputErrorKind::Syntax { message, near_text })
+        })?;
+        problem(Section::new(&document, String::new(), 0..0, table.get_ref()))
+    }
+}
+
+fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
+    let name = name(&mut root)?;
+    let title = root.text("title")?.unwrap_or(&name).to_owned();
+    let gravity = root.vector("gravity", &ACCELERATION)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
+    let statics = statics(root.section("statics")?)?;
+    let joints = arm::joints(&mut root)?;
+    let tool = tool(root.section("tool")?)?;
+    let base = base(root.section("base")?)?;
+    let effects = effects::read(&mut root, &joints)?;
+    let parameters = parameters::read(&mut root)?;
+    let data = data(&mut root)?;
+    root.finish()?;
+    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, data })
+}
+
+fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
+    let item = root.require("name", "name = \"…\"")?;
+    let name = item.text()?;
+    let barred = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
+    let edges = |c: char| c.is_whitespace() || c == '.';
+    if name.contains(barred) || name.starts_with(edges) || name.ends_with(edges) || name.len() > 200 {
+        let name = name.chars().take(200).collect();
+        return Err(item.error(InputErrorKind::NotAFolderName { name }));
+    }
+    Ok(name.to_owned())
+}
+
+fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
+    let mut statics = Statics { equilibrium: Equilibrium::Deflected, beam_elements: 1 };
+    let Some(mut section) = section else { return Ok(statics) };
+    let meanings = [Equilibrium::Deflected, Equilibrium::Undeflected];
+    if let Some(equilibrium) = section.word("equilibrium", &["deflected", "undeflected"], &meanings)? {
+        statics.equilibrium = equilibrium;
+    }
+    if let Some(item) = section.get("beam_elements") {
+        statics.beam_elements = usize::from(item.small()?);
+    }
+    section.finish()?;
+    Ok(statics)
+}
+
+fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
+    let mut tool = Tool { target: Vector3::zeros(), payload_at: Vector3::zeros(), payload_mass: 0.0 };
+    let Some(mut section) = section else { return Ok(tool) };
+    tool.target = section.vector("target", &LENGTH)?.unwrap_or_default();
+    tool.payload_at = section.vector("payload_at", &LENGTH)?.unwrap_or(tool.target);
+    tool.payload_mass = section.not_negative("payload", &MASS)?.unwrap_or(0.0);
+    section.finish()?;
+    Ok(tool)
+}
+
+fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
+    let mut base = BasePose { translation: Vector3::zeros(), rotation: Vector3::zeros() };
+    let Some(mut section) = section else { return Ok(base) };
+    base.translation = section.vector("translation", &LENGTH)?.unwrap_or_default();
+    base.rotation = section.vector("rotation", &ANGLE)?.unwrap_or_default();
+    section.finish()?;
+    Ok(base)
+}
+
+fn data(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
+    let file = root.location();
+    let Some(mut section) = root.section("data")? else {
+        let location = Location::file(file.file).with_key("data");
+        return Ok(Data {
+            files: Vec::new(),
+            position_sigma: None,
+            held_out: None,
+            reference_temperature: None,
+            files_location: location.clone(),
+            held_out_location: location.clone(),
+            location,
+        });
+    };
+    let location = section.location();
+    let mut files = Vec::new();
+    let mut files_location = location.clone();
+    if let Some(item) = section.get("files") {
+        let folder = file.file.parent().unwrap_or(Path::new(""));
+        for element in item.list("a list of file names")? {
+            files.push(folder.join(element.text()?));
+        }
+        files_location = item.location();
+    }
+    let position_sigma = section.positive("position_sigma", &LENGTH, |value| InputErrorKind::NotPositive { value })?;
+    let mut held_out = None;
+    let mut held_out_location = location.clone();
+    if let Some(item) = section.get("held_out") {
+        held_out_location = item.location();
+        held_out = Some(held_out_rows(item.section()?)?);
+    }
+    let reference_temperature = section.number("reference_temperature", &TEMPERATURE)?;
+    section.finish()?;
+    Ok(Data { files, position_sigma, held_out, reference_temperature, files_location, held_out_location, location })
+}
+
+fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
+    let column = section.get("column");
+    let fraction = section.get("fraction");
+    let session = section.get("session");
+    let seed = section.get("seed");
+    section.finish()?;
+    match (column, fraction, session, seed) {
+        (Some(column), None, None, None) => Ok(HeldOut::Column(column.text()?.trim().to_owned())),
+        (None, None, Some(session), None) => Ok(HeldOut::Session(session.text()?.trim().to_owned())),
+        (None, Some(item), None, seed) => {
+            let fraction = item.number()?;
+            if fraction <= 0.0 || fraction >= 1.0 {
+                return Err(item.error(InputErrorKind::NotAFraction { value: fraction }));
+            }
+            let seed = seed.map_or(Ok(0), |seed| seed.whole(0))?;
+            Ok(HeldOut::Fraction { fraction, seed })
+        }
+        _ => Err(section.error(InputErrorKind::NotOneHeldOut)),
+    }
+}

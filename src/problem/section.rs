@@ -1,0 +1,182 @@
+//! A table of the problem file, read key by key; a key that nobody asked for is an error.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use toml::de::DeTable;
+
+use super::item::{Document, Item, join};
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::units::{self, Kind, Unit};
+
+/// A table that is being read.
+pub(super) struct Section<'a, 'i> {
+    document: &'a Document,
+    path: String,
+    span: Range<usize>,
+    table: &'a DeTable<'i>,
+    /// Keys asked for so far.
+    known: Vec<String>,
+}
+
+impl<'a, 'i> Section<'a, 'i> {
+    pub fn new(document: &'a Document, path: String, span: Range<usize>, table: &'a DeTable<'i>) -> Self {
+        Self { document, path, span, table, known: Vec::new() }
+    }
+
+    /// Where the section begins.
+    pub fn location(&self) -> Location {
+        let location = self.document.locate(self.span.clone());
+        if self.path.is_empty() { location } else { location.with_key(self.path.as_str()) }
+    }
+
+    /// A mistake in the section as a whole.
+    pub fn error(&self, kind: InputErrorKind) -> InputError {
+        self.location().error(kind)
+    }
+
+    /// The error of a key that is not there.
+    pub fn missing(&self, key: &str, write: impl Into<String>) -> InputError {
+        let kind = InputErrorKind::MissingKey { write: write.into() };
+        self.location().with_key(join(&self.path, key)).error(kind)
+    }
+
+    /// Number of keys.
+    pub fn len(&self) -> usize {
+        self.table.len()
+    }
+
+    /// Every key and its value, in the order of the file.
+    pub fn entries(&self) -> Vec<(&'a str, Item<'a, 'i>)> {
+        let mut entries: Vec<_> = self.table.iter().collect();
+        entries.sort_by_key(|(key, _)| key.span().start);
+        let item = |(key, value)| Item::of_key(self.document, &self.path, key, value);
+        entries.into_iter().map(|(key, value)| (&**key.get_ref(), item((key, value)))).collect()
+    }
+
+    /// The value of a key, without taking note of it.
+    pub fn peek(&self, key: &str) -> Option<Item<'a, 'i>> {
+        let (key, value) = self.table.get_key_value(key)?;
+        Some(Item::of_key(self.document, &self.path, key, value))
+    }
+
+    /// The value of a key that may be there.
+    pub fn get(&mut self, key: &str) -> Option<Item<'a, 'i>> {
+        self.known.push(key.to_owned());
+        self.peek(key)
+    }
+
+    /// The value of a key that has to be there.
+    pub fn require(&mut self, key: &str, write: &str) -> Result<Item<'a, 'i>, InputError> {
+        self.get(key).ok_or_else(|| self.missing(key, write))
+    }
+
+    /// Text that may be there.
+    pub fn text(&mut self, key: &str) -> Result<Option<&'a str>, InputError> {
+        self.get(key).map(|item| item.text()).transpose()
+    }
+
+    /// One of a few words, with what each stands for.
+    pub fn word<T: Copy>(
+        &mut self,
+        key: &str,
+        words: &'static [&'static str],
+        meanings: &[T],
+    ) -> Result<Option<T>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let word = item.text()?;
+        let meaning = words.iter().zip(meanings).find(|(known, _)| **known == word).map(|(_, meaning)| *meaning);
+        let unknown = || item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known: words });
+        meaning.ok_or_else(unknown).map(Some)
+    }
+
+    /// A subsection that may be there.
+    pub fn section(&mut self, key: &str) -> Result<Option<Self>, InputError> {
+        self.get(key).map(|item| item.section()).transpose()
+    }
+
+    /// The tables of `[[key]]`, none if it is not there.
+    pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, InputError> {
+        let Some(item) = self.get(key) else { return Ok(Vec::new()) };
+        item.list("a list of tables, each with its header in double brackets")?.iter().map(Item::section).collect()
+    }
+
+    /// The value of the key `base` in one of the units of `kind`, and that unit.
+    pub fn pick(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
+        let mut found: Option<(Item<'a, 'i>, Unit)> = None;
+        let mut first_key = String::new();
+        for unit in kind.units {
+            let key = format!("{base}_{}", unit.suffix);
+            if let Some(item) = self.get(&key) {
+                if found.is_some() {
+                    return Err(item.error(InputErrorKind::GivenTwice { first: first_key }));
+                }
+                found = Some((item, *unit));
+                first_key = key;
+            }
+        }
+        Ok(found)
+    }
+
+    /// The same, where `base` has this one kind: no unit or the unit of another kind is an error.
+    fn quantity(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
+        if let Some(bare) = self.peek(base).filter(|item| !item.holds_tables()) {
+            let write = kind.spelled(base);
+            return Err(bare.error(InputErrorKind::NeedsUnit { noun: kind.noun, write }));
+        }
+        for suffix in units::suffixes().filter(|suffix| kind.unit(suffix).is_none()) {
+            if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
+                let (suffix, write) = (suffix.to_owned(), kind.spelled(base));
+                return Err(item.error(InputErrorKind::WrongUnit { noun: kind.noun, suffix, write }));
+            }
+        }
+        self.pick(base, kind)
+    }
+
+    /// A number with a unit [SI].
+    pub fn number(&mut self, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
+        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+        Ok(Some((unit.to_si)(item.number()?)))
+    }
+
+    /// A number with a unit that is not negative [SI].
+    pub fn not_negative(&mut self, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
+        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+        let value = item.number()?;
+        if value < 0.0 { Err(item.error(InputErrorKind::Negative { value })) } else { Ok(Some((unit.to_si)(value))) }
+    }
+
+    /// A number with a unit that is above zero [SI]; `zero` makes the error where it is not.
+    pub fn positive(
+        &mut self,
+        base: &str,
+        kind: &Kind,
+        zero: fn(f64) -> InputErrorKind,
+    ) -> Result<Option<f64>, InputError> {
+        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+        let value = item.number()?;
+        // A tiny length in millimetres may become 0 in metres.
+        let converted = (unit.to_si)(value);
+        if converted > 0.0 { Ok(Some(converted)) } else { Err(item.error(zero(value))) }
+    }
+
+    /// Three numbers with a unit [SI].
+    pub fn vector(&mut self, base: &str, kind: &Kind) -> Result<Option<Vector3<f64>>, InputError> {
+        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+        Ok(Some(item.vector()?.map(unit.to_si)))
+    }
+
+    /// Three numbers with a unit that have to be there [SI].
+    pub fn require_vector(&mut self, base: &str, kind: &Kind) -> Result<Vector3<f64>, InputError> {
+        self.vector(base, kind)?.ok_or_else(|| self.missing(base, kind.spelled(base)))
+    }
+
+    /// Whether the section holds a key that nobody asked for: an error at the first of them.
+    pub fn finish(&self) -> Result<(), InputError> {
+        let unknown = self.entries().into_iter().find(|(key, _)| !self.known.iter().any(|known| known == key));
+        match unknown {
+            Some((_, item)) => Err(item.error(InputErrorKind::UnknownKey { known: self.known.clone() })),
+            None => Ok(()),
+        }
+    }
+}
