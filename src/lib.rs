@@ -1,8 +1,12 @@
 //! Identifies the geometric and elastic parameters of robot arms from measured end-point positions.
 
+pub mod arm;
 pub mod error;
 pub mod fit;
 pub mod measurement;
+pub mod model;
+pub mod parameter;
 pub mod problem;
-
+pub mod scalar;
+pub mod spatial;
 mod units;

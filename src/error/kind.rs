@@ -108,6 +108,13 @@ pub enum InputErrorKind {
     #[error("bounds hold the nominal value, at {nominal}: a max is not below it")]
     MaxBelowNominal { nominal: f64 },
 
+    #[error("the pattern matches no parameter of this arm; {}", list("they are", known, "it has none"))]
+    MatchesNothing { known: Vec<String> },
+    #[error("{parameter} takes {suffixes}; give that too, or a rule of its own")]
+    QuantityMissing { parameter: String, suffixes: &'static str },
+    #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
+    QuantityUseless { suffixes: &'static str },
+
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,

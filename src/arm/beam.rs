@@ -1,0 +1,177 @@
+//! The Euler–Bernoulli cantilever in closed form, in three dimensions.
+//!
+//! Root frame: x along the beam, the tip at x = L. Every load is a wrench at a station or spread evenly; deflections
+//! superpose. L may be negative (the link runs along −x); rigidities then enter with the sign of L, which leaves every
+//! formula as it stands.
+
+use nalgebra::Vector3;
+
+use crate::scalar::Scalar;
+
+/// Flexibilities of a uniform beam; 0 means rigid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flexibility<S> {
+    /// 1/EA [1/N].
+    pub axial: S,
+    /// `1/EI_y` [1/(N·m²)]: bends in the x-z plane.
+    pub about_y: S,
+    /// `1/EI_z` [1/(N·m²)]: bends in the x-y plane.
+    pub about_z: S,
+    /// 1/GJ [1/(N·m²)].
+    pub twist: S,
+}
+
+/// Force [N] and moment [N·m] at one point, in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench<S> {
+    /// Force [N].
+    pub force: Vector3<S>,
+    /// Moment about the point [N·m].
+    pub moment: Vector3<S>,
+}
+
+/// Displacement [m] and small rotation vector [rad] of a section, root frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deflection<S> {
+    /// Displacement of the axis [m].
+    pub displacement: Vector3<S>,
+    /// Rotation vector [rad].
+    pub rotation: Vector3<S>,
+}
+
+impl<S: Scalar> Deflection<S> {
+    /// No deflection.
+    pub fn zero() -> Self {
+        let zero = Vector3::from_element(S::from(0.0));
+        Self { displacement: zero, rotation: zero }
+    }
+}
+
+/// What a unit load does: geometry only, shared by both bending planes.
+#[derive(Clone, Copy)]
+struct Shape<S> {
+    /// Deflection per force and flexibility [m³] (evenly spread: per N/m [m⁴]).
+    deflection_of_force: S,
+    /// Slope per force and flexibility [m²] ([m³]).
+    slope_of_force: S,
+    /// Deflection per moment and flexibility [m²].
+    deflection_of_moment: S,
+    /// Slope per moment and flexibility, also stretch and twist [m].
+    slope_of_moment: S,
+}
+
+/// A clamped uniform beam with its loads, all in the root frame.
+#[derive(Debug)]
+pub struct Cantilever<'a, S> {
+    /// Signed length L [m].
+    pub length: S,
+    /// Flexibilities, those of a beam along +x.
+    pub flexibility: Flexibility<S>,
+    /// Evenly spread load [N/m] over the signed length: total force / L.
+    pub spread: Vector3<S>,
+    /// Point loads: station s [m] between 0 and L, and wrench there. The tip load is the one at s = L.
+    pub points: &'a [(S, Wrench<S>)],
+}
+
+impl<S: Scalar> Cantilever<'_, S> {
+    /// Deflection of the section at `x` [m], 0 ≤ x/L ≤ 1.
+    ///
+    /// Load F, M at s, for x ≤ s:  δ = F (s x²/2 − x³/6)/EI + M x²/(2EI),  φ = F (s x − x²/2)/EI + M x/EI;
+    /// beyond s the beam stays straight. Spread load q:  δ = q (L²x²/4 − L x³/6 + x⁴/24)/EI. Small slopes only.
+    /// At the tip these are [Chen2021, eq. 4 and 6] without their misprints.
+    pub fn at(&self, x: S) -> Deflection<S> {
+        let l = self.length;
+        let (x2, l2) = (x * x, l * l);
+        let mut out = Deflection::zero();
+        for (station, wrench) in self.points {
+            let s = *station;
+            let shape = if x.re().abs() <= s.re().abs() {
+                Shape {
+                    deflection_of_force: x2 * (s * 0.5 - x / 6.0),
+                    slope_of_force: x * (s - x * 0.5),
+                    deflection_of_moment: x2 * 0.5,
+                    slope_of_moment: x,
+                }
+            } else {
+                let (beyond, half) = (x - s, s * s * 0.5);
+                Shape {
+                    deflection_of_force: s * half * (2.0 / 3.0) + half * beyond,
+                    slope_of_force: half,
+                    deflection_of_moment: half + s * beyond,
+                    slope_of_moment: s,
+                }
+            };
+            self.superpose(&mut out, &shape, wrench);
+        }
+        self.superpose_spread(
+            &mut out,
+            x2 * (l2 * 0.25 - l * x / 6.0 + x2 / 24.0),
+            x * (l2 * 0.5 - l * x * 0.5 + x2 / 6.0),
+            x * (l - x * 0.5),
+        );
+        out
+    }
+
+    /// Deflection of the tip, x = L.
+    pub fn tip(&self) -> Deflection<S> {
+        self.at(self.length)
+    }
+
+    /// Mean displacement along the beam [m]: that of its own centre of mass.
+    pub fn mean_displacement(&self) -> Vector3<S> {
+        let l = self.length;
+        let mut out = Deflection::zero();
+        for (station, wrench) in self.points {
+            let s = *station;
+            let (beyond, half) = (l - s, s * s * 0.5);
+            let end = Shape {
+                deflection_of_force: s * half * (2.0 / 3.0),
+                slope_of_force: half,
+                deflection_of_moment: half,
+                slope_of_moment: s,
+            };
+            let mean = |inside: S, end: S, slope: S| (inside + (end + slope * beyond * 0.5) * beyond) / l;
+            let shape = Shape {
+                deflection_of_force: mean(half * half * 0.5, end.deflection_of_force, end.slope_of_force),
+                slope_of_force: half,
+                deflection_of_moment: mean(s * half / 3.0, end.deflection_of_moment, s),
+                slope_of_moment: (half + s * beyond) / l,
+            };
+            self.superpose(&mut out, &shape, wrench);
+        }
+        let l2 = l * l;
+        self.superpose_spread(&mut out, l2 * l2 * 0.05, l2 * l / 6.0, l2 / 3.0);
+        out.displacement
+    }
+
+    fn signed_flexibility(&self) -> Flexibility<S> {
+        let k = self.flexibility;
+        if self.length.re() < 0.0 {
+            Flexibility { axial: -k.axial, about_y: -k.about_y, about_z: -k.about_z, twist: -k.twist }
+        } else {
+            k
+        }
+    }
+
+    /// Rotation about z is +slope in y; rotation about y is −slope in z.
+    fn superpose(&self, out: &mut Deflection<S>, shape: &Shape<S>, wrench: &Wrench<S>) {
+        let k = self.signed_flexibility();
+        let (f, m) = (&wrench.force, &wrench.moment);
+        out.displacement.x += k.axial * f.x * shape.slope_of_moment;
+        out.displacement.y += k.about_z * (f.y * shape.deflection_of_force + m.z * shape.deflection_of_moment);
+        out.displacement.z += k.about_y * (f.z * shape.deflection_of_force - m.y * shape.deflection_of_moment);
+        out.rotation.x += k.twist * m.x * shape.slope_of_moment;
+        out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
+        out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
+    }
+
+    fn superpose_spread(&self, out: &mut Deflection<S>, deflection: S, slope: S, stretch: S) {
+        let k = self.signed_flexibility();
+        let q = &self.spread;
+        out.displacement.x += k.axial * q.x * stretch;
+        out.displacement.y += k.about_z * q.y * deflection;
+        out.displacement.z += k.about_y * q.z * deflection;
+        out.rotation.y -= k.about_y * q.z * slope;
+        out.rotation.z += k.about_z * q.y * slope;
+    }
+}

@@ -1,0 +1,148 @@
+//! One beam element on the bent arm.
+
+use nalgebra::Vector3;
+
+use super::{Cantilever, Deflection, Flexibility, Wrench};
+use crate::scalar::Scalar;
+use crate::spatial::{Frame, rotate};
+
+/// A load on a beam.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LinkLoad<S> {
+    /// Which element carries it.
+    pub element: usize,
+    /// Place in the beam's frame [m].
+    pub at: Vector3<f64>,
+    /// Force, arm base frame [N].
+    pub force: Vector3<S>,
+}
+
+/// A stretch of a beam with everything that acts on it, forces in the arm base frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Element<'a, S> {
+    /// Number along the beam.
+    pub number: usize,
+    /// Signed length [m].
+    pub length: S,
+    /// Where it begins along the beam [m].
+    pub start: S,
+    pub flexibility: Flexibility<S>,
+    /// Own weight [N].
+    pub weight: Vector3<S>,
+    /// Loads of the whole beam.
+    pub loads: &'a [LinkLoad<S>],
+    /// Force of everything beyond the tip [N], and its moment about the tip [N·m].
+    pub tip: Wrench<S>,
+}
+
+/// An element that has bent.
+///
+/// Deflections are taken relative to the chord from root to tip and forces are resolved along it: what the closed form
+/// neglects (the axial force's lever on the bent axis, the shortening of a bent axis) is then small of higher order.
+pub(super) struct BentElement<'a, S> {
+    element: &'a Element<'a, S>,
+    cantilever: Cantilever<'a, S>,
+    /// Frame at the root, x along the chord.
+    chord: Frame<S>,
+    /// Rotation vector from the undeflected axis to the chord [rad].
+    lean: Vector3<S>,
+}
+
+impl<S: Scalar> Element<'_, S> {
+    /// Loads on this element.
+    pub fn own_loads(&self) -> impl Iterator<Item = &LinkLoad<S>> {
+        self.loads.iter().filter(|load| load.element == self.number)
+    }
+
+    /// The clamped beam with its loads resolved in `axes`; `points` is memory.
+    fn cantilever<'p>(&self, axes: &Frame<S>, points: &'p mut Vec<(S, Wrench<S>)>) -> Cantilever<'p, S> {
+        points.clear();
+        for load in self.own_loads() {
+            let (station, offset) = self.station_and_offset(load);
+            let force = axes.resolve(&load.force);
+            points.push((station, Wrench { force, moment: offset.cross(&force) }));
+        }
+        let tip = Wrench { force: axes.resolve(&self.tip.force), moment: axes.resolve(&self.tip.moment) };
+        points.push((self.length, tip));
+        Cantilever {
+            length: self.length,
+            flexibility: self.flexibility,
+            spread: axes.resolve(&self.weight) / self.length,
+            points,
+        }
+    }
+
+    /// The section that carries a load, measured from the element's root, and the rigid arm from there to it [m].
+    fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
+        let x = -self.start + load.at.x;
+        let part = x.re() / self.length.re();
+        let station = if part < 0.0 {
+            S::from(0.0)
+        } else if part > 1.0 {
+            self.length
+        } else {
+            x
+        };
+        (station, Vector3::new(x - station, S::from(load.at.y), S::from(load.at.z)))
+    }
+
+    /// Tip frame to first order [Chen2021, eq. 20-22 as corrected]: loads resolved in the frame `rigid` of the rigid arm.
+    pub fn first_order_tip(&self, root: Frame<S>, rigid: &Frame<S>, points: &mut Vec<(S, Wrench<S>)>) -> Frame<S> {
+        let Deflection { displacement, rotation } = self.cantilever(rigid, points).tip();
+        let mut tip = root;
+        tip.translate_x(self.length);
+        tip.translate(&displacement);
+        tip.rotate(&rotation);
+        tip
+    }
+
+    /// The element bent by its loads, clamped at `root`.
+    pub fn bend<'p>(&'p self, root: &Frame<S>, points: &'p mut Vec<(S, Wrench<S>)>) -> BentElement<'p, S> {
+        let lean_of = |tip: &Deflection<S>| {
+            let slope = tip.displacement / self.length;
+            Vector3::new(S::from(0.0), -slope.z, slope.y)
+        };
+        let leaning = |lean: &Vector3<S>| {
+            let mut chord = *root;
+            chord.rotate(lean);
+            chord
+        };
+        let along_root = lean_of(&self.cantilever(root, points).tip());
+        let cantilever = self.cantilever(&leaning(&along_root), points);
+        let lean = lean_of(&cantilever.tip());
+        BentElement { element: self, cantilever, chord: leaning(&lean), lean }
+    }
+
+    /// Where a load hangs on the straight element, arm base frame [m].
+    pub fn straight_point(&self, root: &Frame<S>, load: &LinkLoad<S>) -> Vector3<S> {
+        let (station, mut local) = self.station_and_offset(load);
+        local.x += station;
+        root.point(&local)
+    }
+}
+
+impl<S: Scalar> BentElement<'_, S> {
+    /// Place of a load, arm base frame [m].
+    pub fn point(&self, load: &LinkLoad<S>) -> Vector3<S> {
+        let (station, offset) = self.element.station_and_offset(load);
+        let Deflection { displacement, rotation } = self.cantilever.at(station);
+        let along = Vector3::new(station, S::from(0.0), S::from(0.0));
+        let axis = along + displacement - self.lean.cross(&along);
+        self.chord.point(&(axis + rotate(&(rotation - self.lean), &offset)))
+    }
+
+    /// Centre of mass of the element itself, arm base frame [m].
+    pub fn centre_of_mass(&self) -> Vector3<S> {
+        let along = Vector3::new(self.element.length * 0.5, S::from(0.0), S::from(0.0));
+        self.chord.point(&(along + self.cantilever.mean_displacement() - self.lean.cross(&along)))
+    }
+
+    /// Frame at the tip, arm base frame.
+    pub fn tip(&self) -> Frame<S> {
+        let Deflection { displacement, rotation } = self.cantilever.tip();
+        let mut tip = self.chord;
+        tip.translate_x(self.element.length + displacement.x);
+        tip.rotate(&(rotation - self.lean));
+        tip
+    }
+}

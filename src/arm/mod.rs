@@ -1,0 +1,11 @@
+//! The arm's physics, generic over the scalar: frames, elastic links and joints, static equilibrium.
+
+mod beam;
+mod element;
+mod link;
+mod place;
+mod statics;
+
+pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
+pub use link::{Angle, Arm, Beam, Hoist, Joint, PointMass, Setup};
+pub use statics::{Equilibrated, Response, StaticsError, Workspace};

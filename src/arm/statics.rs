@@ -1,0 +1,248 @@
+//! Static equilibrium: which moments bend the arm, and where its end point comes to rest.
+//!
+//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam element's tip and one
+//! about every flexible joint. A walk with moments x places every load, and the loads give moments G(x). The rigid
+//! walk's moments are the paper's first order; x = G(x) is equilibrium on the bent arm. With P(x) the target position,
+//! its total derivative needs no iteration in dual numbers:
+//!
+//! p = P(x*) + Λ (G(x*) − x*),  Λ = `P_x` (I − `G_x`)⁻¹,
+//!
+//! has the value and the first derivatives of the equilibrium position when the walk is made in dual numbers at the
+//! real fixed point x* (implicit function theorem, in adjoint form).
+
+use nalgebra::Vector3;
+use num_dual::DualSVec64;
+
+use super::link::{Arm, Setup};
+use super::place::{Bend, Event};
+use crate::problem::Equilibrium;
+use crate::scalar::{Scalar, gradient, seeded};
+use crate::spatial::Frame;
+
+pub use super::place::Workspace;
+
+/// Passes after which a fixed point that has not settled is given up: the arm is too soft for its loads.
+const MAX_PASSES: usize = 200;
+/// Moments have settled when they change by less than this part of the largest.
+const SETTLED: f64 = 1e-13;
+/// Directions seeded at once when the response to moments is differentiated.
+const CHUNK: usize = 8;
+
+type Dual = DualSVec64<CHUNK>;
+
+/// Why a pose has no static equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum StaticsError {
+    /// The bent arm keeps bending: too soft for its loads.
+    #[error("the deflection does not settle: the arm is too soft for its loads")]
+    NotSettled,
+}
+
+/// A pose in static equilibrium.
+#[derive(Debug, Clone)]
+pub struct Equilibrated {
+    /// The last frame, arm base frame.
+    pub frame: Frame<f64>,
+    /// Moments x* [N·m].
+    moments: Vec<f64>,
+    /// Λ, shape = (3, moments), row after row [m/(N·m)]; empty until asked for.
+    adjoint: Vec<f64>,
+    /// `P_x`, shape = (3, moments), and `G_x`, column after column.
+    position_response: Vec<f64>,
+    moment_response: Vec<f64>,
+}
+
+impl Default for Equilibrated {
+    fn default() -> Self {
+        Self {
+            frame: Frame::identity(),
+            moments: Vec::new(),
+            adjoint: Vec::new(),
+            position_response: Vec::new(),
+            moment_response: Vec::new(),
+        }
+    }
+}
+
+impl<S: Scalar> Workspace<S> {
+    /// Moments at every section that bends, from the loads of the last walk, arm base frame [N·m].
+    fn sum_moments(&mut self) {
+        let Self { events, next_moments, .. } = self;
+        let zero = Vector3::from_element(S::from(0.0));
+        let (mut force_sum, mut moment_sum) = (zero, zero);
+        next_moments.clear();
+        for event in events.iter().rev() {
+            match event {
+                Event::Load { at, force } => {
+                    force_sum += force;
+                    moment_sum += at.cross(force);
+                }
+                Event::Tip { at } => {
+                    let moment = moment_sum - at.cross(&force_sum);
+                    next_moments.extend([moment.z, moment.y, moment.x]);
+                }
+                Event::Axis { at, axis } => next_moments.push(axis.dot(&(moment_sum - at.cross(&force_sum)))),
+            }
+        }
+        next_moments.reverse();
+    }
+}
+
+impl Arm<f64> {
+    /// Brings one pose to rest.
+    ///
+    /// # Errors
+    /// The arm is too soft for its loads.
+    pub fn equilibrate(
+        &self,
+        setup: &Setup,
+        ws: &mut Workspace<f64>,
+        pose: &mut Equilibrated,
+    ) -> Result<(), StaticsError> {
+        pose.adjoint.clear();
+        pose.moments.clear();
+        if !self.is_elastic() {
+            pose.frame = self.walk(setup, Bend::Rigid, ws);
+            return Ok(());
+        }
+        self.gather_forces(setup, ws);
+        self.walk(setup, Bend::Rigid, ws);
+        ws.sum_moments();
+        pose.moments.extend_from_slice(&ws.next_moments);
+        if self.equilibrium == Equilibrium::Undeflected {
+            pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), ws);
+            return Ok(());
+        }
+        for _ in 0..MAX_PASSES {
+            pose.frame = self.walk(setup, Bend::Bent(&pose.moments), ws);
+            ws.sum_moments();
+            let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let change = pose.moments.iter().zip(&ws.next_moments).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            if !change.is_finite() {
+                break;
+            }
+            if change <= SETTLED * largest {
+                return Ok(());
+            }
+            pose.moments.copy_from_slice(&ws.next_moments);
+        }
+        Err(StaticsError::NotSettled)
+    }
+}
+
+/// Differentiates equilibrium with respect to its moments.
+#[derive(Debug, Clone)]
+pub struct Response {
+    arm: Arm<Dual>,
+    ws: Workspace<Dual>,
+}
+
+impl Response {
+    /// For poses of `arm`.
+    pub fn new(arm: &Arm<f64>) -> Self {
+        Self { arm: arm.lift(), ws: Workspace::default() }
+    }
+
+    /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame.
+    pub fn adjoint(&mut self, setup: &Setup, target: &Vector3<f64>, pose: &mut Equilibrated) {
+        let n = pose.moments.len();
+        if n == 0 || self.arm.equilibrium == Equilibrium::Undeflected {
+            return;
+        }
+        pose.position_response.resize(3 * n, 0.0);
+        pose.moment_response.resize(n * n, 0.0);
+        let target = target.map(Dual::from);
+        let mut moments = std::mem::take(&mut self.ws.moments);
+        self.arm.gather_forces(setup, &mut self.ws);
+        for first in (0..n).step_by(CHUNK) {
+            moments.clear();
+            moments.extend(pose.moments.iter().enumerate().map(|(k, &x)| seeded(x, k.checked_sub(first))));
+            let frame = self.arm.walk(setup, Bend::Bent(&moments), &mut self.ws);
+            self.ws.sum_moments();
+            let position = frame.point(&target);
+            let columns = first..n.min(first + CHUNK);
+            for i in 0..3 {
+                let row = gradient(&position[i]);
+                pose.position_response[i * n..(i + 1) * n][columns.clone()]
+                    .copy_from_slice(&row.as_slice()[..columns.len()]);
+            }
+            for i in 0..n {
+                let row = gradient(&self.ws.next_moments[i]);
+                for (j, g) in columns.clone().zip(&row) {
+                    pose.moment_response[j * n + i] = *g;
+                }
+            }
+        }
+        self.ws.moments = moments;
+        pose.solve_adjoint();
+    }
+}
+
+impl Equilibrated {
+    /// Λ = `P_x` + Λ `G_x` by the same contraction as the equilibrium itself.
+    fn solve_adjoint(&mut self) {
+        let n = self.moments.len();
+        self.adjoint.clear();
+        self.adjoint.extend_from_slice(&self.position_response);
+        for row in 0..3 {
+            let direct = &self.position_response[row * n..(row + 1) * n];
+            let adjoint = &mut self.adjoint[row * n..(row + 1) * n];
+            let scale = direct.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            for _ in 0..MAX_PASSES {
+                let mut change = 0.0_f64;
+                // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything inboard.
+                for j in (0..n).rev() {
+                    let column = &self.moment_response[j * n..(j + 1) * n];
+                    let next = direct[j] + adjoint.iter().zip(column).map(|(l, g)| l * g).sum::<f64>();
+                    change = change.max((next - adjoint[j]).abs());
+                    adjoint[j] = next;
+                }
+                if change <= SETTLED * scale {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Arm<S> {
+    /// Position [m] of the target at `target` [m] (last frame), arm base frame, with its exact first derivatives.
+    ///
+    /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and for loads on the bent
+    /// arm its Λ for the same target.
+    pub fn target_position(
+        &self,
+        setup: &Setup,
+        target: &Vector3<f64>,
+        pose: &Equilibrated,
+        ws: &mut Workspace<S>,
+    ) -> Vector3<S> {
+        let target = target.map(S::from);
+        if pose.moments.is_empty() {
+            return self.walk(setup, Bend::Rigid, ws).point(&target);
+        }
+        self.gather_forces(setup, ws);
+        let mut moments = std::mem::take(&mut ws.moments);
+        moments.clear();
+        let position = if self.equilibrium == Equilibrium::Undeflected {
+            self.walk(setup, Bend::Rigid, ws);
+            ws.sum_moments();
+            moments.extend_from_slice(&ws.next_moments);
+            self.walk(setup, Bend::FirstOrder(&moments), ws).point(&target)
+        } else {
+            moments.extend(pose.moments.iter().map(|&x| S::from(x)));
+            let mut position = self.walk(setup, Bend::Bent(&moments), ws).point(&target);
+            ws.sum_moments();
+            let n = moments.len();
+            for (j, (next, &x)) in ws.next_moments.iter().zip(&pose.moments).enumerate() {
+                let change = *next - x;
+                for i in 0..3 {
+                    position[i] += change * pose.adjoint[i * n + j];
+                }
+            }
+            position
+        };
+        ws.moments = moments;
+        position
+    }
+}

@@ -1,0 +1,165 @@
+//! What the measurements can tell: rank, conditioning, and the combinations they are blind to.
+//!
+//! Columns of the Jacobian are scaled to unit norm first, so that angles, lengths and logarithms compare.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A scaled singular value below this part of the largest counts as zero.
+///
+/// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above 1e-5.
+pub const BLIND_BELOW: f64 = 1e-9;
+/// A column of the Jacobian with a norm below this part of the largest, per unit of its scale, counts as zero.
+const ZERO_COLUMN: f64 = 1e-14;
+/// Entries of a combination below this are rounding.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// What the data of a problem can identify, from the triangular factor R of its Jacobian.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identifiability {
+    /// Singular values of the column-scaled Jacobian, largest first.
+    pub singular_values: Vec<f64>,
+    /// Number of singular values that are not zero.
+    pub rank: usize,
+    /// Combinations of parameters that leave every measurement as it is.
+    pub blind: Vec<BlindCombination>,
+    /// Rows that span the blind combinations, orthonormal in the scaled unknowns, shape = (n − rank, n) [1 / unit of x].
+    pub gauge: DMatrix<f64>,
+    /// Part of each unknown that lies outside the blind combinations, 0…1.
+    pub visible: Vec<f64>,
+}
+
+/// Parameters that can change together without changing any measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlindCombination {
+    /// Unknown and weight in scaled unknowns (unit norm, first weight positive), in the order of the unknowns.
+    pub weights: Vec<(usize, f64)>,
+    /// What the scaled Jacobian makes of it.
+    pub singular_value: f64,
+}
+
+impl Identifiability {
+    /// Of the least-squares problem with triangular factor `triangle` (n × n).
+    pub fn of(triangle: &DMatrix<f64>) -> Self {
+        let n = triangle.ncols();
+        let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm()).collect();
+        let largest = norms.iter().copied().fold(0.0, f64::max);
+        let scale: Vec<f64> = norms.iter().map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 }).collect();
+        let mut scaled = triangle.clone();
+        for (mut column, (norm, scale)) in scaled.column_iter_mut().zip(norms.iter().zip(&scale)) {
+            column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
+        }
+        let svd = scaled.clone().svd(false, true);
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
+        let singular_values: Vec<f64> = order.iter().map(|&k| svd.singular_values[k]).collect();
+        let threshold = BLIND_BELOW * singular_values.first().copied().unwrap_or(0.0);
+        let rank = singular_values.iter().filter(|&&value| value > threshold).count();
+        let null = DMatrix::from_fn(n - rank, n, |i, j| {
+            svd.v_t.as_ref().map_or(0.0, |v| v[(order[rank + i], j)])
+        });
+        let visible = (0..n).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
+        let blind = named(null.clone(), &scaled);
+        let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
+        Self { singular_values, rank, blind, gauge, visible }
+    }
+
+    /// Ratio of the largest singular value to the smallest that is not zero.
+    pub fn condition_number(&self) -> f64 {
+        match self.singular_values[..self.rank] {
+            [] => 1.0,
+            [largest, .., smallest] => largest / smallest,
+            [_] => 1.0,
+        }
+    }
+
+    /// Observability indices O1 to O5 over the identifiable directions, from m measured coordinates.
+    ///
+    /// O1 = (Π σ)^(1/r) / √m,  O2 = `σ_r` / `σ_1`,  O3 = `σ_r`,  O4 = `σ_r`² / `σ_1`,  O5 = 1 / Σ 1/σ   [Sun & Hollerbach 2008].
+    pub fn observability(&self, measurements: usize) -> [f64; 5] {
+        let used = &self.singular_values[..self.rank];
+        let (Some(&largest), Some(&smallest)) = (used.first(), used.last()) else { return [0.0; 5] };
+        let mean_log = used.iter().map(|value| value.ln()).sum::<f64>() / used.len() as f64;
+        [
+            mean_log.exp() / (measurements as f64).sqrt(),
+            smallest / largest,
+            smallest,
+            smallest * smallest / largest,
+            used.iter().map(|value| value.recip()).sum::<f64>().recip(),
+        ]
+    }
+}
+
+/// The reduced row echelon form of the null space: a basis that depends on the space alone, with few unknowns in each
+/// combination. Pivots are the earliest unknowns.
+fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination> {
+    let (rows, n) = null.shape();
+    let mut row = 0;
+    for column in 0..n {
+        if row == rows {
+            break;
+        }
+        let below = null.view((row, column), (rows - row, 1));
+        let pivot = row + below.icamax().0;
+        if null[(pivot, column)].abs() < NEGLIGIBLE {
+            for i in row..rows {
+                null[(i, column)] = 0.0;
+            }
+            continue;
+        }
+        null.swap_rows(row, pivot);
+        let divisor = null[(row, column)];
+        null.row_mut(row).unscale_mut(divisor);
+        for other in (0..rows).filter(|&other| other != row) {
+            let factor = null[(other, column)];
+            for j in 0..n {
+                null[(other, j)] -= factor * null[(row, j)];
+            }
+        }
+        row += 1;
+    }
+    null.row_iter()
+        .map(|combination| {
+            let norm = combination.norm();
+            let weights: Vec<(usize, f64)> = combination
+                .iter()
+                .map(|weight| weight / norm)
+                .enumerate()
+                .filter(|(_, weight)| weight.abs() > NEGLIGIBLE)
+                .collect();
+            let mut vector = DVector::zeros(n);
+            for &(j, weight) in &weights {
+                vector[j] = weight;
+            }
+            BlindCombination { weights, singular_value: (scaled * vector).norm() }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn duplicated_and_dead_columns_are_named() {
+        // Columns: a, b, a, 0, a + b
+        let base = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, -1.0, 0.0, 2.0, 3.0, 1.0]);
+        let (a, b) = (base.column(0), base.column(1));
+        let jacobian = DMatrix::from_columns(&[
+            a.clone_owned(),
+            b.clone_owned(),
+            a.clone_owned(),
+            DVector::zeros(4),
+            a + b,
+        ]);
+        let mut padded = DMatrix::zeros(5, 5);
+        padded.rows_mut(0, 4).copy_from(&jacobian);
+        let found = Identifiability::of(&padded.qr().unpack_r());
+        assert_eq!(found.rank, 2);
+        let unknowns: Vec<Vec<usize>> =
+            found.blind.iter().map(|blind| blind.weights.iter().map(|w| w.0).collect()).collect();
+        assert_eq!(unknowns, [vec![0, 2], vec![1, 2, 4], vec![3]]);
+        assert!(found.blind.iter().all(|blind| blind.singular_value < 1e-12 && blind.weights[0].1 > 0.0));
+        assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
+        assert!((found.gauge.clone() * found.gauge.transpose()).nrows() == 3);
+    }
+}

@@ -1,0 +1,98 @@
+//! Covariance of an estimate.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Weight that turns gauge rows into constraints: their variance falls below rounding.
+const HARD: f64 = 1e5;
+/// Scaled singular values below this part of the largest carry no information.
+const NO_INFORMATION: f64 = 1e-13;
+
+/// Covariance of the unknowns of a fit, and what it rests on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertainty {
+    /// Covariance, shape = (n, n); rows and columns of held unknowns are zero.
+    pub covariance: DMatrix<f64>,
+    /// How many unknowns the data determine, the priors' share taken off.
+    pub effective_parameters: f64,
+}
+
+impl Uncertainty {
+    /// (RᵀR / s² + PᵀP)⁻¹ on the free unknowns, with the blind combinations held.
+    ///
+    /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's prior, `gauge` rows that
+    /// span the blind combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
+    /// multiplies the assumed variance of the data.
+    pub fn of(
+        data: &DMatrix<f64>,
+        prior_sigma: &[Option<f64>],
+        gauge: &DMatrix<f64>,
+        held: &[bool],
+        noise_factor: f64,
+    ) -> Self {
+        let n = data.ncols();
+        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
+        let priors: Vec<(usize, f64)> =
+            free.iter().enumerate().filter_map(|(j, &k)| Some((j, prior_sigma[k]?))).collect();
+        let rows = data.nrows() + priors.len() + gauge.nrows();
+        let mut stack = DMatrix::zeros(rows.max(free.len()), free.len());
+        for (j, &k) in free.iter().enumerate() {
+            stack.view_mut((0, j), (n, 1)).copy_from(&(data.column(k) / noise_factor.sqrt()));
+            let gauged = gauge.column(k) * HARD;
+            stack.view_mut((n + priors.len(), j), (gauge.nrows(), 1)).copy_from(&gauged);
+        }
+        for (i, &(j, sigma)) in priors.iter().enumerate() {
+            stack[(n + i, j)] = sigma.recip();
+        }
+        let small = inverse_normal(stack);
+        let mut covariance = DMatrix::zeros(n, n);
+        for (a, &j) in free.iter().enumerate() {
+            for (b, &k) in free.iter().enumerate() {
+                covariance[(j, k)] = small[(a, b)];
+            }
+        }
+        let from_priors: f64 = priors.iter().map(|&(j, sigma)| small[(j, j)] / (sigma * sigma)).sum();
+        let effective_parameters = (free.len() as f64 - gauge.nrows() as f64 - from_priors).max(0.0);
+        Self { covariance, effective_parameters }
+    }
+
+    /// Standard error of each unknown.
+    pub fn standard_errors(&self) -> Vec<f64> {
+        self.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
+    }
+
+    /// Pairs of unknowns correlated by more than `least` in absolute value, strongest first.
+    pub fn correlations_above(&self, least: f64) -> Vec<(usize, usize, f64)> {
+        let error = self.standard_errors();
+        let n = error.len();
+        let mut pairs: Vec<(usize, usize, f64)> = (0..n)
+            .flat_map(|i| (i + 1..n).map(move |j| (i, j)))
+            .filter(|&(i, j)| error[i] > 0.0 && error[j] > 0.0)
+            .map(|(i, j)| (i, j, (self.covariance[(i, j)] / (error[i] * error[j])).clamp(-1.0, 1.0)))
+            .filter(|&(_, _, rho)| rho.abs() > least)
+            .collect();
+        pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()).then((a.0, a.1).cmp(&(b.0, b.1))));
+        pairs
+    }
+}
+
+/// (AᵀA)⁺ through the singular values of A with its columns scaled to unit norm.
+fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
+    let n = a.ncols();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let scale = DVector::from_iterator(n, a.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }));
+    for (mut column, scale) in a.column_iter_mut().zip(scale.iter()) {
+        column.unscale_mut(*scale);
+    }
+    let svd = a.qr().unpack_r().svd(false, true);
+    let largest = svd.singular_values.max();
+    let Some(mut v) = svd.v_t.map(|v_t| v_t.transpose()) else { return DMatrix::zeros(n, n) };
+    for (mut column, &value) in v.column_iter_mut().zip(svd.singular_values.iter()) {
+        column.scale_mut(if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
+    }
+    for (mut row, scale) in v.row_iter_mut().zip(scale.iter()) {
+        row.unscale_mut(*scale);
+    }
+    &v * v.transpose()
+}

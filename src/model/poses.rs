@@ -1,0 +1,121 @@
+//! Measured poses as a least-squares problem.
+
+use std::ops::Range;
+
+use nalgebra::{DVector, Vector3};
+
+use super::Model;
+use super::derivative::Linearised;
+use crate::arm::{Equilibrated, Setup, Workspace};
+use crate::fit::{Block, LeastSquares};
+
+/// One measured pose as the model sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Pose<'a> {
+    /// What was set.
+    pub setup: Setup<'a>,
+    /// Which base.
+    pub base: usize,
+    /// Which target.
+    pub target: usize,
+    /// Measured position, measuring frame [m].
+    pub measured: Vector3<f64>,
+    /// 1 σ of each coordinate [m].
+    pub sigma: f64,
+}
+
+/// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the parameters.
+pub struct PoseResiduals<'a> {
+    model: &'a Model,
+    poses: Vec<Pose<'a>>,
+    /// Which parameters are unknown here.
+    unknowns: Vec<usize>,
+    /// Full parameter vector; the unknowns' entries are overwritten.
+    at: DVector<f64>,
+}
+
+impl<'a> PoseResiduals<'a> {
+    /// Residuals of `poses`; the parameters listed in `unknowns` vary, the others stay as in `at`.
+    pub fn new(model: &'a Model, poses: Vec<Pose<'a>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
+        Self { model, poses, unknowns, at }
+    }
+
+    /// The full parameter vector for unknowns `x`.
+    pub fn full(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut full = self.at.clone();
+        for (&k, &value) in self.unknowns.iter().zip(x.iter()) {
+            full[k] = value;
+        }
+        full
+    }
+
+    /// The unknowns' entries of a full parameter vector.
+    pub fn reduced(&self, full: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| full[k]))
+    }
+
+    /// The poses.
+    pub fn poses(&self) -> &[Pose<'a>] {
+        &self.poses
+    }
+
+    /// Which parameters are unknown.
+    pub fn unknowns(&self) -> &[usize] {
+        &self.unknowns
+    }
+
+    /// Residuals measured − predicted, measuring frame [m]; NaN where a pose has no equilibrium.
+    pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        let mut errors = Vec::with_capacity(self.poses.len());
+        self.each_prediction(x, 0..self.poses.len(), |pose, predicted| errors.push(pose.measured - predicted));
+        errors
+    }
+
+    fn each_prediction(&self, x: &DVector<f64>, items: Range<usize>, mut use_it: impl FnMut(&Pose, Vector3<f64>)) {
+        let full = self.full(x);
+        let arm = self.model.arm(|k| full[k]);
+        let bases = self.model.base_frames(full.as_slice());
+        let targets = self.model.target_positions(full.as_slice());
+        let mut ws = Workspace::default();
+        let mut rest = Equilibrated::default();
+        for pose in &self.poses[items] {
+            let predicted = match arm.equilibrate(&pose.setup, &mut ws, &mut rest) {
+                Ok(()) => bases[pose.base].point(&rest.frame.point(&targets[pose.target])),
+                Err(_) => Vector3::from_element(f64::NAN),
+            };
+            use_it(pose, predicted);
+        }
+    }
+}
+
+impl LeastSquares for PoseResiduals<'_> {
+    fn parameters(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn items(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        3
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        let mut rows = out.chunks_exact_mut(3);
+        self.each_prediction(x, items, |pose, predicted| {
+            if let Some(row) = rows.next() {
+                row.copy_from_slice(((pose.measured - predicted) / pose.sigma).as_slice());
+            }
+        });
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        let full = self.full(x);
+        let mut linearised = Linearised::new(self.model, &full, &self.unknowns);
+        block.clear();
+        for (k, pose) in self.poses[items].iter().enumerate() {
+            linearised.write(pose, block, 3 * k);
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Free parameters: names, units, priors and bounds, resolved from the problem's rules.
+//!
+//! An unknown x is a deviation from nominal: additive for angles [rad] and lengths [m], ln(value / nominal) for
+//! stiffnesses and rigidities, so that x = 0 is nominal everywhere and a stiffness never turns negative.
+
+mod name;
+mod resolve;
+
+pub use name::{BeamField, JointField, Slot};
+pub use resolve::resolve;
+
+/// A free parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name as in the problem file: `joint2.alpha`, `A.EI`, `base[B].rx`.
+    pub name: String,
+    /// Where it enters the model.
+    pub slot: Slot,
+    /// Nominal value, SI.
+    pub nominal: f64,
+    /// 1 σ of the Gaussian prior on x about 0.
+    pub sigma: Option<f64>,
+    /// Lower bound on x, −∞ where there is none.
+    pub lower: f64,
+    /// Upper bound on x, +∞ where there is none.
+    pub upper: f64,
+}
+
+/// What kind of quantity a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// [rad]
+    Angle,
+    /// [m]
+    Length,
+    /// [N·m/rad]
+    TorsionalStiffness,
+    /// EA [N]
+    AxialRigidity,
+    /// EI or GJ [N·m²]
+    FlexuralRigidity,
+}
+
+impl Unit {
+    /// SI unit in words.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Angle => "rad",
+            Self::Length => "m",
+            Self::TorsionalStiffness => "N·m/rad",
+            Self::AxialRigidity => "N",
+            Self::FlexuralRigidity => "N·m²",
+        }
+    }
+
+    /// Whether x is ln(value / nominal).
+    pub fn is_relative(self) -> bool {
+        matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
+    }
+}
+
+impl Parameter {
+    /// Kind of quantity.
+    pub fn unit(&self) -> Unit {
+        self.slot.unit()
+    }
+
+    /// Value at x, SI.
+    pub fn value(&self, x: f64) -> f64 {
+        if self.unit().is_relative() { self.nominal * x.exp() } else { self.nominal + x }
+    }
+
+    /// Standard error of the value from that of x, SI.
+    pub fn value_error(&self, x: f64, error: f64) -> f64 {
+        if self.unit().is_relative() { self.value(x) * error } else { error }
+    }
+
+    /// Whether x has a lower or an upper bound.
+    pub fn is_bounded(&self) -> bool {
+        self.lower.is_finite() || self.upper.is_finite()
+    }
+}

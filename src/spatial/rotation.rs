@@ -1,0 +1,99 @@
+//! Exponential and logarithm of rotations.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+use crate::scalar::Scalar;
+
+/// Below this squared angle [rad²] the exponential uses its power series, exact to rounding there.
+const SERIES_BELOW: f64 = 0.01;
+
+/// Rotates `vector` by the rotation vector `w` [rad]: exp(`[w]×`) v.
+///
+/// exp(`[w]×`) v = v + A w×v + B w×(w×v), A = sin φ / φ, B = (1 − cos φ) / φ², φ = ‖w‖  (Rodrigues).
+/// Smooth at w = 0, with its derivative.
+pub fn rotate<S: Scalar>(w: &Vector3<S>, vector: &Vector3<S>) -> Vector3<S> {
+    let (a, b) = coefficients(w.dot(w));
+    let first = w.cross(vector);
+    let second = w.cross(&first);
+    vector + first * a + second * b
+}
+
+/// (sin φ / φ, (1 − cos φ) / φ²) from φ² [rad²].
+fn coefficients<S: Scalar>(squared: S) -> (S, S) {
+    if squared.re() < SERIES_BELOW {
+        let horner = |c: [f64; 5]| {
+            (((squared * c[4] + S::from(c[3])) * squared + S::from(c[2])) * squared + S::from(c[1])) * squared
+                + S::from(c[0])
+        };
+        let a = horner([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
+        let b = horner([0.5, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0]);
+        (a, b)
+    } else {
+        let angle = squared.sqrt();
+        let (sin, cos) = angle.sin_cos();
+        (sin / angle, (-cos + 1.0) / squared)
+    }
+}
+
+/// The rotation vector [rad] of a rotation matrix, of length at most π.
+pub fn rotation_vector(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::DualSVec64;
+
+    /// Rotates e_k by w with derivatives with respect to w.
+    fn derivative(w: [f64; 3], k: usize) -> [[f64; 4]; 3] {
+        let w = Vector3::from_fn(|i, _| {
+            DualSVec64::<3>::new(w[i], num_dual::Derivative::derivative_generic(nalgebra::Const::<3>, nalgebra::U1, i))
+        });
+        let mut v = Vector3::from_element(DualSVec64::<3>::from(0.0));
+        v[k] = DualSVec64::from(1.0);
+        let out = rotate(&w, &v);
+        std::array::from_fn(|i| {
+            let eps = out[i].eps.unwrap_generic(nalgebra::Const::<3>, nalgebra::U1);
+            [out[i].re, eps[0], eps[1], eps[2]]
+        })
+    }
+
+    #[test]
+    fn derivative_at_zero_is_the_cross_product() {
+        for k in 0..3 {
+            let rows = derivative([0.0; 3], k);
+            for (j, axis) in [Vector3::x(), Vector3::y(), Vector3::z()].iter().enumerate() {
+                let mut e = Vector3::zeros();
+                e[k] = 1.0;
+                let expected: Vector3<f64> = axis.cross(&e);
+                for i in 0..3 {
+                    assert!((rows[i][j + 1] - expected[i]).abs() < 1e-15);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn series_and_closed_form_meet() {
+        let at = |angle: f64| {
+            let w = Vector3::new(0.3, -0.5, 0.8).normalize() * angle;
+            rotate(&w, &Vector3::new(1.0, 2.0, 3.0))
+        };
+        let reference = |angle: f64| {
+            let w = Vector3::new(0.3, -0.5, 0.8).normalize() * angle;
+            Rotation3::new(w) * Vector3::new(1.0, 2.0, 3.0)
+        };
+        for angle in [1e-9, 1e-3, 0.099_999, 0.1, 0.100_001, 1.0, 3.0] {
+            assert!((at(angle) - reference(angle)).norm() < 1e-14, "{angle}");
+        }
+    }
+
+    #[test]
+    fn logarithm_undoes_the_exponential() {
+        for w in [Vector3::new(0.0, 0.0, 0.0), Vector3::new(1e-8, 0.0, 2e-8), Vector3::new(1.0, -2.0, 0.5)] {
+            let columns = [Vector3::x(), Vector3::y(), Vector3::z()].map(|e| rotate(&w, &e));
+            assert!((rotation_vector(&Matrix3::from_columns(&columns)) - w).norm() < 1e-14);
+        }
+    }
+}
