@@ -139,6 +139,8 @@ pub enum InputErrorKind {
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error("the row has {found} fields, the header {expected}")]
     RowLength { expected: usize, found: usize },
+    #[error("a quote is opened and never closed")]
+    OpenQuote,
     #[error("the cell is empty")]
     EmptyCell,
     #[error("\"{value}\" is not a number")]
