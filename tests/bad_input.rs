@@ -1,5 +1,7 @@
 //! Mistakes in the input: each message names file, line and key, and no input makes the reader panic.
 
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -88,7 +90,7 @@ fn files_that_cannot_be_read() {
 
     let problem = problem(ARM).unwrap();
     let other = PathBuf::from("other.csv");
-    let error = Measurements::read(&[other.clone()], &problem).unwrap_err();
+    let error = Measurements::read(std::slice::from_ref(&other), &problem).unwrap_err();
     check(&error, "missing file", &["other.csv: no such file"]);
     let error = Measurements::read(&[folder.path().to_owned()], &problem).unwrap_err();
     check(&error, "a folder", &["cannot be read"]);
@@ -388,7 +390,7 @@ fn no_input_makes_the_reader_panic() {
     let file = folder.path().join("rows.csv");
     for _ in 0..1500 {
         fs::write(&file, mutate(&rows, &mut random)).unwrap();
-        match Measurements::read(&[file.clone()], &valid) {
+        match Measurements::read(std::slice::from_ref(&file), &valid) {
             Ok((measurements, _)) => _ = Split::new(&valid, &measurements),
             Err(error) => check(&error, "mutated rows", &["rows.csv"]),
         }

@@ -1,5 +1,8 @@
 //! Valid problems and measurements, and what they become.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::float_cmp, reason = "these conversions are exact")]
+
 use std::f64::consts::FRAC_PI_2;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -57,8 +60,8 @@ fn the_example_case_is_read_from_its_folder() {
     assert_eq!(warnings, []);
     assert_eq!(measurements.len(), 78);
     assert_eq!(measurements.origin[0], (0, 2));
-    assert!(close(measurements.configuration(0)[1], 17.984805_f64.to_radians()));
-    assert!(close(measurements.positions[1].y, 2.4252522));
+    assert!(close(measurements.configuration(0)[1], 17.984_805_f64.to_radians()));
+    assert!(close(measurements.positions[1].y, 2.425_252_2));
     assert_eq!(measurements.payload.as_ref().unwrap()[1], 0.5);
     assert_eq!(measurements.approach.as_ref().unwrap()[..4], [-1.0, -1.0, -1.0, 1.0]);
     assert_eq!((measurements.time[1], measurements.time_measured), (136.0, true));
@@ -159,10 +162,8 @@ fn every_effect_has_its_arguments() {
         ("tracker-drift = {}", Effect::TrackerDrift),
         ("station-shift = { at_time_s = 60 }", Effect::StationShift { at_time: 60.0 }),
     ];
-    let mut text = "name = 'arm'\n[[joint]]\na_m = 1\nbeam.name = 'A'\n[[joint]]\n".to_owned();
-    for (line, _) in &effects {
-        text += &format!("[[effect]]\n{line}\n");
-    }
+    let tables: Vec<_> = effects.iter().map(|(line, _)| format!("[[effect]]\n{line}\n")).collect();
+    let text = format!("name = 'arm'\n[[joint]]\na_m = 1\nbeam.name = 'A'\n[[joint]]\n{}", tables.concat());
     let declared: Vec<_> = parse(&text).effects.into_iter().map(|declaration| declaration.effect).collect();
     assert_eq!(declared, effects.map(|(_, effect)| effect));
 }
@@ -240,11 +241,10 @@ fn a_fraction_keeps_rows_of_one_configuration_together() {
     let problem = |seed: u64| {
         parse(&format!("name = 'arm'\n[[joint]]\n[data]\nheld_out = {{ fraction = 0.3, seed = {seed} }}\n"))
     };
-    let mut table = "q1_deg,x_m,y_m,z_m\n".to_owned();
-    for row in 0..100 {
-        // Four rows of each configuration, apart by less than a hundredth of a degree.
-        table += &format!("{},0,0,0\n", f64::from(row % 25) + 0.001 * f64::from(row / 25));
-    }
+    // Four rows of each configuration, apart by less than a hundredth of a degree.
+    let angle = |row: i32| f64::from(row % 25) + 0.001 * f64::from(row / 25);
+    let rows: Vec<_> = (0..100).map(|row| format!("{},0,0,0\n", angle(row))).collect();
+    let table = format!("q1_deg,x_m,y_m,z_m\n{}", rows.concat());
     let measurements = read(&problem(1), &[&table]).unwrap().0;
     let split = Split::new(&problem(1), &measurements).unwrap();
     assert_eq!(split.held_out.len(), 32);
