@@ -23,7 +23,7 @@ pub struct Location {
 }
 
 /// A piece of text of an input file, and a part of it that is meant.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Excerpt {
     /// The text: a whole problem file, one line of measurements.
     pub text: Arc<str>,
@@ -31,6 +31,13 @@ pub struct Excerpt {
     pub first_line: usize,
     /// The part that is meant, as bytes of `text`.
     pub span: Range<usize>,
+}
+
+/// The part that is meant alone; a whole file would bury it.
+impl fmt::Debug for Excerpt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Excerpt({:?})", self.text.get(self.span.clone()).unwrap_or_default())
+    }
 }
 
 impl Location {

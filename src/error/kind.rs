@@ -1,13 +1,14 @@
 //! The kinds of mistakes, and what each says.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 /// What is wrong with the input.
 ///
-/// The message of a variant says what it stands for and how to mend it; the place comes from [`Location`](super::Location).
+/// The message of a variant says what it stands for and how to mend it; the place comes from
+/// [`Location`](super::Location).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
@@ -142,10 +143,12 @@ pub enum InputErrorKind {
     MissingColumn { write: String },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
-    #[error("{} {}; give every file the same columns", other.display(), if *has { "has it, this file does not" } else { "does not have it" })]
+    #[error("{}; give every file the same columns", difference(other, *has))]
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error("the row has {found} fields, the header {expected}")]
     RowLength { expected: usize, found: usize },
+    #[error("a quote is opened and never closed")]
+    OpenQuote,
     #[error("the cell is empty")]
     EmptyCell,
     #[error("\"{value}\" is not a number")]
@@ -183,6 +186,11 @@ pub enum WarningKind {
 
 fn near(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }
+}
+
+fn difference(other: &Path, has: bool) -> String {
+    let says = if has { "has it, this file does not" } else { "does not have it" };
+    format!("{} {says}", other.display())
 }
 
 fn list(verb: &str, names: &[String], none: &str) -> String {

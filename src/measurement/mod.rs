@@ -43,7 +43,7 @@ pub struct Measurements {
     pub session: Labels,
     /// Target of each row; `None` where there is no column.
     pub target: Option<Labels>,
-    /// Whether the row is marked `validation`, where the problem names such a column, or says nothing and there is a `split`.
+    /// Whether the row is marked `validation`: in the column that the problem names, or in `split` where it says nothing.
     pub marked_held_out: Option<Vec<bool>>,
 }
 

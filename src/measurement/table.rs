@@ -74,16 +74,25 @@ impl Table {
     }
 
     fn advance(&mut self) -> Result<bool, InputError> {
+        let first = self.next_line();
         let found = self.reader.read_byte_record(&mut self.record).map_err(|error| {
             let source = io::Error::from(error);
             Location::file(&self.file).error(InputErrorKind::Unreadable { source })
         })?;
         if found {
-            // Every line ends in a line feed that belongs to its record, so the next line is the reader's.
-            let next = usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX);
-            self.line = next.saturating_sub(lines(self.record.as_slice()));
+            // Every record ends in a line feed of its own; one that does not is open to the end of the file.
+            self.line = self.next_line().saturating_sub(lines(self.record.as_slice()));
+            if self.line < first {
+                self.line = first;
+                return Err(Location::file(&self.file).at_line(first).error(InputErrorKind::OpenQuote));
+            }
         }
         Ok(found)
+    }
+
+    /// The line at which the reader stands.
+    fn next_line(&self) -> usize {
+        usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX)
     }
 
     /// Line of the row, counted from 1.
