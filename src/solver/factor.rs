@@ -1,19 +1,18 @@
 //! Linear least-squares steps with one factorisation: Gauss–Newton, damped, and limited in length.
 
-use nalgebra::{DMatrix, DVector, Dyn, SVD};
+use nalgebra::{DMatrix, DVector};
 
-/// Iterations allowed to the singular values; a cap, never met in practice.
-const SVD_ITERATIONS: usize = 10_000;
-/// Newton steps allowed to the secular equation.
-const SECULAR_ITERATIONS: usize = 50;
+use super::spectrum::Spectrum;
+
 /// A length within this fraction of the radius fills it [Moré 1978].
 pub(super) const RADIUS_SLACK: f64 = 0.1;
 
 /// min ‖B q + c‖ factorised once, to be solved for any damping.
 ///
-/// A column-pivoted QR decides whether B has full rank: `|Rₙₙ| > tolerance·|R₁₁|`. If so, the Gauss–Newton step comes from
-/// it. Every other question goes to B = U Σ Vᵀ, without the singular values `σ ≤ tolerance·σ₁`: combinations that the
-/// rows cannot see stay where they are.
+/// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
+/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, the Gauss–Newton step comes from it. Every other question goes to B = U Σ Vᵀ; without
+/// full rank, singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
+/// combinations that the rows cannot see stay where they are.
 #[derive(Debug, Clone)]
 pub struct Factor {
     matrix: DMatrix<f64>,
@@ -21,19 +20,6 @@ pub struct Factor {
     tolerance: f64,
     full_rank_step: Option<DVector<f64>>,
     spectrum: Option<Spectrum>,
-}
-
-/// The seen part of B = U Σ Vᵀ.
-#[derive(Debug, Clone)]
-struct Spectrum {
-    /// σᵢ.
-    singular: Vec<f64>,
-    /// `−uᵢᵀc`.
-    projected: Vec<f64>,
-    /// vᵢ, one a row.
-    directions: DMatrix<f64>,
-    /// Rows of `directions` in use.
-    kept: Vec<usize>,
 }
 
 impl Factor {
@@ -81,17 +67,10 @@ impl Factor {
     /// q(λ) = −Σ σᵢ/(σᵢ² + λ) (uᵢᵀc) vᵢ
     pub fn damped(&mut self, lambda: f64) -> DVector<f64> {
         let n = self.matrix.ncols();
-        let spectrum = self.spectrum();
-        let mut q = DVector::zeros(n);
-        for &i in &spectrum.kept {
-            q.axpy(spectrum.coefficient(i, lambda), &spectrum.directions.row(i).transpose(), 1.0);
-        }
-        q
+        self.spectrum().solution(lambda, n)
     }
 
     /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
-    ///
-    /// 1/‖q(λ)‖ = 1/Δ by Newton's method from λ = 0, which approaches from one side [Hebden 1973; Moré 1978]
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
         if let Some(step) = &self.full_rank_step
             && step.norm() <= (1.0 + RADIUS_SLACK) * radius
@@ -103,48 +82,9 @@ impl Factor {
     }
 
     fn spectrum(&mut self) -> &Spectrum {
-        let Self { matrix, constant, tolerance, spectrum, .. } = self;
-        spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, *tolerance))
-    }
-}
-
-impl Spectrum {
-    fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f64) -> Self {
-        let svd = SVD::try_new_unordered(matrix.clone(), true, true, f64::EPSILON, SVD_ITERATIONS);
-        let Some(SVD { u: Some(u), v_t: Some(directions), singular_values }) = svd else {
-            // Without a spectrum nothing is seen and nothing moves.
-            let directions = DMatrix::zeros(0, matrix.ncols());
-            return Self { singular: Vec::new(), projected: Vec::new(), directions, kept: Vec::new() };
-        };
-        let largest = singular_values.iter().copied().fold(0.0, f64::max);
-        let projected = u.tr_mul(constant).iter().map(|c| -c).collect();
-        let kept = (0..singular_values.len()).filter(|&i| singular_values[i] > tolerance * largest).collect();
-        Self { singular: singular_values.as_slice().to_vec(), projected, directions, kept }
-    }
-
-    fn coefficient(&self, i: usize, lambda: f64) -> f64 {
-        let sigma = self.singular[i];
-        // Written so that λ = 0 needs no σ².
-        self.projected[i] / (sigma + lambda / sigma)
-    }
-
-    /// λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack.
-    fn secular_root(&self, radius: f64) -> f64 {
-        let mut lambda = 0.0;
-        for _ in 0..SECULAR_ITERATIONS {
-            let (mut squares, mut slope) = (0.0, 0.0);
-            for &i in &self.kept {
-                let q = self.coefficient(i, lambda);
-                squares += q * q;
-                slope += q * q / (self.singular[i] * self.singular[i] + lambda);
-            }
-            let length = f64::sqrt(squares);
-            if length <= (1.0 + RADIUS_SLACK) * radius {
-                break;
-            }
-            lambda += squares / slope * (length - radius) / radius;
-        }
-        lambda
+        let Self { matrix, constant, tolerance, full_rank_step, spectrum } = self;
+        let cut = if full_rank_step.is_some() { 0.0 } else { spectral_cut(matrix, *tolerance) };
+        spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, cut))
     }
 }
 
@@ -154,7 +94,12 @@ fn pivoted_solution(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f
     if n == 0 || matrix.nrows() < n {
         return None;
     }
-    let qr: nalgebra::ColPivQR<f64, Dyn, Dyn> = matrix.clone().col_piv_qr();
+    let sizes = column_sizes(matrix);
+    let mut unit = matrix.clone();
+    for (mut column, size) in unit.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    let qr = unit.col_piv_qr();
     let mut projected = -constant;
     qr.q_tr_mul(&mut projected);
     let r = qr.r();
@@ -164,7 +109,23 @@ fn pivoted_solution(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f
     }
     let mut step = r.solve_upper_triangular(&projected.rows(0, n))?;
     qr.p().inv_permute_rows(&mut step);
+    for (q, size) in step.iter_mut().zip(&sizes) {
+        *q /= size;
+    }
     Some(step)
+}
+
+/// Lengths of the columns, one for a column of zeros.
+fn column_sizes(matrix: &DMatrix<f64>) -> Vec<f64> {
+    matrix.column_iter().map(|c| c.norm()).map(|size| if size > 0.0 { size } else { 1.0 }).collect()
+}
+
+/// The fraction of σ₁ that counts as zero, lowered (down to rounding) to keep short columns.
+fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
+    let sizes = || matrix.column_iter().map(|c| c.norm()).filter(|&size| size > 0.0);
+    let spread = sizes().fold(f64::INFINITY, f64::min) / sizes().fold(0.0, f64::max);
+    let rounding = 8.0 * matrix.ncols() as f64 * f64::EPSILON;
+    (tolerance * spread.min(1.0)).max(rounding.min(tolerance))
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod box_step;
 mod factor;
 mod levenberg_marquardt;
 mod run;
+mod spectrum;
 mod termination;
 mod trust_region;
 

@@ -12,6 +12,8 @@ pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// A step is taken when ρ reaches this.
 const ACCEPT: f64 = 1e-4;
+/// The radius grows when ρ reaches this.
+const GOOD: f64 = 0.75;
 
 /// When to stop, and how boldly to start.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,6 +169,10 @@ impl<S: Subproblem> TrustRegion<S> {
     /// The tests of MINPACK after a step, with relative reductions.
     fn judge(&self, trial: &Trial, size: f64) -> Option<Termination> {
         let settings = &self.settings;
+        if trial.damping > 0.0 && trial.ratio >= GOOD {
+            // Held back by the radius only, which is about to grow: a short step says nothing yet.
+            return None;
+        }
         let settled = |tolerance: f64| {
             trial.actual.abs() <= tolerance && trial.predicted <= tolerance && 0.5 * trial.ratio <= 1.0
         };
@@ -194,6 +200,7 @@ struct Trial {
     slope: f64,
     ratio: f64,
     length: f64,
+    damping: f64,
 }
 
 impl Trial {
@@ -202,17 +209,16 @@ impl Trial {
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
         let predicted = step.predicted / before;
         let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
-        Self { cost: after, actual, predicted, slope: step.slope / before, ratio, length: step.length }
+        Self { cost: after, actual, predicted, slope: step.slope / before, ratio, length: step.length, damping: step.damping }
     }
 
-    /// The next radius; `full`: the step was not limited by the radius.
-    fn next_radius(&self, radius: f64, full: bool) -> f64 {
+    fn next_radius(&self, radius: f64) -> f64 {
         if self.ratio <= 0.25 {
             // The minimum of the parabola through the two costs and the slope, between a tenth and a half.
             let shrink = if self.actual >= 0.0 { 0.5 } else { 0.5 * self.slope / (self.slope - self.actual) };
             let shrink = if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
             shrink * radius.min(10.0 * self.length)
-        } else if self.ratio >= 0.75 || full {
+        } else if self.ratio >= GOOD || self.damping == 0.0 {
             2.0 * self.length
         } else {
             radius
@@ -266,7 +272,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         }
         let after = problem.problem("cost_count", |o| Ok(o.cost(&step.point)))?;
         let trial = Trial::new(&step, cost, if after.is_nan() { f64::INFINITY } else { after });
-        self.radius = Some(trial.next_radius(radius, step.damping == 0.0));
+        self.radius = Some(trial.next_radius(radius));
         let taken = trial.ratio >= ACCEPT;
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
