@@ -8,5 +8,6 @@ pub mod model;
 pub mod parameter;
 pub mod problem;
 pub mod scalar;
+pub mod solver;
 pub mod spatial;
 mod units;

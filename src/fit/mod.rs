@@ -3,9 +3,17 @@
 //! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see the m × n Jacobian:
 //! it is reduced, block by block, to the triangular factor of its QR decomposition.
 
+mod derivative;
+mod objective;
+mod triangle;
+
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+
+pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
+pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
+pub use triangle::Triangle;
 
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {
@@ -22,6 +30,8 @@ pub trait LeastSquares: Sync {
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]);
 
     /// Writes the whitened residuals of `items` and their derivatives ∂r/∂x.
+    ///
+    /// `block` comes filled with zeros and has exactly the rows of `items`.
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block);
 }
 
@@ -54,6 +64,13 @@ impl Block {
         self.values.fill(0.0);
     }
 
+    /// Changes the number of rows and sets every value to zero; keeps the memory.
+    pub fn reshape(&mut self, rows: usize) {
+        self.rows = rows;
+        self.values.clear();
+        self.values.resize(rows * (self.parameters + 1), 0.0);
+    }
+
     /// Derivative of every row with respect to unknown `j`; `j = n` is the residual itself.
     pub fn column(&self, j: usize) -> &[f64] {
         &self.values[j * self.rows..(j + 1) * self.rows]
@@ -80,6 +97,20 @@ pub trait Objective {
 
     /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
     fn linearise(&self, x: &DVector<f64>) -> Linearisation;
+}
+
+impl<O: Objective + ?Sized> Objective for &O {
+    fn parameters(&self) -> usize {
+        (**self).parameters()
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        (**self).cost(x)
+    }
+
+    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
+        (**self).linearise(x)
+    }
 }
 
 /// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest.

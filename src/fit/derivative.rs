@@ -1,0 +1,115 @@
+//! Derivatives checked against differences of the residuals.
+
+use nalgebra::DVector;
+
+use super::{LeastSquares, jacobian, residual_vector};
+
+/// Largest number of ever smaller steps in one extrapolation.
+const TABLE: usize = 12;
+/// Ratio of successive steps.
+const SHRINK: f64 = 1.4;
+/// First steps tried, as fractions of an unknown's typical size.
+const FIRST_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
+/// An unknown whose whole effect is below this fraction of the largest is judged against that fraction.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// How one column of the Jacobian compares with differences.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnCheck {
+    /// ‖J − F‖ / ‖F‖, or less where ‖F‖ is negligible; F are the differences.
+    pub relative_error: f64,
+    /// Estimated relative error of the differences F themselves; an error below it is no finding.
+    pub accuracy: f64,
+}
+
+/// A Jacobian compared with differences, column by column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JacobianCheck {
+    /// One entry per unknown.
+    pub columns: Vec<ColumnCheck>,
+}
+
+impl JacobianCheck {
+    /// The unknown whose column is furthest off, and its comparison; nothing without unknowns.
+    pub fn worst(&self) -> Option<(usize, ColumnCheck)> {
+        let nan_last = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
+        self.columns
+            .iter()
+            .copied()
+            .enumerate()
+            .max_by(|a, b| nan_last(a.1.relative_error).total_cmp(&nan_last(b.1.relative_error)))
+    }
+}
+
+/// Compares the derivatives of `problem` at `x` with central differences extrapolated to step zero.
+///
+/// F = lim (r(x + h eⱼ) − r(x − h eⱼ)) / 2h, extrapolated in h² over steps h, h/1.4, h/1.4², …       [Ridders 1982]
+///
+/// `step` holds the typical size of each unknown (any sign, not zero), from which the steps h start.
+pub fn check_jacobian(problem: &impl LeastSquares, x: &DVector<f64>, step: &DVector<f64>) -> JacobianCheck {
+    let exact = jacobian(problem, x);
+    let differences: Vec<_> = (0..x.len()).map(|j| extrapolate(problem, x, j, step[j].abs())).collect();
+    let effect = |j: usize| differences[j].0.norm() * step[j].abs();
+    let largest = (0..x.len()).map(effect).filter(|e| e.is_finite()).fold(0.0, f64::max);
+    let columns = differences
+        .iter()
+        .enumerate()
+        .map(|(j, (difference, error))| {
+            let floor = (NEGLIGIBLE * largest / step[j].abs()).max(f64::MIN_POSITIVE);
+            let size = difference.norm().max(floor);
+            ColumnCheck { relative_error: (exact.column(j) - difference).norm() / size, accuracy: error / size }
+        })
+        .collect();
+    JacobianCheck { columns }
+}
+
+/// The best extrapolation over several first steps, with its estimated error.
+fn extrapolate<P: LeastSquares>(problem: &P, x: &DVector<f64>, j: usize, size: f64) -> (DVector<f64>, f64) {
+    let rows = problem.items() * problem.rows_per_item();
+    let mut best = (DVector::from_element(rows, f64::NAN), f64::INFINITY);
+    for first in FIRST_STEPS {
+        let found = ridders(|h| central_difference(problem, x, j, h), first * size);
+        if found.1 < best.1 {
+            best = found;
+        }
+    }
+    best
+}
+
+fn central_difference<P: LeastSquares>(problem: &P, x: &DVector<f64>, j: usize, h: f64) -> DVector<f64> {
+    let at = |value: f64| {
+        let mut moved = x.clone();
+        moved[j] = value;
+        residual_vector(problem, &moved)
+    };
+    // Divide by the step as it was rounded.
+    let (above, below) = (x[j] + h, x[j] - h);
+    (at(above) - at(below)) / (above - below)
+}
+
+/// Ridders' tableau; stops once higher orders make it worse.
+fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64>, f64) {
+    let mut h = first;
+    let mut previous = vec![difference(h)];
+    let mut best = (previous[0].clone(), f64::INFINITY);
+    for _ in 1..TABLE {
+        h /= SHRINK;
+        let mut row = vec![difference(h)];
+        let mut factor = SHRINK * SHRINK;
+        for order in 0..previous.len() {
+            let next = (&row[order] * factor - &previous[order]) / (factor - 1.0);
+            let error = (&next - &row[order]).norm().max((&next - &previous[order]).norm());
+            if error < best.1 {
+                best = (next.clone(), error);
+            }
+            row.push(next);
+            factor *= SHRINK * SHRINK;
+        }
+        let last = row.len() - 1;
+        if (&row[last] - &previous[last - 1]).norm() >= 2.0 * best.1 {
+            break;
+        }
+        previous = row;
+    }
+    best
+}

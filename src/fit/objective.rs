@@ -1,0 +1,197 @@
+//! A problem over many items as a solver sees it: a value and a triangular linearisation.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::triangle::sum_of_squares;
+use super::{Block, LeastSquares, Linearisation, Objective, Triangle};
+
+/// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
+pub const CHUNK_ITEMS: usize = 256;
+
+/// Chunks whose factors exist at the same time.
+const GROUP_CHUNKS: usize = 64;
+
+/// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearRows {
+    /// A, k × n.
+    pub matrix: DMatrix<f64>,
+    /// b, k entries.
+    pub constant: DVector<f64>,
+}
+
+/// Linear rows that do not fit their problem.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RowsError {
+    /// The matrix has another number of columns than the problem has unknowns.
+    #[error("adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns")]
+    Columns {
+        /// Columns of the matrix.
+        columns: usize,
+        /// Unknowns of the problem.
+        parameters: usize,
+    },
+    /// Matrix and constant differ in their number of rows.
+    #[error("adding linear rows: the matrix has {matrix} rows, the constant {constant}")]
+    Rows {
+        /// Rows of the matrix.
+        matrix: usize,
+        /// Entries of the constant.
+        constant: usize,
+    },
+}
+
+/// A data problem with optional linear rows, ready for a solver.
+///
+/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk is reduced to its own [`Triangle`] and the chunks are merged
+/// in order, so that the result is the same to the bit for any number of threads. One chunk alone never leaves its thread.
+#[derive(Debug, Clone)]
+pub struct Fit<'a, P> {
+    problem: &'a P,
+    rows: Vec<LinearRows>,
+}
+
+impl<'a, P: LeastSquares> Fit<'a, P> {
+    /// The data problem alone.
+    pub fn new(problem: &'a P) -> Self {
+        Self { problem, rows: Vec::new() }
+    }
+
+    /// Adds linear rows.
+    ///
+    /// # Errors
+    /// When the rows do not have one column per unknown, or not one constant per row.
+    pub fn with_rows(mut self, rows: LinearRows) -> Result<Self, RowsError> {
+        let (matrix, columns) = rows.matrix.shape();
+        let parameters = self.problem.parameters();
+        if columns != parameters {
+            return Err(RowsError::Columns { columns, parameters });
+        }
+        if matrix != rows.constant.len() {
+            return Err(RowsError::Rows { matrix, constant: rows.constant.len() });
+        }
+        self.rows.push(rows);
+        Ok(self)
+    }
+
+    /// The data problem.
+    pub fn problem(&self) -> &'a P {
+        self.problem
+    }
+
+    fn chunks(&self) -> usize {
+        self.problem.items().div_ceil(CHUNK_ITEMS)
+    }
+
+    fn chunk(&self, index: usize) -> Range<usize> {
+        let start = index * CHUNK_ITEMS;
+        start..(start + CHUNK_ITEMS).min(self.problem.items())
+    }
+
+    fn empty_block(&self) -> Block {
+        let items = self.problem.items().min(CHUNK_ITEMS);
+        Block::zeros(items * self.problem.rows_per_item(), self.problem.parameters())
+    }
+
+    fn chunk_squares(&self, x: &DVector<f64>, index: usize, buffer: &mut [f64]) -> f64 {
+        let items = self.chunk(index);
+        let out = &mut buffer[..items.len() * self.problem.rows_per_item()];
+        self.problem.residuals(x, items, out);
+        sum_of_squares(out)
+    }
+
+    fn chunk_triangle(&self, x: &DVector<f64>, index: usize, block: &mut Block) -> Triangle {
+        let items = self.chunk(index);
+        block.reshape(items.len() * self.problem.rows_per_item());
+        self.problem.linearise(x, items, block);
+        let mut triangle = Triangle::new(self.problem.parameters());
+        triangle.absorb(block);
+        triangle
+    }
+
+    /// Maps every chunk, in parallel when there are several, and hands the results on in order.
+    fn in_order<B, T: Send>(
+        &self,
+        buffer: impl Fn() -> B + Sync + Send,
+        map: impl Fn(usize, &mut B) -> T + Sync + Send,
+        mut take: impl FnMut(T),
+    ) {
+        let chunks = self.chunks();
+        if chunks <= 1 {
+            (0..chunks).for_each(|index| take(map(index, &mut buffer())));
+            return;
+        }
+        for group in (0..chunks).step_by(GROUP_CHUNKS) {
+            let results: Vec<T> = (group..(group + GROUP_CHUNKS).min(chunks))
+                .into_par_iter()
+                .map_init(&buffer, |buffer, index| map(index, buffer))
+                .collect();
+            results.into_iter().for_each(&mut take);
+        }
+    }
+}
+
+impl<P: LeastSquares> Objective for Fit<'_, P> {
+    fn parameters(&self) -> usize {
+        self.problem.parameters()
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        let rows = self.problem.items().min(CHUNK_ITEMS) * self.problem.rows_per_item();
+        let mut squares = 0.0;
+        self.in_order(|| vec![0.0; rows], |index, buffer| self.chunk_squares(x, index, buffer), |s| squares += s);
+        for rows in &self.rows {
+            squares += sum_of_squares((&rows.matrix * x + &rows.constant).as_slice());
+        }
+        half_if_finite(squares)
+    }
+
+    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
+        let mut total: Option<Triangle> = None;
+        let map = |index, block: &mut Block| self.chunk_triangle(x, index, block);
+        self.in_order(|| self.empty_block(), map, |triangle| {
+            match &mut total {
+                Some(total) => total.merge(&triangle),
+                None => total = Some(triangle),
+            }
+        });
+        let mut total = total.unwrap_or_else(|| Triangle::new(self.problem.parameters()));
+        for rows in &self.rows {
+            total.absorb(&mut linear_block(rows, x));
+        }
+        let mut linearisation = total.into_linearisation();
+        linearisation.cost = half_if_finite(2.0 * linearisation.cost);
+        linearisation
+    }
+}
+
+/// ½‖r‖², or infinity when a residual is not finite.
+fn half_if_finite(squares: f64) -> f64 {
+    if squares.is_finite() { 0.5 * squares } else { f64::INFINITY }
+}
+
+fn linear_block(rows: &LinearRows, x: &DVector<f64>) -> Block {
+    let (k, n) = rows.matrix.shape();
+    let mut block = Block::zeros(k, n);
+    block.values[..k * n].copy_from_slice(rows.matrix.as_slice());
+    block.values[k * n..].copy_from_slice((&rows.matrix * x + &rows.constant).as_slice());
+    block
+}
+
+/// All residuals r(x) in one vector; for small problems and tests.
+pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVector<f64> {
+    let mut residuals = DVector::zeros(problem.items() * problem.rows_per_item());
+    problem.residuals(x, 0..problem.items(), residuals.as_mut_slice());
+    residuals
+}
+
+/// The whole Jacobian ∂r/∂x, m × n; for small problems and tests.
+pub fn jacobian<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DMatrix<f64> {
+    let (m, n) = (problem.items() * problem.rows_per_item(), problem.parameters());
+    let mut block = Block::zeros(m, n);
+    problem.linearise(x, 0..problem.items(), &mut block);
+    DMatrix::from_column_slice(m, n, &block.values[..m * n])
+}

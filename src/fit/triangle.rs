@@ -1,0 +1,311 @@
+//! The running QR decomposition of a tall matrix, block by block.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Block, Linearisation};
+
+/// Reflectors applied together to one trailing column.
+const PANEL: usize = 4;
+/// Independent sums of a dot product.
+const LANES: usize = 4;
+/// Sums of squares outside this range are formed again from scaled values.
+const SAFE_SQUARES: std::ops::Range<f64> = 1e-280..1e280;
+
+/// The triangular factor of all rows absorbed so far.
+///
+/// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²          [Golub & Van Loan 2013, §5.2 and §6.5.3]
+///
+/// A block of rows is absorbed by n reflectors; R being triangular, reflector k touches only row k of R and the
+/// rows of the block. Work: 2 n² per row, memory: n². No m × n matrix is ever kept.
+#[derive(Debug, Clone)]
+pub struct Triangle {
+    parameters: usize,
+    /// \[R c\], row after row.
+    rows: Vec<f64>,
+    /// ‖r‖² of all rows absorbed.
+    squares: f64,
+}
+
+impl Triangle {
+    /// The factor of no rows at all, for `parameters` unknowns.
+    pub fn new(parameters: usize) -> Self {
+        Self { parameters, rows: vec![0.0; parameters * (parameters + 1)], squares: 0.0 }
+    }
+
+    /// Number of unknowns n.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+
+    /// ‖r‖² of all rows absorbed so far.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// Takes in the rows of `block`, whose values are lost.
+    ///
+    /// A block for another number of unknowns is a mistake of the caller and is checked in debug builds only.
+    pub fn absorb(&mut self, block: &mut Block) {
+        self.squares += sum_of_squares(block.column(block.parameters));
+        self.reduce(block, |_| usize::MAX);
+    }
+
+    /// Takes in all rows that `other` has absorbed.
+    pub fn merge(&mut self, other: &Triangle) {
+        let n = other.parameters;
+        let mut block = Block::zeros(n, n);
+        for (i, row) in other.rows.chunks_exact(n + 1).enumerate() {
+            for (j, value) in row.iter().enumerate().skip(i) {
+                block.values[j * n + i] = *value;
+            }
+        }
+        // Below its diagonal the block is zero: columns up to k fill only its first k rows.
+        self.reduce(&mut block, |columns| columns);
+        self.squares += other.squares;
+    }
+
+    /// The linearised problem of all rows absorbed.
+    pub fn into_linearisation(self) -> Linearisation {
+        let n = self.parameters;
+        Linearisation {
+            cost: 0.5 * self.squares,
+            triangle: DMatrix::from_fn(n, n, |i, j| if i <= j { self.rows[i * (n + 1) + j] } else { 0.0 }),
+            projected: DVector::from_fn(n, |i, _| self.rows[i * (n + 1) + n]),
+        }
+    }
+
+    /// Reduces the block to zero, panel after panel; `filled(k)` bounds the non-zero rows of its first k columns.
+    fn reduce(&mut self, block: &mut Block, filled: impl Fn(usize) -> usize) {
+        let (n, m) = (self.parameters, block.rows);
+        debug_assert_eq!(n, block.parameters);
+        if m == 0 {
+            return;
+        }
+        for first in (0..n).step_by(PANEL) {
+            let width = PANEL.min(n - first);
+            let used = filled(first + width).min(m);
+            let (panel, trailing) = block.values[first * m..].split_at_mut(width * m);
+            let factors = self.factor_panel(first, width, panel, m, used);
+            let vectors: [&[f64]; PANEL] = std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
+            let coupling = coupling(&vectors, width);
+            for (j, column) in trailing.chunks_exact_mut(m).enumerate() {
+                let column = &mut column[..used];
+                let mut s = dots(&vectors, column);
+                for i in 0..width {
+                    let at = (first + i) * (n + 1) + first + width + j;
+                    let earlier: f64 = (0..i).map(|l| coupling[i][l] * s[l]).sum();
+                    s[i] = factors[i] * (self.rows[at] + s[i] - earlier);
+                    self.rows[at] -= s[i];
+                }
+                s[width..].fill(0.0);
+                subtract(column, &s, &vectors);
+            }
+        }
+    }
+
+    /// Replaces `width` columns by their reflectors and returns the factors τ of H = I − τ u uᵀ.
+    fn factor_panel(&mut self, first: usize, width: usize, panel: &mut [f64], m: usize, used: usize) -> [f64; PANEL] {
+        let stride = self.parameters + 1;
+        let mut factors = [0.0; PANEL];
+        for i in 0..width {
+            let row = (first + i) * stride + first;
+            let (head, tail) = panel.split_at_mut((i + 1) * m);
+            let vector = &mut head[i * m..][..used];
+            let (diagonal, factor) = reflector(self.rows[row + i], vector);
+            self.rows[row + i] = diagonal;
+            factors[i] = factor;
+            for (l, column) in tail.chunks_exact_mut(m).enumerate() {
+                let column = &mut column[..used];
+                let at = row + i + 1 + l;
+                let s = factor * (self.rows[at] + dot(vector, column));
+                self.rows[at] -= s;
+                column.iter_mut().zip(&*vector).for_each(|(c, v)| *c -= s * v);
+            }
+        }
+        factors
+    }
+}
+
+/// Householder reflector that sends (α, v) to (β, 0); `vector` becomes the part of u below its leading 1.
+///
+/// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg. 5.1.1]
+///
+/// Returns (β, τ); for v = 0 nothing is done and τ = 0.
+fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
+    let norm = norm(vector);
+    if norm == 0.0 {
+        return (alpha, 0.0);
+    }
+    let beta = -alpha.hypot(norm).copysign(alpha);
+    let pivot = alpha - beta;
+    let inverse = pivot.recip();
+    if inverse.is_normal() {
+        for v in vector {
+            *v *= inverse;
+        }
+    } else {
+        for v in vector {
+            *v /= pivot;
+        }
+    }
+    (beta, -pivot / beta)
+}
+
+/// Euclidean norm that neither overflows nor underflows.
+fn norm(vector: &[f64]) -> f64 {
+    let squares = sum_of_squares(vector);
+    if SAFE_SQUARES.contains(&squares) || squares.is_nan() {
+        return squares.sqrt();
+    }
+    let largest = vector.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+    if largest == 0.0 || largest.is_infinite() {
+        return largest;
+    }
+    let scaled: f64 = vector.iter().map(|v| (v / largest) * (v / largest)).sum();
+    largest * scaled.sqrt()
+}
+
+/// vᵀv, summed in the same order wherever it is formed.
+pub(super) fn sum_of_squares(vector: &[f64]) -> f64 {
+    dot(vector, vector)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a, a_rest) = a.as_chunks::<{ 2 * LANES }>();
+    let (b, b_rest) = b.as_chunks::<{ 2 * LANES }>();
+    let mut sums = [0.0; 2 * LANES];
+    for (a, b) in a.iter().zip(b) {
+        for l in 0..2 * LANES {
+            sums[l] += a[l] * b[l];
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// `vᵢᵀvₗ` for l < i.
+fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
+    let mut products = [[0.0; PANEL]; PANEL];
+    for i in 1..width {
+        for l in 0..i {
+            products[i][l] = dot(vectors[i], vectors[l]);
+        }
+    }
+    products
+}
+
+/// The four products vᵢᵀb in one pass over b.
+fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
+    let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
+    let (b, rest) = b.as_chunks::<LANES>();
+    let mut sums = [[0.0; LANES]; PANEL];
+    for ((((b, v0), v1), v2), v3) in b.iter().zip(v0).zip(v1).zip(v2).zip(v3) {
+        for l in 0..LANES {
+            sums[0][l] += v0[l] * b[l];
+            sums[1][l] += v1[l] * b[l];
+            sums[2][l] += v2[l] * b[l];
+            sums[3][l] += v3[l] * b[l];
+        }
+    }
+    let tail = |r: &[f64]| r.iter().zip(rest).map(|(v, b)| v * b).sum::<f64>();
+    let tails = [tail(r0), tail(r1), tail(r2), tail(r3)];
+    std::array::from_fn(|i| (sums[i][0] + sums[i][1]) + (sums[i][2] + sums[i][3]) + tails[i])
+}
+
+/// b ← b − Σ sᵢ vᵢ in one pass over b.
+fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL]) {
+    let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
+    let (b, rest) = b.as_chunks_mut::<LANES>();
+    for ((((b, v0), v1), v2), v3) in b.iter_mut().zip(v0).zip(v1).zip(v2).zip(v3) {
+        for l in 0..LANES {
+            b[l] -= (s[0] * v0[l] + s[1] * v1[l]) + (s[2] * v2[l] + s[3] * v3[l]);
+        }
+    }
+    for ((((b, v0), v1), v2), v3) in rest.iter_mut().zip(r0).zip(r1).zip(r2).zip(r3) {
+        *b -= (s[0] * v0 + s[1] * v1) + (s[2] * v2 + s[3] * v3);
+    }
+}
+
+type Chunks<'a> = [&'a [[f64; LANES]]; PANEL];
+
+/// Whole chunks and remainders of the four vectors.
+fn split<'a>(vectors: &[&'a [f64]; PANEL]) -> (Chunks<'a>, [&'a [f64]; PANEL]) {
+    let parts = vectors.map(<[f64]>::as_chunks::<LANES>);
+    (parts.map(|p| p.0), parts.map(|p| p.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A repeatable sequence in (−1, 1).
+    fn wave(i: usize) -> f64 {
+        (1.7 * i as f64 + 0.3 * (i * i % 101) as f64).sin()
+    }
+
+    fn block(rows: usize, n: usize, offset: usize, scale: f64) -> Block {
+        let mut block = Block::zeros(rows, n);
+        block.values_mut().iter_mut().enumerate().for_each(|(i, v)| *v = scale * wave(i + offset));
+        block
+    }
+
+    fn dense(block: &Block) -> DMatrix<f64> {
+        DMatrix::from_column_slice(block.rows, block.parameters + 1, &block.values)
+    }
+
+    /// `RᵀR`, `Rᵀc` and the cost are those of the stacked rows.
+    fn assert_same_problem(triangle: Triangle, stacked: &DMatrix<f64>, tolerance: f64) {
+        let n = stacked.ncols() - 1;
+        let gram = stacked.tr_mul(stacked);
+        let reduced = triangle.into_linearisation();
+        let scale = gram.amax();
+        assert!((reduced.triangle.tr_mul(&reduced.triangle) - gram.view((0, 0), (n, n))).amax() <= tolerance * scale);
+        assert!((reduced.triangle.tr_mul(&reduced.projected) - gram.view((0, n), (n, 1))).amax() <= tolerance * scale);
+        assert!((2.0 * reduced.cost - gram[(n, n)]).abs() <= tolerance * scale);
+    }
+
+    #[test]
+    fn absorbs_blocks_of_any_shape() {
+        for n in [1, 2, 3, 4, 5, 7, 8, 13] {
+            let mut triangle = Triangle::new(n);
+            let mut stacked = DMatrix::zeros(0, n + 1);
+            for (k, rows) in [1, 3, 4, 30, 257].into_iter().enumerate() {
+                let mut block = block(rows, n, 1000 * k, 1.0);
+                let top = stacked.nrows();
+                stacked = stacked.insert_rows(top, rows, 0.0);
+                stacked.view_mut((top, 0), (rows, n + 1)).copy_from(&dense(&block));
+                triangle.absorb(&mut block);
+            }
+            assert_same_problem(triangle, &stacked, 1e-13);
+        }
+    }
+
+    #[test]
+    fn merging_equals_absorbing() {
+        let (n, rows) = (11, 40);
+        let (first, second) = (block(rows, n, 0, 1.0), block(rows, n, 5000, 2.0));
+        let mut stacked = DMatrix::zeros(2 * rows, n + 1);
+        stacked.view_mut((0, 0), (rows, n + 1)).copy_from(&dense(&first));
+        stacked.view_mut((rows, 0), (rows, n + 1)).copy_from(&dense(&second));
+        let mut triangle = Triangle::new(n);
+        triangle.absorb(&mut first.clone());
+        let mut other = Triangle::new(n);
+        other.absorb(&mut second.clone());
+        triangle.merge(&other);
+        assert_same_problem(triangle, &stacked, 1e-13);
+    }
+
+    #[test]
+    fn extreme_sizes_and_zero_columns_stay_finite() {
+        for scale in [1e-200, 1e-308, 1e150, 1e200] {
+            let mut block = block(20, 6, 0, scale);
+            block.column_mut(2).fill(0.0);
+            let expected = norm(block.column(0));
+            let mut triangle = Triangle::new(6);
+            triangle.absorb(&mut block);
+            let reduced = triangle.into_linearisation();
+            assert!(reduced.triangle.iter().all(|v| v.is_finite()));
+            assert!((reduced.triangle[(0, 0)].abs() / expected - 1.0).abs() < 1e-6, "{scale}");
+            assert!(reduced.triangle.column(2).iter().skip(2).all(|v| *v == 0.0));
+        }
+    }
+}

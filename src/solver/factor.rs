@@ -1,0 +1,174 @@
+//! Linear least-squares steps with one factorisation: Gauss–Newton, damped, and limited in length.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::spectrum::Spectrum;
+
+/// A length within this fraction of the radius fills it [Moré 1978].
+pub(super) const RADIUS_SLACK: f64 = 0.1;
+
+/// min ‖B q + c‖ factorised once, to be solved for any damping.
+///
+/// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
+/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, the Gauss–Newton step comes from it. Every other question goes to B = U Σ Vᵀ; without
+/// full rank, singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
+/// combinations that the rows cannot see stay where they are.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    matrix: DMatrix<f64>,
+    constant: DVector<f64>,
+    tolerance: f64,
+    full_rank_step: Option<DVector<f64>>,
+    spectrum: Option<Spectrum>,
+}
+
+impl Factor {
+    /// Prepares min ‖B q + c‖; singular values up to `tolerance`·σ₁ count as zero.
+    pub fn new(matrix: DMatrix<f64>, constant: DVector<f64>, tolerance: f64) -> Self {
+        let full_rank_step = pivoted_solution(&matrix, &constant, tolerance);
+        Self { matrix, constant, tolerance, full_rank_step, spectrum: None }
+    }
+
+    /// B.
+    pub fn matrix(&self) -> &DMatrix<f64> {
+        &self.matrix
+    }
+
+    /// c.
+    pub fn constant(&self) -> &DVector<f64> {
+        &self.constant
+    }
+
+    /// The fraction of σ₁ that counts as zero.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// B q.
+    pub fn image(&self, q: &DVector<f64>) -> DVector<f64> {
+        &self.matrix * q
+    }
+
+    /// Bᵀc, the gradient at q = 0.
+    pub fn gradient(&self) -> DVector<f64> {
+        self.matrix.tr_mul(&self.constant)
+    }
+
+    /// The Gauss–Newton step: the shortest minimiser of ‖B q + c‖.
+    pub fn gauss_newton(&mut self) -> DVector<f64> {
+        match &self.full_rank_step {
+            Some(step) => step.clone(),
+            None => self.damped(0.0),
+        }
+    }
+
+    /// The minimiser of ‖B q + c‖² + λ‖q‖², the shortest one for λ = 0.
+    ///
+    /// q(λ) = −Σ σᵢ/(σᵢ² + λ) (uᵢᵀc) vᵢ
+    pub fn damped(&mut self, lambda: f64) -> DVector<f64> {
+        let n = self.matrix.ncols();
+        self.spectrum().solution(lambda, n)
+    }
+
+    /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
+    pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
+        if let Some(step) = &self.full_rank_step
+            && step.norm() <= (1.0 + RADIUS_SLACK) * radius
+        {
+            return (step.clone(), 0.0);
+        }
+        let lambda = self.spectrum().secular_root(radius);
+        (self.damped(lambda), lambda)
+    }
+
+    fn spectrum(&mut self) -> &Spectrum {
+        let Self { matrix, constant, tolerance, full_rank_step, spectrum } = self;
+        let cut = if full_rank_step.is_some() { 0.0 } else { spectral_cut(matrix, *tolerance) };
+        spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, cut))
+    }
+}
+
+/// −B⁻¹c (least squares) by column-pivoted QR, or nothing when B has not full rank.
+fn pivoted_solution(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
+    let n = matrix.ncols();
+    if n == 0 || matrix.nrows() < n {
+        return None;
+    }
+    let sizes = column_sizes(matrix);
+    let mut unit = matrix.clone();
+    for (mut column, size) in unit.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    let qr = unit.col_piv_qr();
+    let mut projected = -constant;
+    qr.q_tr_mul(&mut projected);
+    let r = qr.r();
+    let largest = r[(0, 0)].abs();
+    if r.diagonal().iter().any(|d| d.abs() <= tolerance * largest) {
+        return None;
+    }
+    let mut step = r.solve_upper_triangular(&projected.rows(0, n))?;
+    qr.p().inv_permute_rows(&mut step);
+    for (q, size) in step.iter_mut().zip(&sizes) {
+        *q /= size;
+    }
+    Some(step)
+}
+
+/// Lengths of the columns, one for a column of zeros.
+fn column_sizes(matrix: &DMatrix<f64>) -> Vec<f64> {
+    matrix.column_iter().map(|c| c.norm()).map(|size| if size > 0.0 { size } else { 1.0 }).collect()
+}
+
+/// The fraction of σ₁ that counts as zero, lowered (down to rounding) to keep short columns.
+fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
+    let sizes = || matrix.column_iter().map(|c| c.norm()).filter(|&size| size > 0.0);
+    let spread = sizes().fold(f64::INFINITY, f64::min) / sizes().fold(0.0, f64::max);
+    let rounding = 8.0 * matrix.ncols() as f64 * f64::EPSILON;
+    (tolerance * spread.min(1.0)).max(rounding.min(tolerance))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let matrix = DMatrix::from_fn(n, n, |i, j| if i <= j { ((3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
+        (matrix, DVector::from_fn(n, |i, _| (i as f64 + 0.5).cos()))
+    }
+
+    #[test]
+    fn pivoted_and_spectral_solutions_agree() {
+        let (matrix, constant) = example(6);
+        let mut factor = Factor::new(matrix.clone(), constant.clone(), 1e-13);
+        let step = factor.gauss_newton();
+        assert!((&matrix * &step + &constant).norm() < 1e-9 * step.norm());
+        assert!((factor.damped(0.0) - &step).norm() < 1e-9 * step.norm());
+    }
+
+    #[test]
+    fn limited_steps_have_the_radius_and_satisfy_the_normal_equations() {
+        let (matrix, constant) = example(7);
+        let mut factor = Factor::new(matrix.clone(), constant.clone(), 1e-13);
+        let full = factor.gauss_newton().norm();
+        for fraction in [0.7, 0.1, 1e-3, 1e-8] {
+            let (step, lambda) = factor.limited(fraction * full);
+            assert!((step.norm() / (fraction * full) - 1.0).abs() <= RADIUS_SLACK + 1e-12);
+            let normal = matrix.tr_mul(&(&matrix * &step + &constant)) + lambda * &step;
+            assert!(normal.norm() <= 1e-10 * factor.gradient().norm());
+        }
+    }
+
+    #[test]
+    fn what_is_not_seen_does_not_move() {
+        let (mut matrix, constant) = example(5);
+        let first = matrix.column(0).clone_owned();
+        matrix.set_column(3, &first);
+        matrix.column_mut(4).fill(0.0);
+        let mut factor = Factor::new(matrix, constant.clone(), 1e-12);
+        let step = factor.gauss_newton();
+        assert!((step[0] - step[3]).abs() < 1e-12 * step.norm());
+        assert!(step[4].abs() < 1e-14);
+        assert_eq!(Factor::new(DMatrix::zeros(5, 5), constant, 1e-12).gauss_newton(), DVector::zeros(5));
+    }
+}

@@ -1,0 +1,125 @@
+//! One call from objective and start to solution.
+
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::{Executor, State as _, TerminationReason, TerminationStatus};
+use nalgebra::DVector;
+
+use super::{AtBound, Bounds, Settings, State, Subproblem, Termination, TrustRegion};
+use super::{bounded_levenberg_marquardt, levenberg_marquardt};
+use crate::fit::Objective;
+
+/// Where a solver stopped, and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// x, the best point found.
+    pub x: DVector<f64>,
+    /// ½‖r(x)‖².
+    pub cost: f64,
+    /// Why it stopped.
+    pub termination: Termination,
+    /// Steps tried.
+    pub iterations: u64,
+    /// Evaluations of the cost alone.
+    pub cost_evaluations: u64,
+    /// Evaluations of residual and derivatives.
+    pub linearisations: u64,
+    /// The bound each unknown rests on, one entry per unknown.
+    pub at_bound: Vec<Option<AtBound>>,
+}
+
+/// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
+pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
+    run(objective, start, levenberg_marquardt(*settings), settings, None::<Silent>)
+}
+
+/// As [`minimise`], telling `observer` of every iteration.
+pub fn minimise_observed<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    settings: &Settings,
+    observer: impl Observe<State> + 'static,
+) -> Solution {
+    run(objective, start, levenberg_marquardt(*settings), settings, Some(observer))
+}
+
+/// Minimises ½‖r(x)‖² within `bounds` from `start`.
+pub fn minimise_bounded<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    bounds: &Bounds,
+    settings: &Settings,
+) -> Solution {
+    with_bounds(objective, start, bounds, settings, None::<Silent>)
+}
+
+/// As [`minimise_bounded`], telling `observer` of every iteration.
+pub fn minimise_bounded_observed<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    bounds: &Bounds,
+    settings: &Settings,
+    observer: impl Observe<State> + 'static,
+) -> Solution {
+    with_bounds(objective, start, bounds, settings, Some(observer))
+}
+
+struct Silent;
+
+impl Observe<State> for Silent {}
+
+fn with_bounds<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    bounds: &Bounds,
+    settings: &Settings,
+    observer: Option<impl Observe<State> + 'static>,
+) -> Solution {
+    let solver = bounded_levenberg_marquardt(bounds.clone(), *settings);
+    let mut solution = run(objective, start, solver, settings, observer);
+    if solution.x.len() == bounds.lower().len() {
+        solution.at_bound = (0..solution.x.len()).map(|j| bounds.at(&solution.x, j)).collect();
+    }
+    solution
+}
+
+fn run<O: Objective, S: Subproblem>(
+    objective: O,
+    start: DVector<f64>,
+    solver: TrustRegion<S>,
+    settings: &Settings,
+    observer: Option<impl Observe<State> + 'static>,
+) -> Solution {
+    let unknowns = start.len();
+    let mut executor = Executor::new(objective, solver)
+        .configure(|state: State| state.param(start.clone()).max_iters(settings.max_iterations))
+        .ctrlc(false)
+        .timer(false);
+    if let Some(observer) = observer {
+        executor = executor.add_observer(observer, ObserverMode::Always);
+    }
+    let mut solution = Solution {
+        x: start,
+        cost: f64::INFINITY,
+        termination: Termination::Interrupted,
+        iterations: 0,
+        cost_evaluations: 0,
+        linearisations: 0,
+        at_bound: vec![None; unknowns],
+    };
+    // The executor fails only when an observer does.
+    let Ok(mut result) = executor.run() else { return solution };
+    let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
+    solution.cost_evaluations = count("cost_count");
+    solution.linearisations = count("linearise_count");
+    solution.iterations = result.state.get_iter();
+    solution.cost = result.state.get_cost();
+    solution.termination = match (result.solver.termination(), result.state.get_termination_status()) {
+        (Some(termination), _) => termination,
+        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => Termination::IterationLimit,
+        (None, _) => Termination::Interrupted,
+    };
+    if let Some(x) = result.state.take_param() {
+        solution.x = x;
+    }
+    solution
+}

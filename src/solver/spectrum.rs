@@ -1,0 +1,132 @@
+//! Singular values by one-sided Jacobi rotations: slow for large matrices, exact and never failing for ours.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::factor::RADIUS_SLACK;
+
+/// Sweeps over all pairs of columns; five are usual.
+const SWEEPS: usize = 60;
+/// Newton steps allowed to the secular equation.
+const SECULAR_ITERATIONS: usize = 50;
+
+/// The seen part of min ‖B q + c‖ with B = U Σ Vᵀ.
+///
+/// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they become σᵢ Pᵀvᵢ, and the same
+/// rotations turn Qᵀc into Uᵀc.                                                   [Hestenes 1958; Drmač & Veselić 2008]
+#[derive(Debug, Clone)]
+pub(super) struct Spectrum {
+    terms: Vec<Term>,
+}
+
+/// One singular triplet.
+#[derive(Debug, Clone)]
+struct Term {
+    /// σᵢ.
+    singular: f64,
+    /// `−uᵢᵀc`.
+    projected: f64,
+    /// vᵢ.
+    direction: DVector<f64>,
+}
+
+impl Term {
+    /// Length of q(λ) along vᵢ, written so that λ = 0 needs no σ².
+    fn length(&self, lambda: f64) -> f64 {
+        self.projected / (self.singular + lambda / self.singular)
+    }
+}
+
+impl Spectrum {
+    /// Decomposes B and drops σ ≤ `cut`·σ₁.
+    pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, cut: f64) -> Self {
+        let n = matrix.ncols();
+        let qr = matrix.clone().col_piv_qr();
+        let mut projected = -constant;
+        qr.q_tr_mul(&mut projected);
+        let mut columns = qr.r().transpose();
+        orthogonalise(&mut columns, &mut projected);
+        let singular: Vec<f64> = columns.column_iter().map(|c| c.norm()).collect();
+        let largest = singular.iter().copied().fold(0.0, f64::max);
+        let terms = (0..n.min(columns.ncols()))
+            .filter(|&i| singular[i] > cut * largest && singular[i].is_normal())
+            .map(|i| {
+                let mut direction = columns.column(i) / singular[i];
+                qr.p().inv_permute_rows(&mut direction);
+                Term { singular: singular[i], projected: projected[i], direction }
+            })
+            .collect();
+        Self { terms }
+    }
+
+    /// q(λ) = −Σ σᵢ/(σᵢ² + λ) `(uᵢᵀc)` vᵢ, of `n` entries.
+    pub(super) fn solution(&self, lambda: f64, n: usize) -> DVector<f64> {
+        let mut q = DVector::zeros(n);
+        for term in &self.terms {
+            q.axpy(term.length(lambda), &term.direction, 1.0);
+        }
+        q
+    }
+
+    /// λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack, or zero if ‖q(0)‖ is no longer than that.
+    ///
+    /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0, which approaches from one side        [Hebden 1973; Moré 1978]
+    pub(super) fn secular_root(&self, radius: f64) -> f64 {
+        let mut lambda = 0.0;
+        for _ in 0..SECULAR_ITERATIONS {
+            let (mut squares, mut slope) = (0.0, 0.0);
+            for term in &self.terms {
+                let square = term.length(lambda).powi(2);
+                squares += square;
+                slope += square / (term.singular * term.singular + lambda);
+            }
+            let length = f64::sqrt(squares);
+            if length <= (1.0 + RADIUS_SLACK) * radius {
+                break;
+            }
+            lambda += squares / slope * (length - radius) / radius;
+        }
+        lambda
+    }
+}
+
+/// Rotates pairs of columns until all are orthogonal, and the entries of `projected` with them.
+fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
+    let (rows, n) = columns.shape();
+    let tolerance = (rows.max(1) as f64).sqrt() * f64::EPSILON;
+    for _ in 0..SWEEPS {
+        let mut rotated = false;
+        for i in 0..n {
+            for j in i + 1..n {
+                let (head, tail) = columns.as_mut_slice().split_at_mut(j * rows);
+                let (a, b) = (&mut head[i * rows..(i + 1) * rows], &mut tail[..rows]);
+                let Some((cosine, sine)) = rotation(a, b, tolerance) else { continue };
+                rotated = true;
+                for (a, b) in a.iter_mut().zip(b) {
+                    (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
+                }
+                let (a, b) = (projected[i], projected[j]);
+                (projected[i], projected[j]) = (cosine * a - sine * b, sine * a + cosine * b);
+            }
+        }
+        if !rotated {
+            break;
+        }
+    }
+}
+
+/// Cosine and sine of the rotation that makes a and b orthogonal, unless they are.
+fn rotation(a: &[f64], b: &[f64], tolerance: f64) -> Option<(f64, f64)> {
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        aa += a * a;
+        bb += b * b;
+        ab += a * b;
+    }
+    if ab == 0.0 || ab.abs() <= tolerance * aa.sqrt() * bb.sqrt() {
+        return None;
+    }
+    let zeta = (bb - aa) / (2.0 * ab);
+    let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+    let cosine = tangent.hypot(1.0).recip();
+    Some((cosine, cosine * tangent))
+}

@@ -1,0 +1,96 @@
+//! Why a solver stopped.
+
+use std::fmt;
+
+/// Why a solver stopped, with the inequality that held.
+///
+/// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction of ½‖r‖²; ε = 2⁻⁵².
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Termination {
+    /// The residual is orthogonal to every column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ `gradient_tolerance`.
+    Gradient,
+    /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤ `cost_tolerance`·½‖r‖² and ρ ≤ 2.
+    Cost,
+    /// The step is negligible: ‖D p‖ ≤ `step_tolerance` ‖D x‖.
+    Step,
+    /// The data are met exactly: ‖r‖ = 0.
+    ZeroResidual,
+    /// Rounding hides any further reduction: |actual| and predicted ≤ ε·½‖r‖² and ρ ≤ 2.
+    CostPrecision,
+    /// Rounding hides any smaller step: Δ ≤ ε ‖D x‖.
+    StepPrecision,
+    /// Rounding hides any smaller gradient: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ ε.
+    GradientPrecision,
+    /// As many steps were tried as allowed: iterations ≥ `max_iterations`.
+    IterationLimit,
+    /// The cost at the start is not finite.
+    OutsideDomainAtStart,
+    /// The cost is finite at x, but ∂r/∂x is not.
+    DerivativesNotFinite,
+    /// Every step left the domain, down to the smallest: ½‖r(x + p)‖² = ∞ and ‖D p‖ ≤ `step_tolerance` ‖D x‖.
+    DomainEdge,
+    /// The start, the bounds and the problem differ in their number of unknowns.
+    SizeMismatch,
+    /// An observer failed or interrupted the run.
+    Interrupted,
+}
+
+impl Termination {
+    /// Whether x is a minimum as far as the settings or the arithmetic can tell.
+    pub fn converged(self) -> bool {
+        match self {
+            Self::Gradient
+            | Self::Cost
+            | Self::Step
+            | Self::ZeroResidual
+            | Self::CostPrecision
+            | Self::StepPrecision
+            | Self::GradientPrecision => true,
+            Self::IterationLimit
+            | Self::OutsideDomainAtStart
+            | Self::DerivativesNotFinite
+            | Self::DomainEdge
+            | Self::SizeMismatch
+            | Self::Interrupted => false,
+        }
+    }
+
+    /// A stable name for files, in kebab case.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Gradient => "gradient",
+            Self::Cost => "cost",
+            Self::Step => "step",
+            Self::ZeroResidual => "zero-residual",
+            Self::CostPrecision => "cost-precision",
+            Self::StepPrecision => "step-precision",
+            Self::GradientPrecision => "gradient-precision",
+            Self::IterationLimit => "iteration-limit",
+            Self::OutsideDomainAtStart => "outside-domain-at-start",
+            Self::DerivativesNotFinite => "derivatives-not-finite",
+            Self::DomainEdge => "domain-edge",
+            Self::SizeMismatch => "size-mismatch",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+impl fmt::Display for Termination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Gradient => "converged: the residual is orthogonal to the derivatives",
+            Self::Cost => "converged: the cost no longer falls",
+            Self::Step => "converged: the step is negligible",
+            Self::ZeroResidual => "converged: the residual is zero",
+            Self::CostPrecision => "converged to rounding: the cost cannot fall further",
+            Self::StepPrecision => "converged to rounding: the step cannot be smaller",
+            Self::GradientPrecision => "converged to rounding: the gradient cannot be smaller",
+            Self::IterationLimit => "stopped: the limit of iterations was reached",
+            Self::OutsideDomainAtStart => "failed: the start lies outside the model's domain",
+            Self::DerivativesNotFinite => "failed: a derivative is not finite",
+            Self::DomainEdge => "failed: every step leaves the model's domain",
+            Self::SizeMismatch => "failed: start, bounds and problem differ in size",
+            Self::Interrupted => "stopped: interrupted from outside",
+        })
+    }
+}
