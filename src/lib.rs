@@ -10,4 +10,5 @@ pub mod problem;
 pub mod scalar;
 pub mod solver;
 pub mod spatial;
+pub mod study;
 mod units;

@@ -75,16 +75,16 @@ fn problems() -> Vec<Problem> {
             [0.0]
         ),
         problem!("Penalty I, n = 4 (23)", penalty1, 5, [1.0, 2.0, 3.0, 4.0], [2.249_975e-5]),
-        problem!(
-            "Penalty I, n = 10 (23)",
-            penalty1,
-            11,
-            (1..=10).map(f64::from).collect::<Vec<_>>(),
-            [7.087_651e-5]
-        ),
+        problem!("Penalty I, n = 10 (23)", penalty1, 11, (1..=10).map(f64::from).collect::<Vec<_>>(), [7.087_651e-5]),
         problem!("Penalty II, n = 4 (24)", penalty2, 8, [0.5; 4], [9.376_293e-6]),
         problem!("Penalty II, n = 10 (24)", penalty2, 20, [0.5; 10], [2.936_605e-4]),
-        problem!("Variably dimensioned, n = 10 (25)", variable, 12, (1..=10).map(|j| 1.0 - f64::from(j) / 10.0).collect::<Vec<_>>(), [0.0]),
+        problem!(
+            "Variably dimensioned, n = 10 (25)",
+            variable,
+            12,
+            (1..=10).map(|j| 1.0 - f64::from(j) / 10.0).collect::<Vec<_>>(),
+            [0.0]
+        ),
         problem!("Trigonometric, n = 10 (26)", trigonometric, 10, [0.1; 10], [0.0, 2.795_06e-5]),
         problem!("Brown almost linear, n = 10 (27)", brown_almost_linear, 10, [0.5; 10], [0.0, 1.0]),
         problem!("Brown almost linear, n = 30 (27)", brown_almost_linear, 30, [0.5; 30], [0.0, 1.0]),

@@ -116,6 +116,9 @@ pub enum InputErrorKind {
     #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
     QuantityUseless { suffixes: &'static str },
 
+    #[error("the nominal arm has no equilibrium under its loads here; check stiffnesses and masses")]
+    NoEquilibrium,
+
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,

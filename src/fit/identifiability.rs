@@ -54,9 +54,7 @@ impl Identifiability {
         let singular_values: Vec<f64> = order.iter().map(|&k| svd.singular_values[k]).collect();
         let threshold = BLIND_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
-        let null = DMatrix::from_fn(n - rank, n, |i, j| {
-            svd.v_t.as_ref().map_or(0.0, |v| v[(order[rank + i], j)])
-        });
+        let null = DMatrix::from_fn(n - rank, n, |i, j| svd.v_t.as_ref().map_or(0.0, |v| v[(order[rank + i], j)]));
         let visible = (0..n).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
         let blind = named(null.clone(), &scaled);
         let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
@@ -98,8 +96,7 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination>
         if row == rows {
             break;
         }
-        let below = null.view((row, column), (rows - row, 1));
-        let pivot = row + below.icamax().0;
+        let pivot = row + null.column(column).rows_range(row..).iamax();
         if null[(pivot, column)].abs() < NEGLIGIBLE {
             for i in row..rows {
                 null[(i, column)] = 0.0;
@@ -144,13 +141,8 @@ mod tests {
         // Columns: a, b, a, 0, a + b
         let base = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, -1.0, 0.0, 2.0, 3.0, 1.0]);
         let (a, b) = (base.column(0), base.column(1));
-        let jacobian = DMatrix::from_columns(&[
-            a.clone_owned(),
-            b.clone_owned(),
-            a.clone_owned(),
-            DVector::zeros(4),
-            a + b,
-        ]);
+        let jacobian =
+            DMatrix::from_columns(&[a.clone_owned(), b.clone_owned(), a.clone_owned(), DVector::zeros(4), a + b]);
         let mut padded = DMatrix::zeros(5, 5);
         padded.rows_mut(0, 4).copy_from(&jacobian);
         let found = Identifiability::of(&padded.qr().unpack_r());

@@ -4,16 +4,20 @@
 //! it is reduced, block by block, to the triangular factor of its QR decomposition.
 
 mod derivative;
+mod identifiability;
 mod objective;
 mod triangle;
+mod uncertainty;
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
+pub use identifiability::{BlindCombination, Identifiability};
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
+pub use uncertainty::Uncertainty;
 
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {

@@ -10,6 +10,8 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
+use crate::error::Location;
+
 pub use split::Split;
 
 /// Measured poses, a column for each quantity, in the order of the files.
@@ -65,6 +67,12 @@ impl Measurements {
     /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
+    }
+
+    /// File and line of a row, for messages.
+    pub fn location(&self, row: usize) -> Location {
+        let (file, line) = self.origin[row];
+        Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
     /// Configuration of a row, shape = (joints) [rad] or [m].

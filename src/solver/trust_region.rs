@@ -103,14 +103,7 @@ pub struct TrustRegion<S> {
 impl<S: Subproblem> TrustRegion<S> {
     /// The loop around `subproblem`.
     pub fn new(subproblem: S, settings: Settings) -> Self {
-        Self {
-            subproblem,
-            settings,
-            scale: DVector::zeros(0),
-            radius: None,
-            prepared: false,
-            termination: None,
-        }
+        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, prepared: false, termination: None }
     }
 
     /// Why it stopped, once it has.
@@ -209,7 +202,15 @@ impl Trial {
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
         let predicted = step.predicted / before;
         let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
-        Self { cost: after, actual, predicted, slope: step.slope / before, ratio, length: step.length, damping: step.damping }
+        Self {
+            cost: after,
+            actual,
+            predicted,
+            slope: step.slope / before,
+            ratio,
+            length: step.length,
+            damping: step.damping,
+        }
     }
 
     fn next_radius(&self, radius: f64) -> f64 {

@@ -1,0 +1,47 @@
+//! Position errors, summed up.
+
+use nalgebra::Vector3;
+
+/// A value per axis of the measuring frame and for the Euclidean norm [m].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AxisValues {
+    /// Along x.
+    pub x: f64,
+    /// Along y.
+    pub y: f64,
+    /// Along z.
+    pub z: f64,
+    /// Of the norm.
+    pub norm: f64,
+}
+
+/// Size of the position errors of some poses [m].
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ErrorSummary {
+    /// Number of poses.
+    pub n: usize,
+    /// Mean absolute value per axis, mean norm.
+    pub mean: AxisValues,
+    /// Largest absolute value per axis, largest norm.
+    pub max: AxisValues,
+    /// Root mean square per axis, root of the mean squared norm.
+    pub rms: AxisValues,
+}
+
+impl ErrorSummary {
+    /// Of the errors measured − predicted [m].
+    pub fn of(errors: &[Vector3<f64>]) -> Self {
+        let values: Vec<[f64; 4]> = errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();
+        let n = values.len().max(1) as f64;
+        let over = |fold: &dyn Fn(f64, f64) -> f64, finish: &dyn Fn(f64) -> f64| {
+            let axis = |k: usize| finish(values.iter().fold(0.0, |sum, value| fold(sum, value[k])));
+            AxisValues { x: axis(0), y: axis(1), z: axis(2), norm: axis(3) }
+        };
+        Self {
+            n: errors.len(),
+            mean: over(&|sum, v| sum + v, &|sum| sum / n),
+            max: over(&|max, v| if v > max || v.is_nan() { v } else { max }, &|max| max),
+            rms: over(&|sum, v| v.mul_add(v, sum), &|sum| (sum / n).sqrt()),
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! From measurements to estimates with their errors.
+
+use std::time::Instant;
+
+use nalgebra::DVector;
+
+use super::fitting::{FitEnd, Fitting};
+use super::stage::{Stage, StageError};
+use super::statistics::Statistics;
+use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::error::{InputError, InputErrorKind};
+use crate::fit::Identifiability;
+use crate::measurement::{Measurements, Split};
+use crate::model::Model;
+use crate::parameter::{Parameter, Unit};
+use crate::problem::Problem;
+use crate::solver::{AtBound, Termination};
+
+/// An undeclared σ has settled when it changes by less than this part.
+const NOISE_SETTLED: f64 = 1e-3;
+/// Fits after which the search for an undeclared σ stops.
+const MAX_NOISE_FITS: usize = 20;
+/// A parameter of which the data gave no more than this part has no standard error.
+const NOTHING_LEARNED: f64 = 1e-6;
+
+/// How to identify.
+#[derive(Clone, Default)]
+pub struct Options {
+    /// Which parameters are fitted together.
+    pub strategy: Strategy,
+    /// By which solver.
+    pub solver: SolverChoice,
+    /// Told of every step.
+    pub progress: Option<ProgressSink>,
+}
+
+/// Why an identification could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// Problem and data do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A fit could not be set up.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// Bounds were declared for a solver that cannot keep them.
+    #[error(
+        "{solver} does not keep the bounds of [parameters]: take the solver bounded or auto, or leave out min and max"
+    )]
+    BoundsIgnored {
+        /// The solver that was asked for.
+        solver: &'static str,
+    },
+    /// A strategy has nothing to vary.
+    #[error("strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]")]
+    NothingToFit {
+        /// The strategy that was asked for.
+        strategy: &'static str,
+    },
+}
+
+/// Errors on both parts of the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// On the poses that are fitted.
+    pub identification: ErrorSummary,
+    /// On the poses that decide nothing.
+    pub held_out: ErrorSummary,
+}
+
+/// Where the assumed noise comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Noise {
+    /// From `position_sigma` or the column `sigma`.
+    Declared,
+    /// From the scatter about the fit, 1 σ per coordinate [m].
+    Estimated(f64),
+}
+
+/// A parameter after the fit; SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name as in the problem file.
+    pub name: String,
+    /// Kind of quantity.
+    pub unit: Unit,
+    /// Nominal value.
+    pub nominal: f64,
+    /// Estimated value.
+    pub estimate: f64,
+    /// 1 σ; `None` where nothing was learned, where the value rests on a bound, or where it was not fitted.
+    pub std_error: Option<f64>,
+    /// The bound on which the value rests.
+    pub at_bound: Option<AtBound>,
+    /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among blind combinations.
+    pub identified: f64,
+    /// Whether the strategy varied it.
+    pub fitted: bool,
+}
+
+/// An identified arm.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// Which parameters were fitted together.
+    pub strategy: Strategy,
+    /// The solver that was used.
+    pub solver: SolverChoice,
+    /// Why it stopped.
+    pub termination: Termination,
+    /// Steps tried, over all stages.
+    pub iterations: u64,
+    /// Time taken [s].
+    pub seconds: f64,
+    /// Where the noise comes from.
+    pub noise: Noise,
+    /// Of the nominal arm, with base and target fitted where they are free.
+    pub registered: Errors,
+    /// Of the identified arm.
+    pub fitted: Errors,
+    /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
+    pub reduced_chi2: Option<f64>,
+    /// By how much the declared variance was raised for the standard errors, ≥ 1.
+    pub noise_factor: f64,
+    /// Measured coordinates that were fitted.
+    pub coordinates: usize,
+    /// Fitted parameters that have no prior.
+    pub without_prior: usize,
+    /// Names of the fitted parameters, in the order of `identifiability`.
+    pub unknowns: Vec<String>,
+    /// What the identification data can tell about them, at the registered nominal arm.
+    pub identifiability: Identifiability,
+    /// Every free parameter.
+    pub estimates: Vec<Estimate>,
+    /// Pairs of parameters correlated by more than 0.9, strongest first.
+    pub correlations: Vec<(String, String, f64)>,
+    /// Full parameter vector of the model.
+    pub x: DVector<f64>,
+}
+
+impl Identification {
+    /// Whether there are as many equations as unknowns without a prior.
+    pub fn is_determined(&self) -> bool {
+        self.coordinates >= self.without_prior
+    }
+
+    /// Whether the fit is to be trusted.
+    pub fn is_trusted(&self) -> bool {
+        self.is_determined() && self.termination.converged()
+    }
+}
+
+/// Identifies the free parameters of `problem` from the identification rows; held-out rows decide nothing.
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let clock = Instant::now();
+    let placement = Placement::of(measurements);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let (strategy, solver) = (options.strategy, options.solver.decide(&model.parameters));
+    if solver != SolverChoice::Bounded && model.parameters.iter().any(Parameter::is_bounded) {
+        return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
+    }
+    let declared = problem.data.position_sigma;
+    let noise_is_declared = declared.is_some() || measurements.sigma.is_some();
+    let mut fitting = Fitting {
+        model: &model,
+        measurements,
+        split,
+        placement: &placement,
+        late: placement.late(&model, split),
+        strategy,
+        solver,
+        progress: options.progress.as_ref(),
+        sigma: declared.unwrap_or(1e-3),
+    };
+    if let Some(row) = fitting.without_equilibrium() {
+        return Err(measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
+    }
+    let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
+    if strategy != Strategy::Joint && unknowns.iter().all(|parameter| parameter.slot.is_placement()) {
+        return Err(IdentifyError::NothingToFit { strategy: strategy.as_str() });
+    }
+
+    let start = fitting.registered()?;
+    let registered = fitting.errors(&start);
+    if !noise_is_declared {
+        fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(f64::MIN_POSITIVE);
+    }
+    let mut fits = 0;
+    let (mut end, statistics) = loop {
+        let end = fitting.run(&start)?;
+        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared);
+        fits += 1;
+        let factor = statistics.reduced_chi2.filter(|&chi2| chi2 > 0.0).map_or(1.0, f64::sqrt);
+        if noise_is_declared || (factor - 1.0).abs() < NOISE_SETTLED || fits == MAX_NOISE_FITS {
+            break (end, statistics);
+        }
+        fitting.sigma *= factor;
+    };
+    let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
+    report(&mut estimates, &fitting.whole(), &end, &statistics);
+    if let Some(stage) = fitting.late_stage() {
+        let late: FitEnd = stage.run(&end.x)?.into();
+        report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared));
+        end.x = late.x;
+    }
+    let name = |j: usize| unknowns[j].name.clone();
+    Ok(Identification {
+        strategy,
+        solver,
+        termination: end.termination,
+        iterations: end.iterations,
+        noise: if noise_is_declared { Noise::Declared } else { Noise::Estimated(fitting.sigma) },
+        registered,
+        fitted: fitting.errors(&end.x),
+        reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
+        noise_factor: statistics.noise_factor,
+        coordinates: 3 * split.identification.len(),
+        without_prior: unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count(),
+        identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
+        estimates,
+        correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
+        unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        x: end.x,
+        seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+impl Estimate {
+    fn unfitted(parameter: &Parameter) -> Self {
+        Self {
+            name: parameter.name.clone(),
+            unit: parameter.unit(),
+            nominal: parameter.nominal,
+            estimate: parameter.nominal,
+            std_error: None,
+            at_bound: None,
+            identified: 0.0,
+            fitted: false,
+        }
+    }
+}
+
+/// Enters what a stage found into the estimates of its unknowns.
+fn report(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
+    for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
+        let x = end.x[k];
+        let learned = end.at_bound[j].is_none() && statistics.identified[j] > NOTHING_LEARNED;
+        let estimate = &mut estimates[k];
+        estimate.estimate = parameter.value(x);
+        estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));
+        estimate.at_bound = end.at_bound[j];
+        estimate.identified = statistics.identified[j];
+        estimate.fitted = true;
+    }
+}

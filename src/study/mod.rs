@@ -1,0 +1,16 @@
+//! What to fit, in which order, and what came of it.
+
+mod errors;
+mod fitting;
+mod identification;
+mod placement;
+mod registration;
+mod stage;
+mod statistics;
+mod strategy;
+
+pub use errors::{AxisValues, ErrorSummary};
+pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
+pub use placement::Placement;
+pub use stage::{Progress, ProgressSink, StageError};
+pub use strategy::{SolverChoice, Strategy};

@@ -1,0 +1,82 @@
+//! Which base and which target each row uses, and which of them appear in held-out rows only.
+
+use crate::arm::Setup;
+use crate::measurement::{Measurements, Split};
+use crate::model::{Model, Pose};
+use crate::parameter::Slot;
+
+/// Bases and targets of a set of measurements.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Placement {
+    /// One base per session.
+    pub bases: Vec<String>,
+    /// One target per word of the column `target`, or per session where there is none.
+    pub targets: Vec<String>,
+    base_of_row: Vec<usize>,
+    target_of_row: Vec<usize>,
+}
+
+impl Placement {
+    /// As the columns `session` and `target` say.
+    pub fn of(measurements: &Measurements) -> Self {
+        let session = &measurements.session;
+        let target = measurements.target.as_ref().unwrap_or(session);
+        Self {
+            bases: session.names.clone(),
+            targets: target.names.clone(),
+            base_of_row: session.of_row.clone(),
+            target_of_row: target.of_row.clone(),
+        }
+    }
+
+    /// Rows as poses; `sigma` [m] is that of rows without one of their own.
+    pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
+        let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
+        rows.iter()
+            .map(|&row| Pose {
+                setup: Setup {
+                    configuration: measurements.configuration(row),
+                    payload: at(&measurements.payload, row),
+                    hoist: at(&measurements.hoist, row),
+                },
+                base: self.base_of_row[row],
+                target: self.target_of_row[row],
+                measured: measurements.positions[row],
+                sigma: at(&measurements.sigma, row).unwrap_or(sigma),
+            })
+            .collect()
+    }
+
+    /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.
+    ///
+    /// They say nothing about the arm: they are fitted on their held-out rows, alone.
+    pub fn late(&self, model: &Model, split: &Split) -> Late {
+        let unused = |count: usize, of_row: &[usize]| {
+            let mut unused = vec![true; count];
+            split.identification.iter().for_each(|&row| unused[of_row[row]] = false);
+            unused
+        };
+        let bases = unused(self.bases.len(), &self.base_of_row);
+        let targets = unused(self.targets.len(), &self.target_of_row);
+        let parameters = model
+            .parameters
+            .iter()
+            .map(|parameter| match parameter.slot {
+                Slot::Base { base, .. } => bases[base],
+                Slot::Target { target, .. } => targets[target],
+                Slot::Joint { .. } | Slot::Beam { .. } => false,
+            })
+            .collect();
+        let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];
+        Late { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
+    }
+}
+
+/// Bases and targets that appear in held-out rows only.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Late {
+    /// Whether each parameter of the model belongs to one.
+    pub parameters: Vec<bool>,
+    /// The held-out rows that use one.
+    pub rows: Vec<usize>,
+}

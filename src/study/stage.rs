@@ -1,0 +1,171 @@
+//! One least-squares fit of some parameters to some poses.
+
+use std::sync::Arc;
+
+use argmin::core::observers::Observe;
+use argmin::core::{Error, KV, State as _};
+use nalgebra::{DMatrix, DVector};
+
+use super::SolverChoice;
+use crate::fit::{Fit, Identifiability, LinearRows, Objective as _, RowsError};
+use crate::model::{Model, Pose, PoseResiduals};
+use crate::parameter::Parameter;
+use crate::solver::{self, Bounds, BoundsError, Settings, Solution, State};
+
+/// How far a fit has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Steps tried in the fit at hand.
+    pub iteration: u64,
+    /// Number of unknowns of the fit at hand.
+    pub unknowns: usize,
+    /// Number of poses of the fit at hand.
+    pub poses: usize,
+    /// ½‖r‖².
+    pub cost: f64,
+}
+
+/// Where progress goes; the library itself prints nothing.
+pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
+
+/// A stage that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// Bounds leave a parameter no value.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
+    /// Priors do not fit the unknowns.
+    #[error(transparent)]
+    Rows(#[from] RowsError),
+}
+
+/// What a stage works on.
+pub(super) struct Stage<'a> {
+    pub model: &'a Model,
+    pub poses: Vec<Pose<'a>>,
+    /// Which parameters vary.
+    pub unknowns: Vec<usize>,
+    pub solver: SolverChoice,
+    pub progress: Option<&'a ProgressSink>,
+}
+
+/// Where a stage ended.
+pub(super) struct StageEnd {
+    /// Full parameter vector.
+    pub x: DVector<f64>,
+    pub solution: Solution,
+    pub gauge: Gauge,
+}
+
+/// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.
+#[derive(Debug, Clone)]
+pub(super) struct Gauge {
+    /// Rows that span them, on the unknowns.
+    pub rows: DMatrix<f64>,
+    /// Part of each unknown outside of them, 0…1.
+    pub visible: Vec<f64>,
+}
+
+struct Reporter {
+    sink: ProgressSink,
+    unknowns: usize,
+    poses: usize,
+}
+
+impl Observe<State> for Reporter {
+    fn observe_iter(&mut self, state: &State, _kv: &KV) -> Result<(), Error> {
+        (self.sink)(Progress {
+            iteration: state.get_iter(),
+            unknowns: self.unknowns,
+            poses: self.poses,
+            cost: state.get_cost(),
+        });
+        Ok(())
+    }
+}
+
+impl<'a> Stage<'a> {
+    /// The parameters that vary.
+    pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
+        self.unknowns.iter().map(|&k| &self.model.parameters[k])
+    }
+
+    /// Residuals of the stage about the full parameter vector `at`.
+    pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
+        PoseResiduals::new(self.model, self.poses.clone(), self.unknowns.clone(), at.clone())
+    }
+
+    /// Triangular factor R of the whitened data at `at`, priors left out.
+    pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = self.residuals(at);
+        Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
+    }
+
+    /// Combinations that the data and the priors together leave open at `at`.
+    pub fn gauge(&self, at: &DVector<f64>) -> Gauge {
+        let priors = self.priors();
+        let n = self.unknowns.len();
+        if priors.nrows() == n {
+            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
+        }
+        let data = self.data_triangle(at);
+        let stacked =
+            DMatrix::from_fn(n + priors.nrows(), n, |i, j| if i < n { data[(i, j)] } else { priors[(i - n, j)] });
+        let found = Identifiability::of(&stacked.qr().unpack_r());
+        Gauge { rows: found.gauge, visible: found.visible }
+    }
+
+    /// Minimises from the full parameter vector `start`.
+    ///
+    /// # Errors
+    /// Bounds leave a parameter no value.
+    pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
+        let residuals = self.residuals(start);
+        let begin = residuals.reduced(start);
+        let priors = self.priors();
+        let gauge = self.gauge(start);
+        let hold = -(&gauge.rows * &begin);
+        let none = DVector::zeros(priors.nrows());
+        let fit = Fit::new(&residuals)
+            .with_rows(LinearRows { matrix: priors, constant: none })?
+            .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
+        let settings = Settings::default();
+        let reporter = self.progress.map(|sink| Reporter {
+            sink: Arc::clone(sink),
+            unknowns: self.unknowns.len(),
+            poses: self.poses.len(),
+        });
+        let solution = match (self.solver, reporter) {
+            (SolverChoice::Bounded, reporter) => {
+                let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
+                let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
+                let bounds = Bounds::new(lower, upper)?;
+                match reporter {
+                    Some(reporter) => solver::minimise_bounded_observed(fit, begin, &bounds, &settings, reporter),
+                    None => solver::minimise_bounded(fit, begin, &bounds, &settings),
+                }
+            }
+            (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
+            (_, None) => solver::minimise(fit, begin, &settings),
+        };
+        Ok(StageEnd { x: residuals.full(&solution.x), solution, gauge })
+    }
+
+    /// ½‖r‖² of the data and the priors at the full parameter vector `at`.
+    pub fn cost(&self, at: &DVector<f64>) -> f64 {
+        let residuals = self.residuals(at);
+        let x = residuals.reduced(at);
+        Fit::new(&residuals).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
+    }
+
+    /// One row x / σ for each unknown with a prior.
+    fn priors(&self) -> DMatrix<f64> {
+        let sigmas: Vec<(usize, f64)> =
+            self.parameters().enumerate().filter_map(|(j, parameter)| Some((j, parameter.sigma?))).collect();
+        let mut rows = DMatrix::zeros(sigmas.len(), self.unknowns.len());
+        for (i, &(j, sigma)) in sigmas.iter().enumerate() {
+            rows[(i, j)] = sigma.recip();
+        }
+        rows
+    }
+}

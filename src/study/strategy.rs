@@ -1,0 +1,75 @@
+//! Which parameters are fitted together, and by which solver.
+
+use crate::parameter::Parameter;
+
+/// Which parameters are fitted together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Strategy {
+    /// Everything at once.
+    #[default]
+    Joint,
+    /// Stiffness, then geometry [Chen2021, sec. 3.3], repeated until it settles.
+    Sequential,
+    /// Geometry; stiffnesses stay at their nominal values.
+    GeometryOnly,
+    /// Stiffnesses; geometry stays at its nominal values.
+    StiffnessOnly,
+}
+
+/// A solver by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SolverChoice {
+    /// Bounded Levenberg–Marquardt where any free parameter has a bound, plain otherwise.
+    #[default]
+    Auto,
+    /// Levenberg–Marquardt without bounds.
+    LevenbergMarquardt,
+    /// Levenberg–Marquardt within the bounds of `[parameters]`.
+    Bounded,
+}
+
+impl Strategy {
+    /// Name on the command line and in results.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Sequential => "sequential",
+            Self::GeometryOnly => "geometry-only",
+            Self::StiffnessOnly => "stiffness-only",
+        }
+    }
+
+    /// The stages of one sweep, each as a choice of parameters; bases and targets take part in every stage.
+    pub fn stages(self) -> &'static [fn(&Parameter) -> bool] {
+        const ALL: fn(&Parameter) -> bool = |_| true;
+        const STIFFNESS: fn(&Parameter) -> bool = |p| p.slot.is_elastic() || p.slot.is_placement();
+        const GEOMETRY: fn(&Parameter) -> bool = |p| !p.slot.is_elastic();
+        match self {
+            Self::Joint => &[ALL],
+            Self::Sequential => &[STIFFNESS, GEOMETRY],
+            Self::GeometryOnly => &[GEOMETRY],
+            Self::StiffnessOnly => &[STIFFNESS],
+        }
+    }
+}
+
+impl SolverChoice {
+    /// Name on the command line and in results.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::LevenbergMarquardt => "levenberg-marquardt",
+            Self::Bounded => "bounded",
+        }
+    }
+
+    /// The solver that `auto` stands for with these parameters.
+    #[must_use]
+    pub fn decide(self, parameters: &[Parameter]) -> Self {
+        match self {
+            Self::Auto if parameters.iter().any(Parameter::is_bounded) => Self::Bounded,
+            Self::Auto => Self::LevenbergMarquardt,
+            chosen => chosen,
+        }
+    }
+}
