@@ -152,12 +152,14 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
         let mut total: Option<Triangle> = None;
         let map = |index, block: &mut Block| self.chunk_triangle(x, index, block);
-        self.in_order(|| self.empty_block(), map, |triangle| {
-            match &mut total {
+        self.in_order(
+            || self.empty_block(),
+            map,
+            |triangle| match &mut total {
                 Some(total) => total.merge(&triangle),
                 None => total = Some(triangle),
-            }
-        });
+            },
+        );
         let mut total = total.unwrap_or_else(|| Triangle::new(self.problem.parameters()));
         for rows in &self.rows {
             total.absorb(&mut linear_block(rows, x));

@@ -187,8 +187,7 @@ impl<'a> BoxProblem<'a> {
             right.push(self.upper[j] * sizes[j] / scale);
         }
         let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
-        let diagonal: Vec<f64> =
-            sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
+        let diagonal: Vec<f64> = sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
         let indices: Vec<usize> = (0..n + rows).collect();
         let quadratic = CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
         let cones: [SupportedConeT<f64>; 2] = [ZeroConeT(rows), NonnegativeConeT(lower.len() + upper.len())];
@@ -218,7 +217,11 @@ mod tests {
         let n = 8;
         let spread = |j: usize| 10.0_f64.powf(0.75 * j as f64);
         let matrix =
-            DMatrix::from_fn(n, n, |i, j| if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 });
+            DMatrix::from_fn(
+                n,
+                n,
+                |i, j| if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 },
+            );
         let constant = DVector::from_fn(n, |i, _| 1.0 + i as f64);
         let factor = Factor::new(matrix, constant, 1e-13);
         let mut lower = DVector::from_fn(n, |j, _| -0.5 / spread(j));
@@ -228,7 +231,8 @@ mod tests {
             let mut problem = BoxProblem::new(&factor, lower.clone(), upper.clone(), vec![None; n]);
             let interior = problem.interior_point(lambda).unwrap();
             let solution = problem.solve(lambda);
-            let cost = |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
+            let cost =
+                |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
             assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
             assert!(solution.active.iter().any(Option::is_some));
             let corrected = problem.corrected(&solution.active, &solution.q, lambda);

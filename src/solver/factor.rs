@@ -133,7 +133,8 @@ mod tests {
     use super::*;
 
     fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let matrix = DMatrix::from_fn(n, n, |i, j| if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
+        let matrix =
+            DMatrix::from_fn(n, n, |i, j| if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
         (matrix, DVector::from_fn(n, |i, _| (i as f64 + 0.5).cos()))
     }
 

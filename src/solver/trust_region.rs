@@ -26,7 +26,9 @@ pub struct Settings {
     pub step_tolerance: f64,
     /// Singular values of the scaled Jacobian up to this fraction of the largest count as zero; default 1e-12.
     pub rank_tolerance: f64,
-    /// First radius as a multiple of ‖D x‖; default 100.
+    /// First radius as a multiple of ‖D x‖ (of 1 where x = 0), but no less than ‖r‖; default 100.
+    ///
+    /// Where x is near zero its size says nothing; ‖r‖ is the length that orthogonal columns would need.
     pub initial_radius: f64,
     /// Largest number of steps tried, taken or not; default 500.
     pub max_iterations: u64,
@@ -95,22 +97,13 @@ pub struct TrustRegion<S> {
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
-    /// Whether the linearisation at x is in the subproblem.
-    prepared: bool,
     termination: Option<Termination>,
 }
 
 impl<S: Subproblem> TrustRegion<S> {
     /// The loop around `subproblem`.
     pub fn new(subproblem: S, settings: Settings) -> Self {
-        Self {
-            subproblem,
-            settings,
-            scale: DVector::zeros(0),
-            radius: None,
-            prepared: false,
-            termination: None,
-        }
+        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, termination: None }
     }
 
     /// Why it stopped, once it has.
@@ -161,7 +154,7 @@ impl<S: Subproblem> TrustRegion<S> {
         if self.radius.is_none() {
             let length = self.scale.component_mul(x).norm();
             let factor = self.settings.initial_radius;
-            self.radius = Some(if length > 0.0 { factor * length } else { factor });
+            self.radius = Some(residual.max(if length > 0.0 { factor * length } else { factor }));
         }
         None
     }
@@ -209,7 +202,15 @@ impl Trial {
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
         let predicted = step.predicted / before;
         let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
-        Self { cost: after, actual, predicted, slope: step.slope / before, ratio, length: step.length, damping: step.damping }
+        Self {
+            cost: after,
+            actual,
+            predicted,
+            slope: step.slope / before,
+            ratio,
+            length: step.length,
+            damping: step.damping,
+        }
     }
 
     fn next_radius(&self, radius: f64) -> f64 {
@@ -249,7 +250,6 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         } else {
             Some(Termination::OutsideDomainAtStart)
         };
-        self.prepared = true;
         let state = state.param(x).cost(linearisation.cost);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
     }
@@ -257,13 +257,6 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
     fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         let cost = state.get_cost();
-        if !self.prepared {
-            let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
-            if let Some(termination) = self.take_in(&x, &linearisation) {
-                return Ok((self.stop(state.param(x).cost(cost), termination), None));
-            }
-            self.prepared = true;
-        }
         let first = state.get_iter() == 0;
         let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
         let step = self.subproblem.step(&x, radius);
@@ -276,9 +269,12 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let taken = trial.ratio >= ACCEPT;
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
-        let termination = self.judge(&trial, size);
+        let mut termination = self.judge(&trial, size);
         let state = if taken {
-            self.prepared = false;
+            if termination.is_none() {
+                let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
+                termination = self.take_in(&step.point, &linearisation);
+            }
             state.param(step.point).cost(trial.cost)
         } else {
             state.param(x).cost(cost)

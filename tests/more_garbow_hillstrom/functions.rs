@@ -128,10 +128,7 @@ pub fn wood<D: Scalar>(x: &[D]) -> Vec<D> {
 pub fn kowalik_osborne<D: Scalar>(x: &[D]) -> Vec<D> {
     const Y: [f64; 11] = [0.1957, 0.1947, 0.1735, 0.1600, 0.0844, 0.0627, 0.0456, 0.0342, 0.0323, 0.0235, 0.0246];
     const U: [f64; 11] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.167, 0.125, 0.1, 0.0833, 0.0714, 0.0625];
-    Y.iter()
-        .zip(U)
-        .map(|(&y, u)| -(x[0] * (x[1] * u + u * u)) / (x[2] * u + x[3] + u * u) + y)
-        .collect()
+    Y.iter().zip(U).map(|(&y, u)| -(x[0] * (x[1] * u + u * u)) / (x[2] * u + x[3] + u * u) + y).collect()
 }
 
 pub fn brown_dennis<D: Scalar>(x: &[D]) -> Vec<D> {
@@ -186,10 +183,8 @@ pub fn osborne2<D: Scalar>(x: &[D]) -> Vec<D> {
                 let d = -centre + t;
                 height * (-d * d * width).exp()
             };
-            let model = x[0] * (-x[4] * t).exp()
-                + peak(x[1], x[5], x[8])
-                + peak(x[2], x[6], x[9])
-                + peak(x[3], x[7], x[10]);
+            let model =
+                x[0] * (-x[4] * t).exp() + peak(x[1], x[5], x[8]) + peak(x[2], x[6], x[9]) + peak(x[3], x[7], x[10]);
             -model + y
         })
         .collect()
@@ -243,7 +238,7 @@ pub fn variable<D: Scalar>(x: &[D]) -> Vec<D> {
 
 pub fn trigonometric<D: Scalar>(x: &[D]) -> Vec<D> {
     let n = x.len() as f64;
-    let cosines = sum(x.iter().map(|x| x.cos()));
+    let cosines = sum(x.iter().map(DualNum::cos));
     x.iter().zip(1..).map(|(x, i)| -cosines + n + (-x.cos() + 1.0) * f64::from(i) - x.sin()).collect()
 }
 
@@ -346,10 +341,7 @@ fn chebyshev_means<D: Scalar>(x: &[D], m: usize) -> Vec<D> {
         }
     }
     let n = x.len() as f64;
-    rows.iter()
-        .zip(1..)
-        .map(|(&row, i)| row / n + if i % 2 == 0 { 1.0 / f64::from(i * i - 1) } else { 0.0 })
-        .collect()
+    rows.iter().zip(1..).map(|(&row, i)| row / n + if i % 2 == 0 { 1.0 / f64::from(i * i - 1) } else { 0.0 }).collect()
 }
 
 pub fn chebyquad<D: Scalar>(x: &[D]) -> Vec<D> {

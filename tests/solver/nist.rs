@@ -170,7 +170,12 @@ fn parse(name: &'static str, text: &str, value: Model<f64>, dual: Model<Dual64>)
         starts: [DVector::from_vec(entry("start1")), DVector::from_vec(entry("start2"))],
         certified: DVector::from_vec(entry("certified")),
         rss: entry("rss")[0],
-        observations: rows.map(|line| { let row = numbers(line); (row[0], row[1..].to_vec()) }).collect(),
+        observations: rows
+            .map(|line| {
+                let row = numbers(line);
+                (row[0], row[1..].to_vec())
+            })
+            .collect(),
         value,
         dual,
     }
@@ -217,6 +222,7 @@ fn digits(solution: &Solution, certified: &DVector<f64>) -> f64 {
     solution.x.iter().zip(certified).map(error).fold(11.0, |a, b| if b.is_nan() { 0.0 } else { f64::min(a, b) })
 }
 
+#[expect(clippy::print_stdout, reason = "the table of results, shown on request")]
 fn solve(dataset: &Dataset, start: usize, settings: &Settings) -> (Solution, f64) {
     let solution = minimise(Fit::new(dataset), dataset.starts[start].clone(), settings);
     let digits = digits(&solution, &dataset.certified);
