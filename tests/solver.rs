@@ -15,5 +15,7 @@ mod edges;
 mod functions;
 #[path = "solver/nist.rs"]
 mod nist;
+#[path = "solver/speed.rs"]
+mod speed;
 #[path = "solver/threads.rs"]
 mod threads;

@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
+pub(crate) use triangle::dot;
 
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {

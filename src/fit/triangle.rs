@@ -170,7 +170,8 @@ pub(super) fn sum_of_squares(vector: &[f64]) -> f64 {
     dot(vector, vector)
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// aᵀb with independent partial sums.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a, a_rest) = a.as_chunks::<{ 2 * LANES }>();
     let (b, b_rest) = b.as_chunks::<{ 2 * LANES }>();
     let mut sums = [0.0; 2 * LANES];
@@ -179,7 +180,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
             sums[l] += a[l] * b[l];
         }
     }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+    let (low, high) = sums.split_at(LANES);
+    (low[0] + high[0]) + (low[1] + high[1]) + ((low[2] + high[2]) + (low[3] + high[3])) + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// `vᵢᵀvₗ` for l < i.
