@@ -64,6 +64,22 @@ impl Triangle {
         self.squares += other.squares;
     }
 
+    /// The problem \[R c\] with further rows diag(d) p = 0, whose cost is left out.
+    pub(crate) fn damped(triangle: &DMatrix<f64>, projected: &DVector<f64>, diagonal: &DVector<f64>) -> Linearisation {
+        let n = diagonal.len();
+        let mut damped = Self::new(n);
+        let mut block = Block::zeros(n, n);
+        for i in 0..n {
+            for j in i..n {
+                damped.rows[i * (n + 1) + j] = triangle[(i, j)];
+            }
+            damped.rows[i * (n + 1) + n] = projected[i];
+            block.values[i * n + i] = diagonal[i];
+        }
+        damped.reduce(&mut block, |columns| columns);
+        damped.into_linearisation()
+    }
+
     /// The linearised problem of all rows absorbed.
     pub fn into_linearisation(self) -> Linearisation {
         let n = self.parameters;
@@ -181,7 +197,10 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     let (low, high) = sums.split_at(LANES);
-    (low[0] + high[0]) + (low[1] + high[1]) + ((low[2] + high[2]) + (low[3] + high[3])) + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+    (low[0] + high[0])
+        + (low[1] + high[1])
+        + ((low[2] + high[2]) + (low[3] + high[3]))
+        + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// `vᵢᵀvₗ` for l < i.

@@ -6,6 +6,7 @@ mod bounded;
 mod box_step;
 mod factor;
 mod levenberg_marquardt;
+mod pivoted;
 mod run;
 mod spectrum;
 mod termination;

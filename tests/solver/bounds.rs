@@ -74,7 +74,7 @@ fn without_active_bounds_as_without_bounds() {
     }
 }
 
-/// `SciPy` 1.x, method "trf", Jacobian by complex step:
+/// `SciPy` 1.17.1, method "trf", Jacobian by complex step:
 ///
 /// ```python
 /// def watson(x):

@@ -3,8 +3,8 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use flexcal::fit::{Block, Triangle};
-use flexcal::solver::Factor;
+use flexcal::fit::{Block, Linearisation, Objective, Triangle};
+use flexcal::solver::{Factor, Settings, minimise};
 use nalgebra::{DMatrix, DVector};
 
 fn wave(i: usize) -> f64 {
@@ -62,15 +62,40 @@ fn speed_of_one_step() {
         println!("n = {n}: Gauss–Newton step {:.1} µs, limited step {:.1} µs", 1e6 * direct, 1e6 * limited);
     }
 }
+
+/// ½‖R x + c‖² with a slope that is a third too steep, so that many equal iterations are needed.
+struct Steep {
+    triangle: DMatrix<f64>,
+    constant: DVector<f64>,
+}
+
+impl Objective for Steep {
+    fn parameters(&self) -> usize {
+        self.constant.len()
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        0.5 * (&self.triangle * x + &self.constant).norm_squared()
+    }
+
+    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
+        let projected = &self.triangle * x + &self.constant;
+        Linearisation { cost: 0.5 * projected.norm_squared(), triangle: 1.5 * &self.triangle, projected }
+    }
+}
+
 #[test]
-#[ignore]
-fn speed_tmp() {
-    for n in [25, 57] {
-        let matrix = DMatrix::from_fn(4 * n, n, |i, j| wave(i * n + j)).qr().r();
-        let qr = best(|| timed(|| matrix.clone().col_piv_qr()));
-        let q = matrix.clone().col_piv_qr();
-        let r = best(|| timed(|| q.r()));
-        let plain = best(|| timed(|| matrix.clone().qr()));
-        println!("n = {n}: colpiv {:.1} µs r {:.1} plain qr {:.1}", 1e6 * qr, 1e6 * r, 1e6*plain);
+#[ignore = "a measurement"]
+fn speed_of_one_iteration() {
+    for n in [6, 25, 57] {
+        let triangle = DMatrix::from_fn(4 * n, n, |i, j| wave(i * n + j)).qr().r();
+        let objective = Steep { triangle, constant: DVector::from_fn(n, |i, _| wave(i)) };
+        let start = DVector::from_element(n, 1.0);
+        let settings = Settings::default();
+        let iterations = minimise(&objective, start.clone(), &settings).iterations as f64;
+        let all = best(|| timed(|| minimise(&objective, start.clone(), &settings)));
+        let evaluations = best(|| timed(|| (objective.cost(black_box(&start)), objective.linearise(&start))));
+        let own = all / iterations - evaluations;
+        println!("n = {n}: {iterations} iterations, {:.1} µs each beyond the evaluations", 1e6 * own);
     }
 }
