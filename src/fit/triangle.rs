@@ -187,6 +187,7 @@ pub(super) fn sum_of_squares(vector: &[f64]) -> f64 {
 }
 
 /// aᵀb with independent partial sums.
+#[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a, a_rest) = a.as_chunks::<{ 2 * LANES }>();
     let (b, b_rest) = b.as_chunks::<{ 2 * LANES }>();
@@ -196,11 +197,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
             sums[l] += a[l] * b[l];
         }
     }
-    let (low, high) = sums.split_at(LANES);
-    (low[0] + high[0])
-        + (low[1] + high[1])
-        + ((low[2] + high[2]) + (low[3] + high[3]))
-        + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// `vᵢᵀvₗ` for l < i.
