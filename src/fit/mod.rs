@@ -4,6 +4,7 @@
 //! it is reduced, block by block, to the triangular factor of its QR decomposition.
 
 mod derivative;
+mod kernel;
 mod objective;
 mod triangle;
 
@@ -12,9 +13,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
+pub(crate) use kernel::dot;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
-pub(crate) use triangle::dot;
 
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {
