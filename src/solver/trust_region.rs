@@ -103,6 +103,9 @@ impl<S: Subproblem> TrustRegion<S> {
             return Some(Termination::ZeroResidual);
         }
         let norms = DVector::from_iterator(x.len(), triangle.column_iter().map(|c| c.norm()));
+        if !norms.iter().all(|norm| norm.is_finite()) {
+            return Some(Termination::DerivativesNotFinite);
+        }
         self.scale = match self.radius {
             None => norms.map(|norm| if norm == 0.0 { 1.0 } else { norm }),
             Some(_) => self.scale.sup(&norms),
