@@ -1,5 +1,7 @@
 //! Positions from an independent finite-segment simulator (`tests/golden`): no formula in common with the closed forms.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 use std::path::Path;
 
 use flexcal::arm::{Angle, Arm, Equilibrated, Setup, Workspace};
@@ -96,8 +98,7 @@ fn first_order_displacements_agree_for_each_part() {
     let rows = rows("first_order.csv");
     // Deflections a million times smaller are in the linear limit; scaled back they keep ten digits.
     let soft = 1e-6;
-    type Keep = (&'static str, bool, bool, bool);
-    let parts: [Keep; 4] = [
+    let parts = [
         ("joints", true, false, false),
         ("link A", false, true, false),
         ("link B", false, false, true),
