@@ -1,5 +1,6 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+mod compare;
 mod diagnostic;
 mod identify;
 mod input;
@@ -22,6 +23,8 @@ struct Cli {
 enum Command {
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
+    /// Put every strategy and solver, and every part of the elasticity left out, side by side.
+    Compare(compare::Arguments),
 }
 
 /// What a command says to the shell.
@@ -45,6 +48,7 @@ pub fn run() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -1,9 +1,11 @@
 //! The model: an arm, its bases and targets, and where each free parameter enters. Immutable; knows no files and no
 //! sensors.
 
+mod ablation;
 mod derivative;
 mod poses;
 
+pub use ablation::Ablation;
 pub use poses::{Pose, PoseResiduals};
 
 use nalgebra::Vector3;
