@@ -9,12 +9,14 @@ use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strateg
 use crate::measurement::{Measurements, Split};
 use crate::model::{Model, PoseResiduals};
 use crate::parameter::Parameter;
-use crate::solver::{AtBound, Termination};
+use crate::solver::{AtBound, Settings, Termination};
 
 /// Sweeps after which a sequential strategy is given up.
-const MAX_SWEEPS: usize = 500;
+const MAX_SWEEPS: usize = 2000;
 /// A sequential strategy has settled when a sweep lowers the cost by less than this part.
-const SWEEP_SETTLED: f64 = 1e-9;
+const SWEEP_SETTLED: f64 = 1e-6;
+/// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage changes are wasted.
+const SWEEP_STEPS: u64 = 2;
 
 /// What all fits of an identification share.
 pub(super) struct Fitting<'a> {
@@ -65,6 +67,7 @@ impl<'a> Fitting<'a> {
             poses: self.placement.poses(self.measurements, rows, self.sigma),
             unknowns,
             solver: self.solver,
+            max_steps: Settings::default().max_iterations,
             progress: self.progress,
         }
     }
@@ -122,14 +125,18 @@ impl<'a> Fitting<'a> {
         let mut cost = f64::INFINITY;
         let once = self.strategy == Strategy::OneSweep;
         for _ in 0..MAX_SWEEPS {
-            let mut termination = end.termination;
             for chosen in self.strategy.stages() {
-                let stage = self.stage(&self.split.identification, self.choose(chosen));
+                let mut stage = self.stage(&self.split.identification, self.choose(chosen));
+                if !once {
+                    stage.max_steps = SWEEP_STEPS;
+                }
                 let StageEnd { x, solution, .. } = stage.run(&end.x)?;
                 end.x = x;
                 end.iterations += solution.iterations;
                 end.evaluations += solution.evaluations();
-                termination = solution.termination;
+                if once {
+                    end.termination = solution.termination;
+                }
                 for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
                     if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
                         end.at_bound[j] = at_bound;
@@ -137,9 +144,12 @@ impl<'a> Fitting<'a> {
                 }
             }
             let next = whole.cost(&end.x);
-            if once || !termination.converged() || cost - next <= SWEEP_SETTLED * next {
-                end.termination = termination;
-                return Ok(end);
+            let settled = cost - next <= SWEEP_SETTLED * next;
+            if settled && !once {
+                end.termination = Termination::Cost;
+            }
+            if settled || once {
+                break;
             }
             cost = next;
         }
