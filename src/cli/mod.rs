@@ -1,6 +1,7 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
 mod compare;
+mod compensate;
 mod diagnostic;
 mod identify;
 mod input;
@@ -25,6 +26,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Put every strategy and solver, and every part of the elasticity left out, side by side.
     Compare(compare::Arguments),
+    /// Find the joint commands that bring the arm, as identified, to desired positions.
+    Compensate(compensate::Arguments),
 }
 
 /// What a command says to the shell.
@@ -49,6 +52,7 @@ pub fn run() -> ExitCode {
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Compensate(arguments) => compensate::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

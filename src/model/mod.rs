@@ -2,6 +2,7 @@
 //! sensors.
 
 mod ablation;
+mod command;
 mod derivative;
 mod poses;
 
@@ -21,14 +22,10 @@ use crate::spatial::Frame;
 #[derive(Debug, Clone)]
 pub struct Model {
     nominal: Arm<f64>,
-    base: BasePose,
-    target: Vector3<f64>,
+    bases: Vec<BasePose>,
+    targets: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
-    /// Number of bases.
-    pub bases: usize,
-    /// Number of targets.
-    pub targets: usize,
 }
 
 impl Model {
@@ -42,11 +39,9 @@ impl Model {
         }
         Ok(Self {
             nominal: Arm::nominal(problem),
-            base: problem.base.clone(),
-            target: problem.tool.target,
+            bases: vec![problem.base.clone(); bases.len()],
+            targets: vec![problem.tool.target; targets.len()],
             parameters: resolve(problem, bases, targets)?,
-            bases: bases.len(),
-            targets: targets.len(),
         })
     }
 
@@ -88,7 +83,7 @@ impl Model {
 
     /// Base poses in the measuring frame: translation [m] and rotation vector [rad].
     pub fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
-        let mut bases = vec![self.base.clone(); self.bases];
+        let mut bases = self.bases.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let Slot::Base { base, axis } = parameter.slot {
                 if axis < 3 {
@@ -108,7 +103,7 @@ impl Model {
 
     /// Targets in the last frame [m].
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
-        let mut targets = vec![self.target; self.targets];
+        let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let Slot::Target { target, axis } = parameter.slot {
                 targets[target][axis] += x;
