@@ -64,9 +64,8 @@ impl Identifiability {
     /// Ratio of the largest singular value to the smallest that is not zero.
     pub fn condition_number(&self) -> f64 {
         match self.singular_values[..self.rank] {
-            [] => 1.0,
             [largest, .., smallest] => largest / smallest,
-            [_] => 1.0,
+            [] | [_] => 1.0,
         }
     }
 

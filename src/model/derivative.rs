@@ -48,7 +48,7 @@ enum Inner {
     /// Link by link; `frames` are those before each link of the pose at hand.
     Rigid { links: Vec<Link>, frames: Vec<Frame<f64>> },
     /// In chunks through the statics.
-    Elastic { response: Box<Response>, chunks: Vec<Chunk>, real: Workspace<f64>, ws: Workspace<ChunkDual> },
+    Elastic { response: Box<Response>, chunks: Vec<Chunk>, real: Workspace<f64>, ws: Box<Workspace<ChunkDual>> },
 }
 
 /// A link of a rigid arm with its five parameters seeded, and their columns.
@@ -95,7 +95,7 @@ impl Linearised {
                 columns: part.iter().map(|&(column, _)| column).collect(),
             });
             let response = Box::new(Response::new(&arm));
-            Inner::Elastic { response, chunks: chunks.collect(), real: Workspace::default(), ws: Workspace::default() }
+            Inner::Elastic { response, chunks: chunks.collect(), real: Workspace::default(), ws: Box::default() }
         } else {
             Inner::Rigid { links: links(model, &arm, &own), frames: Vec::new() }
         };

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use num_dual::DualSVec64;
 
-    /// Rotates e_k by w with derivatives with respect to w.
+    /// Rotates `e_k` by w with derivatives with respect to w.
     fn derivative(w: [f64; 3], k: usize) -> [[f64; 4]; 3] {
         let w = Vector3::from_fn(|i, _| {
             DualSVec64::<3>::new(w[i], num_dual::Derivative::derivative_generic(nalgebra::Const::<3>, nalgebra::U1, i))

@@ -16,7 +16,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     let targets = model.target_positions(x.as_slice());
     let nominal = model.base_poses(DVector::zeros(x.len()).as_slice());
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
-    for base in 0..model.bases {
+    for (base, nominal) in nominal.iter().enumerate() {
         let columns: Vec<(usize, usize)> = model
             .parameters
             .iter()
@@ -37,8 +37,8 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
             continue;
         }
         let (rotation, translation) = rigid_motion(&points);
-        let rotation = rotation_vector(&rotation) - nominal[base].rotation;
-        let translation = translation - nominal[base].translation;
+        let rotation = rotation_vector(&rotation) - nominal.rotation;
+        let translation = translation - nominal.translation;
         for (axis, k) in columns {
             x[k] = if axis < 3 { translation[axis] } else { rotation[axis - 3] };
         }
