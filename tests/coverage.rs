@@ -154,7 +154,7 @@ fn ur10() -> Trial {
 
 #[test]
 fn errors_cover_the_truth_with_priors() {
-    lunar_sampler().check("lunar sampler", 120);
+    lunar_sampler().check("lunar sampler", 100);
 }
 
 #[test]
