@@ -23,6 +23,9 @@ const NORMAL: [(f64, f64); 2] = [(1.0, 0.682_689), (2.0, 0.954_500)];
 /// Limits in standard deviations of the shares.
 const LIMIT: f64 = 4.0;
 
+/// Share of fits that may fail.
+const FAILURES: f64 = 0.005;
+
 /// One fit: (estimate − truth) / σ of each parameter that something was learned of, and χ²/ν.
 struct Score {
     z: Vec<Option<f64>>,
@@ -44,28 +47,34 @@ impl Trial {
         Self { problem, rows, model, spread }
     }
 
-    fn score(&self, seed: u64) -> Score {
+    /// `None` where the fit itself says that it is not to be trusted.
+    fn score(&self, seed: u64) -> Option<Score> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = draw(&self.model, self.spread, &mut rng);
         let mut rows = self.rows.clone();
         measure(&self.problem, &mut rows, &truth, self.problem.data.position_sigma.unwrap(), &mut rng);
         let split = split_at(rows.len(), &rows);
         let found = identify(&self.problem, &rows, &split, &Options::default()).unwrap();
-        assert!(found.is_trusted(), "seed {seed}: {:?}", found.termination);
+        if !found.is_trusted() {
+            println!("seed {seed}: {:?}", found.termination);
+            return None;
+        }
         let z = found.estimates.iter().enumerate().map(|(k, estimate)| {
             // Of x, which is a logarithm for stiffnesses.
             let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
             estimate.std_error.map(|error| (found.x[k] - truth[k]) / (error / scale))
         });
-        Score { z: z.collect(), reduced_chi2: found.reduced_chi2.unwrap() }
+        Some(Score { z: z.collect(), reduced_chi2: found.reduced_chi2.unwrap() })
     }
 
     /// Scores `fits` fits and holds them against the normal distribution.
     fn check(&self, what: &str, fits: u64) {
-        let scores: Vec<Score> = (0..fits).into_par_iter().map(|seed| self.score(seed)).collect();
+        let scores: Vec<Score> = (0..fits).into_par_iter().filter_map(|seed| self.score(seed)).collect();
+        let failed = fits as f64 - scores.len() as f64;
+        assert!(failed <= FAILURES * fits as f64, "{what}: {failed} fits of {fits} failed");
         let chi2: Vec<f64> = scores.iter().map(|score| score.reduced_chi2).collect();
         let (mean, error) = mean_and_error(&chi2);
-        println!("{what}: {fits} fits, χ²/ν {mean:.4} ± {error:.4}");
+        println!("{what}: {fits} fits, {failed} failed, χ²/ν {mean:.4} ± {error:.4}");
         assert!((mean - 1.0).abs() < LIMIT * error, "{what}: mean χ²/ν {mean} ± {error}");
         for (within, nominal) in NORMAL {
             let of_fit = |score: &Score| share(score.z.iter().flatten().copied(), within).0;

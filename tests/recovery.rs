@@ -109,7 +109,7 @@ fn stiffnesses_come_back_from_exact_positions() {
     measure(&problem, &mut rows, &truth, 0.0, &mut rng());
     let found = fit(&problem, &rows, &split_at(28, &rows));
     let stiffnesses = found.estimates.iter().filter(|estimate| estimate.unit.is_relative());
-    assert_eq!(stiffnesses.filter(|estimate| estimate.identified == 1.0).count(), 9);
+    assert_eq!(stiffnesses.filter(|estimate| estimate.identified > 0.999_999).count(), 9);
     let worst = (&found.x - &truth).amax();
     println!("stiffnesses, worst {worst:.1e} relative; held out {:.1e} m", found.fitted.held_out.max.norm);
     assert!(worst < 1e-6, "{:e}", found.x - truth);
@@ -131,7 +131,8 @@ fn geometry_and_stiffness_come_back_together() {
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
     for (k, estimate) in found.estimates.iter().enumerate().filter(|(_, estimate)| estimate.unit.is_relative()) {
         let error = (found.x[k] - truth[k]).abs();
-        println!("{} off by {error:.1e}, identified {:.6}", estimate.name, estimate.identified);
+        println!("{} off by {error:.1e}", estimate.name);
+        assert!(estimate.identified > 0.999_999 && error < 1e-6, "{}: off by {error:e}", estimate.name);
     }
 }
 
@@ -245,11 +246,27 @@ fn a_target_seen_in_held_out_rows_alone_does_not_touch_the_arm() {
     }
 }
 
+/// The lunar sampler's example poses, measured on an arm off nominal by these parts of the priors' sizes.
+fn slightly_off(problem: &Problem, geometry: f64, stiffness: f64) -> (Measurements, Split) {
+    let mut rows = measured(problem, &["tests/cases/a-none.csv"]);
+    let model = model_of(problem, &rows);
+    let mut truth = draw(&model, |_| 0.0, &mut rng());
+    for (x, parameter) in truth.iter_mut().zip(&model.parameters) {
+        *x *= if parameter.slot.is_elastic() { stiffness } else { geometry };
+    }
+    measure(problem, &mut rows, &truth, 5e-5, &mut rng());
+    let split = Split::new(problem, &rows).unwrap();
+    (rows, split)
+}
+
 #[test]
 fn stage_by_stage_settles_where_everything_at_once_does() {
-    let problem = golden_problem();
-    let rows = measured(&problem, &["tests/cases/a-none.csv"]);
-    let split = Split::new(&problem, &rows).unwrap();
+    // Without joint zeros, which flexible joints resemble: with them a sweep gains too little.
+    let rules = "\"joint*.a\" = { sigma_mm = 30.0 }\n\"joint*.alpha\" = { sigma_deg = 1.0 }\n\
+                 \"joint*.stiffness\" = { sigma_relative = 0.5 }\n\"A.*\" = { sigma_relative = 0.5 }\n\
+                 \"B.*\" = { sigma_relative = 0.5 }\n\"tool.*\" = { sigma_mm = 5.0 }";
+    let problem = with_parameters("tests/golden/problem.toml", rules);
+    let (rows, split) = slightly_off(&problem, 0.1, 0.1);
     let joint = fit(&problem, &rows, &split);
     let sequential = fit_by(Strategy::Sequential, &problem, &rows, &split);
     let cost = |found: &Identification| cost(&problem, &rows, &split, &found.x);
@@ -271,10 +288,10 @@ fn stage_by_stage_settles_where_everything_at_once_does() {
 #[test]
 fn strategies_leave_the_others_at_nominal() {
     let problem = golden_problem();
-    let rows = measured(&problem, &["tests/cases/a-none.csv"]);
-    let split = Split::new(&problem, &rows).unwrap();
-    let parameters = model_of(&problem, &rows).parameters;
-    for (strategy, elastic) in [(Strategy::GeometryOnly, false), (Strategy::StiffnessOnly, true)] {
+    let strategies = [(Strategy::GeometryOnly, false, 0.1, 1e-3), (Strategy::StiffnessOnly, true, 1e-3, 0.1)];
+    for (strategy, elastic, geometry, stiffness) in strategies {
+        let (rows, split) = slightly_off(&problem, geometry, stiffness);
+        let parameters = model_of(&problem, &rows).parameters;
         let found = fit_by(strategy, &problem, &rows, &split);
         assert!(found.fitted.identification.rms.norm < found.registered.identification.rms.norm);
         for (k, (parameter, estimate)) in parameters.iter().zip(&found.estimates).enumerate() {

@@ -92,7 +92,9 @@ impl<'a> Fitting<'a> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
         let mut known = vec![false; self.model.bases];
-        poses.iter().for_each(|pose| known[pose.base] = true);
+        for pose in &poses {
+            known[pose.base] = true;
+        }
         let late = self.placement.poses(self.measurements, &self.late.rows, self.sigma);
         poses.extend(late.into_iter().filter(|pose| !known[pose.base]));
         register(self.model, &poses, &mut x);
