@@ -7,6 +7,7 @@ pub mod measurement;
 pub mod model;
 pub mod parameter;
 pub mod problem;
+pub mod report;
 pub mod scalar;
 pub mod solver;
 pub mod spatial;

@@ -9,9 +9,6 @@ use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::problem::{Equilibrium, Problem};
 use nalgebra::Vector3;
 
-/// Which parts bend.
-type Keep = (&'static str, bool, bool, bool);
-
 struct Row {
     q: Vec<f64>,
     payload: f64,
@@ -80,7 +77,7 @@ fn first_order_displacements_agree_for_each_part() {
     let rows = rows("first_order.csv");
     // Deflections a million times smaller are in the linear limit; scaled back they keep ten digits.
     let soft = 1e-6;
-    let parts: [Keep; 4] = [
+    let parts = [
         ("joints", true, false, false),
         ("link A", false, true, false),
         ("link B", false, false, true),

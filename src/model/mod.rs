@@ -1,15 +1,17 @@
 //! The model: an arm, its bases and targets, and where each free parameter enters. Immutable; knows no files and no
 //! sensors.
 
+mod ablation;
 mod derivative;
 mod poses;
 
+pub use ablation::Ablation;
 pub use poses::{Pose, PoseResiduals};
 
 use nalgebra::Vector3;
 
 use crate::arm::{Angle, Arm};
-use crate::error::InputError;
+use crate::error::{InputError, InputErrorKind};
 use crate::parameter::{BeamField, JointField, Parameter, Slot, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
@@ -33,8 +35,11 @@ impl Model {
     /// The declared arm with one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` does not fit the parameters there are.
+    /// A rule of `[parameters]` does not fit the parameters there are, or an effect is declared.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
+        if let Some(declared) = problem.effects.first() {
+            return Err(declared.location.clone().error(InputErrorKind::EffectNotModelled));
+        }
         Ok(Self {
             nominal: Arm::nominal(problem),
             base: problem.base.clone(),

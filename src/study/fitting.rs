@@ -37,6 +37,7 @@ pub(super) struct FitEnd {
     pub x: DVector<f64>,
     pub termination: Termination,
     pub iterations: u64,
+    pub evaluations: u64,
     /// For each unknown of the fit.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
@@ -45,8 +46,9 @@ pub(super) struct FitEnd {
 impl From<StageEnd> for FitEnd {
     fn from(end: StageEnd) -> Self {
         let StageEnd { x, solution, gauge } = end;
+        let evaluations = solution.evaluations();
         let (termination, iterations) = (solution.termination, solution.iterations);
-        Self { x, termination, iterations, at_bound: solution.at_bound, gauge }
+        Self { x, termination, iterations, evaluations, at_bound: solution.at_bound, gauge }
     }
 }
 
@@ -119,10 +121,12 @@ impl<'a> Fitting<'a> {
             x: start.clone(),
             termination: Termination::IterationLimit,
             iterations: 0,
+            evaluations: 0,
             at_bound: vec![None; whole.unknowns.len()],
             gauge: whole.gauge(start),
         };
         let mut cost = f64::INFINITY;
+        let once = self.strategy == Strategy::OneSweep;
         for _ in 0..MAX_SWEEPS {
             let mut termination = end.termination;
             for chosen in self.strategy.stages() {
@@ -130,6 +134,7 @@ impl<'a> Fitting<'a> {
                 let StageEnd { x, solution, .. } = stage.run(&end.x)?;
                 end.x = x;
                 end.iterations += solution.iterations;
+                end.evaluations += solution.evaluations();
                 termination = solution.termination;
                 for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
                     if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
@@ -138,7 +143,7 @@ impl<'a> Fitting<'a> {
                 }
             }
             let next = whole.cost(&end.x);
-            if !termination.converged() || cost - next <= SWEEP_SETTLED * next {
+            if once || !termination.converged() || cost - next <= SWEEP_SETTLED * next {
                 end.termination = termination;
                 return Ok(end);
             }

@@ -1,5 +1,6 @@
 //! What to fit, in which order, and what came of it.
 
+mod compare;
 mod errors;
 mod fitting;
 mod identification;
@@ -9,6 +10,7 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use compare::{Comparison, compare};
 pub use errors::{AxisValues, ErrorSummary};
 pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
 pub use placement::Placement;

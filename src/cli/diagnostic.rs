@@ -1,0 +1,66 @@
+//! Errors and warnings on the terminal, with the line that is meant.
+
+use std::error::Error;
+use std::io::Write as _;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use flexcal::error::{InputError, Location, Warning};
+use flexcal::study::IdentifyError;
+
+/// Wide enough that messages keep to one line.
+const WIDTH: usize = 1000;
+
+/// Prints an error to standard error.
+pub fn print(error: &(dyn Error + 'static)) {
+    let input = error.downcast_ref::<InputError>().or(match error.downcast_ref::<IdentifyError>() {
+        Some(IdentifyError::Input(input)) => Some(input),
+        _ => None,
+    });
+    match input {
+        Some(input) => show(Level::ERROR, &input.to_string(), Some(&input.location)),
+        None => show(Level::ERROR, &with_causes(error), None),
+    }
+}
+
+/// Prints warnings to standard error.
+pub fn print_warnings(warnings: &[Warning]) {
+    for warning in warnings {
+        show(Level::WARNING, &warning.to_string(), None);
+    }
+}
+
+/// Prints one line of warning to standard error.
+pub fn warn(message: &str) {
+    show(Level::WARNING, message, None);
+}
+
+fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
+    let title = level.primary_title(message);
+    let excerpt = location.and_then(|location| Some((location, location.excerpt.as_ref()?)));
+    let group = match excerpt {
+        Some((location, excerpt)) => title.element(
+            Snippet::source(&*excerpt.text)
+                .line_start(excerpt.first_line)
+                .path(location.file.display().to_string())
+                .annotation(AnnotationKind::Primary.span(excerpt.span.clone())),
+        ),
+        None => Group::with_title(title),
+    };
+    let text = Renderer::styled().term_width(WIDTH).render(&[group]);
+    // A closed standard error leaves nobody to tell.
+    let _ = writeln!(anstream::stderr(), "{text}");
+}
+
+fn with_causes(error: &(dyn Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(next) = cause {
+        let next_text = next.to_string();
+        if !text.contains(&next_text) {
+            text.push_str(": ");
+            text.push_str(&next_text);
+        }
+        cause = next.source();
+    }
+    text
+}

@@ -1,0 +1,103 @@
+//! `flexcal identify`.
+
+use std::error::Error;
+
+use clap::{Args, ValueEnum};
+use flexcal::report;
+use flexcal::study::{self, Options, SolverChoice, Strategy};
+
+use super::input::{Common, Input};
+use super::progress::Line;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal identify`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal identify problems/lunar-sampler
+  flexcal identify problems/ur10-ipa --data session_A.csv session_B.csv session_C.csv
+  flexcal identify my-arm/problem.toml --strategy sequential --json")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// Which parameters are fitted together
+    #[arg(long, value_enum, default_value_t = StrategyArgument::Joint)]
+    strategy: StrategyArgument,
+    /// By which solver; auto keeps the bounds of [parameters] where there are any
+    #[arg(long, value_enum, default_value_t = SolverArgument::Auto)]
+    solver: SolverArgument,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StrategyArgument {
+    /// Everything at once
+    Joint,
+    /// Stiffness, then geometry, repeated until it settles
+    Sequential,
+    /// Geometry; stiffnesses stay nominal
+    GeometryOnly,
+    /// Stiffnesses; geometry stays nominal
+    StiffnessOnly,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SolverArgument {
+    /// Bounded where a free parameter has bounds, else levenberg-marquardt
+    Auto,
+    /// Levenberg-Marquardt without bounds
+    LevenbergMarquardt,
+    /// Levenberg-Marquardt within the bounds of [parameters]
+    Bounded,
+}
+
+impl From<StrategyArgument> for Strategy {
+    fn from(argument: StrategyArgument) -> Self {
+        match argument {
+            StrategyArgument::Joint => Self::Joint,
+            StrategyArgument::Sequential => Self::Sequential,
+            StrategyArgument::GeometryOnly => Self::GeometryOnly,
+            StrategyArgument::StiffnessOnly => Self::StiffnessOnly,
+        }
+    }
+}
+
+impl From<SolverArgument> for SolverChoice {
+    fn from(argument: SolverArgument) -> Self {
+        match argument {
+            SolverArgument::Auto => Self::Auto,
+            SolverArgument::LevenbergMarquardt => Self::LevenbergMarquardt,
+            SolverArgument::Bounded => Self::Bounded,
+        }
+    }
+}
+
+/// Identifies, writes `estimate.json`, and prints the table.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let Input { problem, measurements, split } = common.read()?;
+    let line = common.talks().then(Line::new);
+    let options = Options {
+        strategy: arguments.strategy.into(),
+        solver: arguments.solver.into(),
+        progress: line.as_ref().map(Line::sink),
+    };
+    let result = study::identify(&problem, &measurements, &split, &options);
+    if let Some(line) = line {
+        line.clear();
+    }
+    let identification = result?;
+    let json = report::estimate_json(&problem, &identification);
+    let path = output::write(&common.folder(&problem), "estimate.json", &json)?;
+    if common.json {
+        output::print(&json)?;
+    } else if common.talks() {
+        output::print(&report::estimate_text(&problem, &identification))?;
+        output::print(&format!("\nWritten to {}\n", path.display()))?;
+    }
+    if identification.is_trusted() {
+        return Ok(Outcome::Done);
+    }
+    if !common.quiet {
+        diagnostic::warn(&report::why_not_trusted(&identification));
+    }
+    Ok(Outcome::NotTrusted)
+}

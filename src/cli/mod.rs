@@ -1,0 +1,61 @@
+//! Arguments, progress and printing; nothing else in flexcal prints.
+
+mod compare;
+mod diagnostic;
+mod identify;
+mod input;
+mod output;
+mod progress;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Identify the geometric and elastic parameters of robot arms from measured end-point positions.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fit the free parameters of a problem and report them with their errors.
+    Identify(identify::Arguments),
+    /// Put every strategy and solver, and every part of the elasticity left out, side by side.
+    Compare(compare::Arguments),
+}
+
+/// What a command says to the shell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// Exit status 0.
+    Done,
+    /// Exit status 1: the fit is not to be trusted.
+    NotTrusted,
+}
+
+/// Runs the command line: exit status 0 done, 1 the fit is not to be trusted, 2 bad input.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Nothing is left to tell when even that cannot be printed.
+            let _ = error.print();
+            return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
+        }
+    };
+    let outcome = match cli.command {
+        Command::Identify(arguments) => identify::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+    };
+    match outcome {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::NotTrusted) => ExitCode::from(1),
+        Err(error) => {
+            diagnostic::print(error.as_ref());
+            ExitCode::from(2)
+        }
+    }
+}

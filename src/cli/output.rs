@@ -1,0 +1,34 @@
+//! Results on disk and on standard output.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+/// A result that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {source}", path.display())]
+pub struct WriteError {
+    path: PathBuf,
+    source: io::Error,
+}
+
+/// Writes `text` to `folder`/`name`, whole or not at all: to a temporary file beside it, then renamed.
+pub fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, WriteError> {
+    let path = folder.join(name);
+    let failed = |source| WriteError { path: path.clone(), source };
+    fs::create_dir_all(folder).map_err(failed)?;
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    file.write_all(text.as_bytes()).and_then(|()| file.flush()).map_err(failed)?;
+    file.persist(&path).map_err(|error| failed(error.error))?;
+    Ok(path)
+}
+
+/// Prints to standard output; a closed pipe ends the printing quietly.
+pub fn print(text: &str) -> Result<(), WriteError> {
+    match anstream::stdout().write_all(text.as_bytes()) {
+        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
+            Err(WriteError { path: PathBuf::from("standard output"), source })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,177 @@
+//! `estimate.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::problem::Problem;
+use crate::solver::AtBound;
+use crate::study::{AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise};
+
+/// An error summary in millimetres.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    n: usize,
+    mean_mm: Axes,
+    max_mm: Axes,
+    rms_mm: Axes,
+}
+
+#[derive(Debug, Serialize)]
+struct Axes {
+    x: f64,
+    y: f64,
+    z: f64,
+    norm: f64,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Both {
+    identification: Summary,
+    held_out: Summary,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    problem: &'a str,
+    strategy: &'a str,
+    solver: &'a str,
+    termination: &'a str,
+    trusted: bool,
+    iterations: u64,
+    seconds: f64,
+    registered: Both,
+    #[serde(flatten)]
+    fitted: Both,
+    reduced_chi2: Option<f64>,
+    /// 1 σ per coordinate where the problem declares none [mm].
+    estimated_sigma_mm: Option<f64>,
+    /// By how much the assumed variance was raised for the standard errors.
+    noise_factor: f64,
+    rank: usize,
+    condition_number: f64,
+    observability: Observability,
+    parameters: Vec<ParameterEntry<'a>>,
+    unidentified: Vec<Unidentified<'a>>,
+    correlations: Vec<Correlation<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
+struct Observability {
+    o1: f64,
+    o2: f64,
+    o3: f64,
+    o4: f64,
+    o5: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ParameterEntry<'a> {
+    name: &'a str,
+    unit: &'a str,
+    nominal: f64,
+    estimate: f64,
+    std_error: Option<f64>,
+    at_bound: Option<&'a str>,
+    identified: f64,
+    fitted: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Unidentified<'a> {
+    combination: BTreeMap<&'a str, f64>,
+    singular_value: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Correlation<'a> {
+    parameters: [&'a str; 2],
+    correlation: f64,
+}
+
+impl From<&AxisValues> for Axes {
+    fn from(values: &AxisValues) -> Self {
+        let AxisValues { x, y, z, norm } = values;
+        Self { x: x * 1e3, y: y * 1e3, z: z * 1e3, norm: norm * 1e3 }
+    }
+}
+
+impl From<&ErrorSummary> for Summary {
+    fn from(summary: &ErrorSummary) -> Self {
+        let ErrorSummary { n, mean, max, rms } = summary;
+        Self { n: *n, mean_mm: mean.into(), max_mm: max.into(), rms_mm: rms.into() }
+    }
+}
+
+impl From<&Errors> for Both {
+    fn from(errors: &Errors) -> Self {
+        Self { identification: (&errors.identification).into(), held_out: (&errors.held_out).into() }
+    }
+}
+
+impl<'a> From<&'a Estimate> for ParameterEntry<'a> {
+    fn from(estimate: &'a Estimate) -> Self {
+        Self {
+            name: &estimate.name,
+            unit: estimate.unit.symbol(),
+            nominal: estimate.nominal,
+            estimate: estimate.estimate,
+            std_error: estimate.std_error,
+            at_bound: estimate.at_bound.map(|bound| match bound {
+                AtBound::Lower => "lower",
+                AtBound::Upper => "upper",
+            }),
+            identified: estimate.identified,
+            fitted: estimate.fitted,
+        }
+    }
+}
+
+/// The result of an identification as JSON text, ending in a line break; SI units except where a key says otherwise.
+pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
+    let identifiability = &result.identifiability;
+    let [o1, o2, o3, o4, o5] = identifiability.observability(result.coordinates);
+    let document = Document {
+        problem: &problem.name,
+        strategy: result.strategy.as_str(),
+        solver: result.solver.as_str(),
+        termination: result.termination.as_str(),
+        trusted: result.is_trusted(),
+        iterations: result.iterations,
+        seconds: result.seconds,
+        registered: (&result.registered).into(),
+        fitted: (&result.fitted).into(),
+        reduced_chi2: result.reduced_chi2,
+        estimated_sigma_mm: match result.noise {
+            Noise::Declared => None,
+            Noise::Estimated(sigma) => Some(sigma * 1e3),
+        },
+        noise_factor: result.noise_factor,
+        rank: identifiability.rank,
+        condition_number: identifiability.condition_number(),
+        observability: Observability { o1, o2, o3, o4, o5 },
+        parameters: result.estimates.iter().map(ParameterEntry::from).collect(),
+        unidentified: identifiability
+            .blind
+            .iter()
+            .map(|blind| Unidentified {
+                combination: blind.weights.iter().map(|&(k, w)| (result.unknowns[k].as_str(), w)).collect(),
+                singular_value: blind.singular_value,
+            })
+            .collect(),
+        correlations: result
+            .correlations
+            .iter()
+            .map(|(a, b, correlation)| Correlation { parameters: [a, b], correlation: *correlation })
+            .collect(),
+    };
+    to_text(&document)
+}
+
+/// JSON text that ends in a line break; text keys and numbers always serialise, numbers that are not finite as null.
+pub(super) fn to_text(document: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(document).unwrap_or_default();
+    text.push('\n');
+    text
+}

@@ -1,0 +1,108 @@
+//! The table of parameters, and what the data cannot tell.
+
+use std::fmt::Write as _;
+
+use super::quantity::{Display, decimals, number, table};
+use crate::fit::BlindCombination;
+use crate::solver::AtBound;
+use crate::study::{Estimate, Identification};
+
+/// Decimals of a value that has no error.
+const PLAIN: usize = 4;
+/// Decimals of any value at most.
+const MOST: usize = 6;
+/// Weights in a blind combination that are worth naming.
+const NAMED: f64 = 0.02;
+/// Correlations that fit on a screen.
+const SHOWN_CORRELATIONS: usize = 12;
+
+/// Nominal, estimate, change and standard error of every free parameter.
+pub(super) fn parameter_table(result: &Identification) -> String {
+    let rows = result
+        .estimates
+        .iter()
+        .map(|estimate| {
+            let unit = Display::of(estimate.unit, estimate.nominal);
+            let error = estimate.std_error.map(|error| error * unit.factor);
+            let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
+            let show = |value: f64| number(value * unit.factor, digits);
+            vec![
+                estimate.name.clone(),
+                number(estimate.nominal * unit.factor, digits.min(PLAIN)),
+                show(estimate.estimate),
+                show(estimate.estimate - estimate.nominal),
+                error.map_or_else(|| "–".to_owned(), |error| number(error, digits)),
+                unit.symbol,
+                verdict(estimate),
+            ]
+        })
+        .collect();
+    table(&["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"], rows, &[0, 5, 6])
+}
+
+/// How well a parameter is identified, in a word and a share.
+fn verdict(estimate: &Estimate) -> String {
+    let share = format!("{:3.0} %", estimate.identified * 100.0);
+    match (estimate.at_bound, estimate.fitted) {
+        (Some(AtBound::Lower), _) => "at its lower bound".to_owned(),
+        (Some(AtBound::Upper), _) => "at its upper bound".to_owned(),
+        (None, false) => "not fitted".to_owned(),
+        (None, true) => match estimate.identified {
+            part if part > 0.9 => format!("{share}  well"),
+            part if part > 0.1 => format!("{share}  in part"),
+            part if part > 1e-6 => format!("{share}  hardly"),
+            _ => format!("{share}  not at all"),
+        },
+    }
+}
+
+/// The combinations that no measurement sees, in words.
+pub(super) fn blind_text(result: &Identification) -> String {
+    let blind = &result.identifiability.blind;
+    if blind.is_empty() {
+        return "The data see every combination of the parameters.\n".to_owned();
+    }
+    let mut text = format!(
+        "{} of {} combinations cannot be seen in these data (their parameters can change together in these\n\
+         proportions, each scaled by its effect, and no predicted position moves):\n",
+        blind.len(),
+        result.unknowns.len()
+    );
+    for combination in blind {
+        let _ = writeln!(text, "  {}", words(combination, result));
+    }
+    text
+}
+
+fn words(combination: &BlindCombination, result: &Identification) -> String {
+    let name = |k: usize| result.unknowns[k].as_str();
+    if let [(k, _)] = combination.weights[..] {
+        return format!("{} alone", name(k));
+    }
+    let mut named: Vec<&(usize, f64)> = combination.weights.iter().filter(|(_, weight)| weight.abs() > NAMED).collect();
+    // Equal weights differ by rounding from machine to machine: sort by what is shown.
+    let shown = |weight: f64| (weight.abs() * 100.0).round();
+    named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
+    let terms: Vec<String> = named
+        .iter()
+        .map(|(k, weight)| format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k)))
+        .collect();
+    terms.join(" ")
+}
+
+/// Pairs of parameters that go together.
+pub(super) fn correlation_text(result: &Identification) -> String {
+    let pairs = &result.correlations;
+    if pairs.is_empty() {
+        return "No two parameters are correlated by more than 0.9.\n".to_owned();
+    }
+    let mut text = "Correlated by more than 0.9 (their sum or difference is known better than each):\n".to_owned();
+    for (a, b, correlation) in pairs.iter().take(SHOWN_CORRELATIONS) {
+        let sign = if *correlation < 0.0 { '−' } else { '+' };
+        let _ = writeln!(text, "  {a} and {b}: {sign}{:.3}", correlation.abs());
+    }
+    if pairs.len() > SHOWN_CORRELATIONS {
+        let _ = writeln!(text, "  and {} more in estimate.json", pairs.len() - SHOWN_CORRELATIONS);
+    }
+    text
+}

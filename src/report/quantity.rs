@@ -1,0 +1,80 @@
+//! Numbers with units, as people read them.
+
+use crate::parameter::Unit;
+
+/// A unit for display and the factor from SI to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Display {
+    pub factor: f64,
+    pub symbol: String,
+}
+
+impl Display {
+    /// Degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` [SI].
+    pub fn of(unit: Unit, magnitude: f64) -> Self {
+        match unit {
+            Unit::Angle => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°".to_owned() },
+            Unit::Length => Self { factor: 1e3, symbol: "mm".to_owned() },
+            Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
+                let (factor, prefix) = match magnitude.abs() {
+                    m if m >= 1e9 => (1e-9, "G"),
+                    m if m >= 1e6 => (1e-6, "M"),
+                    m if m >= 1e3 => (1e-3, "k"),
+                    _ => (1.0, ""),
+                };
+                Self { factor, symbol: format!("{prefix}{}", unit.symbol()) }
+            }
+        }
+    }
+}
+
+/// Decimals that show `error` with two significant digits, at most `most`.
+pub(super) fn decimals(error: f64, most: usize) -> usize {
+    if error <= 0.0 || !error.is_finite() {
+        return most;
+    }
+    let wanted = 1.0 - error.log10().floor();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=most")]
+    let wanted = wanted.clamp(0.0, most as f64) as usize;
+    wanted
+}
+
+/// `value` with `decimals`, never as "-0".
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
+    }
+}
+
+/// A rows-and-columns text, numbers to the right, without lines around it.
+pub(super) fn table(header: &[&str], rows: Vec<Vec<String>>, left: &[usize]) -> String {
+    use comfy_table::{CellAlignment, Table, presets::NOTHING};
+    let mut table = Table::new();
+    table.load_style(NOTHING).set_header(header.to_vec()).add_rows(rows);
+    for (index, column) in table.column_iter_mut().enumerate() {
+        column.set_padding((if index == 0 { 2 } else { 1 }, 1));
+        column.set_cell_alignment(if left.contains(&index) { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    let mut text: String = table.lines().flat_map(|line| [line.trim_end().to_owned(), "\n".to_owned()]).collect();
+    if !text.ends_with('\n') {
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_show_two_digits() {
+        assert_eq!(decimals(0.0123, 6), 3);
+        assert_eq!(decimals(1.5, 6), 1);
+        assert_eq!(decimals(314.0, 6), 0);
+        assert_eq!(decimals(1e-12, 6), 6);
+        assert_eq!(number(-0.0001, 3), "0.000");
+        assert_eq!(number(-0.5, 1), "-0.5");
+    }
+}

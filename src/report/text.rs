@@ -1,0 +1,100 @@
+//! What `identify` prints.
+
+use super::parameters::{blind_text, correlation_text, parameter_table};
+use super::quantity::{number, table};
+use crate::problem::Problem;
+use crate::study::{ErrorSummary, Identification, Noise};
+
+/// A result as a table with its story, ending in a line break.
+pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
+    [
+        headline(problem, result),
+        errors(result),
+        noise(problem, result),
+        parameter_table(result),
+        conditioning(result),
+        blind_text(result),
+        correlation_text(result),
+    ]
+    .join("\n")
+}
+
+/// Why a fit is not to be trusted, in one line.
+pub fn why_not_trusted(result: &Identification) -> String {
+    if result.is_determined() {
+        format!("the fit is not to be trusted: {}", result.termination)
+    } else {
+        format!(
+            "the fit is not to be trusted: {} measured coordinates for {} parameters without a prior",
+            result.coordinates, result.without_prior
+        )
+    }
+}
+
+fn headline(problem: &Problem, result: &Identification) -> String {
+    let fitted = &result.fitted;
+    format!(
+        "{}\n{} parameters from {} poses, {} poses held out; strategy {}, solver {}\n{} after {} steps, {:.3} s\n",
+        problem.title,
+        result.unknowns.len(),
+        fitted.identification.n,
+        fitted.held_out.n,
+        result.strategy.as_str(),
+        result.solver.as_str(),
+        result.termination,
+        result.iterations,
+        result.seconds,
+    )
+}
+
+fn errors(result: &Identification) -> String {
+    let row = |poses: &str, when: &str, of: &ErrorSummary| {
+        let values = [of.mean.x, of.mean.y, of.mean.z, of.mean.norm, of.rms.norm, of.max.norm];
+        let mut row = vec![poses.to_owned(), when.to_owned()];
+        row.extend(values.map(|value| number(value * 1e3, 4)));
+        row
+    };
+    let (before, after) = (&result.registered, &result.fitted);
+    let rows = vec![
+        row("identification", "before", &before.identification),
+        row("", "after", &after.identification),
+        row("held out", "before", &before.held_out),
+        row("", "after", &after.held_out),
+    ];
+    let header = ["error, mm", "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
+    let mut text = table(&header, rows, &[0, 1]);
+    text.push_str("  before: nominal arm, with base and tool fitted where they are free\n");
+    text
+}
+
+fn noise(problem: &Problem, result: &Identification) -> String {
+    match (result.noise, result.reduced_chi2) {
+        (Noise::Estimated(sigma), _) => format!(
+            "No σ is declared; the scatter about the fit gives {:.4} mm per coordinate, model errors included.\n",
+            sigma * 1e3
+        ),
+        (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.\n".to_owned(),
+        (Noise::Declared, Some(chi2)) if result.noise_factor > 1.0 => {
+            let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({:.4} mm)", s * 1e3));
+            format!(
+                "Reduced χ² is {chi2:.2}: the residual is {:.1} times the declared σ{declared}, so the model lacks something.\n\
+                 Standard errors are raised by that factor.\n",
+                chi2.sqrt()
+            )
+        }
+        (Noise::Declared, Some(chi2)) => {
+            format!("Reduced χ² is {chi2:.2}: the model explains the data to the declared σ.\n")
+        }
+    }
+}
+
+fn conditioning(result: &Identification) -> String {
+    let found = &result.identifiability;
+    let [o1, o2, o3, o4, o5] = found.observability(result.coordinates);
+    format!(
+        "Rank {} of {}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}\n",
+        found.rank,
+        result.unknowns.len(),
+        found.condition_number(),
+    )
+}

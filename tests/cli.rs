@@ -1,0 +1,266 @@
+//! The command line as users meet it: exit status, messages, and that bad input leaves nothing behind.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// A folder with a copy of the lunar sampler's problem and data, to spoil.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+        for name in ["problem.toml", "a-none.csv"] {
+            fs::copy(cases.join(name), folder.path().join(name)).unwrap();
+        }
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Replaces the first `from` in a file.
+    fn edit(&self, name: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(name)).unwrap();
+        assert!(text.contains(from), "{name} has no {from:?}");
+        fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
+    }
+
+    /// Keeps the header, then maps every other line of the data, counted from 2.
+    fn map_data(&self, map: impl Fn(usize, &str) -> Option<String>) {
+        let text = fs::read_to_string(self.path("a-none.csv")).unwrap();
+        let lines: Vec<String> = text
+            .lines()
+            .enumerate()
+            .filter_map(|(k, line)| if k == 0 { Some(line.to_owned()) } else { map(k + 1, line) })
+            .collect();
+        fs::write(self.path("a-none.csv"), lines.join("\n") + "\n").unwrap();
+    }
+
+    fn identify(&self, more: &[&str]) -> assert_cmd::assert::Assert {
+        Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+            .current_dir(self.folder.path())
+            .args(["identify", "."])
+            .args(more)
+            .assert()
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn identify_prints_a_table_and_writes_the_estimate() {
+    let bench = Bench::new();
+    let assert = bench.identify(&[]).success();
+    let out = text(&assert.get_output().stdout);
+    for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "Rank 31 of 32", "estimate.json"] {
+        assert!(out.contains(expected), "{expected} missing in:\n{out}");
+    }
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
+    assert_eq!(json["held_out"]["n"], 50);
+    assert!(json["held_out"]["rms_mm"]["norm"].as_f64().unwrap() < 0.14);
+    for key in ["problem", "strategy", "solver", "termination", "iterations", "seconds", "reduced_chi2", "rank"] {
+        assert!(!json[key].is_null(), "{key}");
+    }
+    let stiffness = json["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "joint2.stiffness").unwrap();
+    for key in ["unit", "nominal", "estimate", "std_error", "identified"] {
+        assert!(!stiffness[key].is_null(), "{key}");
+    }
+    assert!(stiffness["at_bound"].is_null());
+    let blind = &json["unidentified"][0];
+    assert!((blind["combination"]["joint1.beta"].as_f64().unwrap() - 0.5_f64.sqrt()).abs() < 1e-6);
+    assert!(blind["singular_value"].as_f64().unwrap() < 1e-9);
+}
+
+#[test]
+fn json_is_all_there_is_on_standard_output_and_quiet_is_quiet() {
+    let bench = Bench::new();
+    let assert = bench.identify(&["--json", "--out", "elsewhere"]).success();
+    let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    assert_eq!(json["problem"], "lunar-sampler");
+    assert!(bench.path("elsewhere/estimate.json").exists() && !bench.path("out").exists());
+    let assert = bench.identify(&["--quiet"]).success();
+    assert!(assert.get_output().stdout.is_empty() && assert.get_output().stderr.is_empty());
+}
+
+#[test]
+fn results_repeat_to_the_byte_but_for_the_time() {
+    let bench = Bench::new();
+    let run = || {
+        let mut json: Value = serde_json::from_slice(&bench.identify(&["--json"]).get_output().stdout).unwrap();
+        json["seconds"] = Value::Null;
+        json
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn strategies_and_solvers_are_what_they_say() {
+    let bench = Bench::new();
+    let rms = |arguments: &[&str]| {
+        let json: Value =
+            serde_json::from_slice(&bench.identify(&[&["--json"], arguments].concat()).get_output().stdout).unwrap();
+        (json["held_out"]["rms_mm"]["norm"].as_f64().unwrap(), json)
+    };
+    let (joint, _) = rms(&[]);
+    let (geometry, json) = rms(&["--strategy", "geometry-only"]);
+    assert_eq!(json["strategy"], "geometry-only");
+    assert!(geometry > 2.0 * joint, "{geometry} against {joint}");
+    let (bounded, json) = rms(&["--solver", "bounded"]);
+    assert_eq!(json["solver"], "bounded");
+    assert!((bounded - joint).abs() < 1e-6);
+    bench.edit(
+        "problem.toml",
+        "\"A.*\" = { sigma_relative = 0.5 }",
+        "\"A.*\" = { min_relative = 0.9, max_relative = 1.1 }",
+    );
+    let (_, json) = rms(&[]);
+    assert_eq!(json["solver"], "bounded");
+    let parameters = json["parameters"].as_array().unwrap();
+    let stiff = parameters.iter().find(|p| p["name"] == "A.EI").unwrap();
+    assert_eq!(stiff["at_bound"], "upper");
+    assert!((stiff["estimate"].as_f64().unwrap() - 1.1 * 2.6e4).abs() < 1e-6);
+    assert!(stiff["std_error"].is_null());
+    let assert = bench.identify(&["--solver", "levenberg-marquardt"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("does not keep the bounds"));
+}
+
+#[test]
+fn too_few_equations_are_not_trusted() {
+    let bench = Bench::new();
+    let problem = fs::read_to_string(bench.path("problem.toml")).unwrap();
+    let (arm, _) = problem.split_once("[parameters]").unwrap();
+    let free = "[parameters]\n\"*\" = { free = true }\n[data]\nfiles = [\"a-none.csv\"]\nposition_sigma_mm = 0.05\n\
+                held_out = { column = \"split\" }\n";
+    fs::write(bench.path("problem.toml"), format!("{arm}{free}")).unwrap();
+    let mut kept = 0;
+    let text_of = fs::read_to_string(bench.path("a-none.csv")).unwrap();
+    let rows: Vec<&str> = text_of
+        .lines()
+        .filter(|line| {
+            kept += usize::from(line.contains("identification"));
+            !line.contains("identification") || kept <= 5
+        })
+        .collect();
+    fs::write(bench.path("a-none.csv"), rows.join("\n")).unwrap();
+    let assert = bench.identify(&[]).code(1);
+    assert!(text(&assert.get_output().stderr).contains("15 measured coordinates for"));
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
+    assert_eq!(json["trusted"], false);
+}
+
+/// What is spoiled, how, and what the message must name.
+type Mistake = (&'static str, fn(&Bench), &'static [&'static str]);
+
+const DATA: &str = "a-none.csv";
+const PROBLEM: &str = "problem.toml";
+
+#[test]
+fn bad_input_is_named_and_leaves_nothing_behind() {
+    let mistakes: &[Mistake] = &[
+        ("empty file", |b| fs::write(b.path(DATA), "").unwrap(), &[DATA, "empty"]),
+        ("header only", |b| b.map_data(|_, _| None), &[DATA, "no rows"]),
+        ("NaN", |b| b.edit(DATA, "1840.7678", "NaN"), &["a-none.csv:2", "x_mm", "finite"]),
+        ("infinity", |b| b.edit(DATA, "1840.7678", "inf"), &["a-none.csv:2", "x_mm", "finite"]),
+        ("text in a number", |b| b.edit(DATA, "1840.7678", "far"), &["a-none.csv:2", "x_mm", "far"]),
+        (
+            "short row",
+            |b| b.map_data(|n, l| Some(if n == 5 { "4,identification".into() } else { l.into() })),
+            &["a-none.csv:5", "fields"],
+        ),
+        ("missing column", |b| b.edit(DATA, ",z_mm,", ",height_mm,"), &[DATA, "z_mm"]),
+        ("doubled column", |b| b.edit(DATA, ",payload_kg,", ",x_m,"), &[DATA, "x_m"]),
+        ("no unit in the data", |b| b.edit(DATA, "q2_deg", "q2"), &[DATA, "q2", "unit"]),
+        (
+            "no unit in the problem",
+            |b| b.edit(PROBLEM, "alpha_deg = 90.0", "alpha = 90.0"),
+            &["problem.toml:15", "alpha", "unit"],
+        ),
+        ("no held-out rows", |b| b.map_data(|_, l| Some(l.replace("validation", "identification"))), &["held out"]),
+        (
+            "no identification rows",
+            |b| b.map_data(|_, l| Some(l.replace("identification", "validation"))),
+            &["no rows are left to fit"],
+        ),
+        ("unknown split word", |b| b.edit(DATA, ",validation,", ",test,"), &["a-none.csv:2", "split", "test"]),
+        ("binary junk", |b| fs::write(b.path(DATA), [0xff, 0xfe, 0x00, 0x80, b'\n']).unwrap(), &[DATA]),
+        ("binary problem", |b| fs::write(b.path(PROBLEM), [0xff, 0xfe, 0x00]).unwrap(), &[PROBLEM]),
+        (
+            "unknown key",
+            |b| b.edit(PROBLEM, "beam_elements = 1", "beam_pieces = 1"),
+            &["problem.toml:7", "beam_pieces"],
+        ),
+        ("negative mass", |b| b.edit(PROBLEM, "mass_kg = 4.2", "mass_kg = -4.2"), &["problem.toml:27", "mass_kg"]),
+        ("zero stiffness", |b| b.edit(PROBLEM, "5.2e4", "0.0"), &["problem.toml:17", "stiffness_N_m_per_rad"]),
+        (
+            "no joints",
+            |b| fs::write(b.path(PROBLEM), "name = \"none\"\n[data]\nfiles = [\"a-none.csv\"]\n").unwrap(),
+            &[PROBLEM, "joint"],
+        ),
+        ("broken TOML", |b| b.edit(PROBLEM, "[statics]", "[statics"), &["problem.toml:5"]),
+        (
+            "pattern that matches nothing",
+            |b| b.edit(PROBLEM, "\"B.*\"", "\"C.*\""),
+            &["problem.toml:77", "C.*", "matches no parameter"],
+        ),
+        (
+            "min above max",
+            |b| b.edit(PROBLEM, "\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { min_mm = 2, max_mm = -2 }"),
+            &["problem.toml:78", "min"],
+        ),
+        (
+            "σ of the wrong kind",
+            |b| b.edit(PROBLEM, "\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_deg = 5.0 }"),
+            &["problem.toml:78", "tool.x", "_mm"],
+        ),
+        ("missing data file", |b| fs::remove_file(b.path(DATA)).unwrap(), &["problem.toml:81", DATA]),
+        ("missing problem", |b| fs::remove_file(b.path(PROBLEM)).unwrap(), &["no such file"]),
+        (
+            "zero sigma",
+            |b| b.edit(PROBLEM, "position_sigma_mm = 0.05", "position_sigma_mm = 0.0"),
+            &["problem.toml:82", "position_sigma_mm"],
+        ),
+        ("an arm too soft to stand", |b| b.edit(PROBLEM, "5.2e4", "1.0"), &["a-none.csv:2", "equilibrium"]),
+    ];
+    for (what, spoil, expected) in mistakes {
+        let bench = Bench::new();
+        spoil(&bench);
+        let assert = bench.identify(&[]).code(2);
+        let output = assert.get_output();
+        let message = text(&output.stderr);
+        for word in *expected {
+            assert!(message.contains(word), "{what}: {word:?} missing in: {message}");
+        }
+        assert!(message.starts_with("error: ") && !message.contains("panicked"), "{what}: {message}");
+        assert!(output.stdout.is_empty() && !bench.path("out").exists(), "{what} left something behind");
+    }
+}
+
+#[test]
+fn wrong_arguments_end_with_status_two_and_help_with_zero() {
+    let flexcal = || Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    flexcal().args(["identify"]).assert().code(2);
+    flexcal().args(["identify", ".", "--strategy", "guess"]).assert().code(2);
+    flexcal().args(["--help"]).assert().success();
+    flexcal().args(["identify", "--help"]).assert().success();
+}
+
+#[test]
+fn a_result_that_cannot_be_written_is_an_error() {
+    let bench = Bench::new();
+    fs::write(bench.path("taken"), "a file where a folder is wanted").unwrap();
+    let assert = bench.identify(&["--out", "taken"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("cannot write"));
+}
