@@ -19,7 +19,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// (RᵀR / s² + PᵀP)⁻¹ on the free unknowns, with the blind combinations held.
+    /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the blind combinations held.
     ///
     /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's prior, `gauge` rows that
     /// span the blind combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
@@ -77,7 +77,7 @@ impl Uncertainty {
     }
 }
 
-/// (AᵀA)⁺ through the singular values of A with its columns scaled to unit norm.
+/// (`AᵀA`)⁺ through the singular values of A with its columns scaled to unit norm.
 fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {

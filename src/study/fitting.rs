@@ -95,8 +95,14 @@ impl<'a> Fitting<'a> {
     /// The nominal arm with bases and targets fitted where they are free.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
-        let rows: Vec<usize> = self.split.identification.iter().chain(&self.late.rows).copied().collect();
-        register(self.model, &self.placement.poses(self.measurements, &rows, self.sigma), &mut x);
+        let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
+        let mut known = vec![false; self.model.bases];
+        for pose in &poses {
+            known[pose.base] = true;
+        }
+        let late = self.placement.poses(self.measurements, &self.late.rows, self.sigma);
+        poses.extend(late.into_iter().filter(|pose| !known[pose.base]));
+        register(self.model, &poses, &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
         if !placements.is_empty() {
             x = self.stage(&self.split.identification, placements).run(&x)?.x;
