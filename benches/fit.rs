@@ -1,5 +1,5 @@
 //! Whole fits, from nominal parameters to the minimum.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a bench may panic")]
+#![allow(clippy::unwrap_used, clippy::wildcard_imports, missing_docs, reason = "a bench may panic")]
 
 mod common;
 

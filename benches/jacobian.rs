@@ -1,5 +1,5 @@
 //! Residuals and derivatives of a block of poses; `items` are poses.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a bench may panic")]
+#![allow(clippy::unwrap_used, clippy::wildcard_imports, missing_docs, reason = "a bench may panic")]
 
 mod common;
 
@@ -8,7 +8,7 @@ use common::lunar::Lunar;
 use common::ur10::Ur10;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use flexcal::fit::{Block, LeastSquares};
+use flexcal::fit::{Block, LeastSquares, check_jacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// Poses of the rigid arm: a block as the fit makes them.
@@ -20,7 +20,18 @@ fn main() {
     let x = Ur10::some_point(&residuals);
     let difference = common::difference(&Analytic::new(&ur10.model, &residuals), &residuals, &x);
     assert!(difference < 1e-9, "the hand-written Jacobian differs by {difference}");
+    let all = ur10.residuals(&(0..ur10.model.parameters.len()).collect::<Vec<usize>>());
+    check(&all, &Ur10::some_point(&all));
+    let lunar = Lunar::new();
+    check(&lunar.residuals(), &DVector::from_element(lunar.parameters(), 1e-3));
     divan::main();
+}
+
+/// Only right derivatives are worth timing.
+fn check(problem: &impl LeastSquares, x: &DVector<f64>) {
+    let check = check_jacobian(problem, x, &DVector::from_element(x.len(), 1e-2));
+    let (column, worst) = check.worst().unwrap();
+    assert!(worst.relative_error < 1e-7_f64.max(2.0 * worst.accuracy), "unknown {column}: {worst:?}");
 }
 
 /// Residuals and Jacobian of all poses of `problem`.

@@ -85,6 +85,12 @@ impl<S: Scalar> Frame<S> {
         self.axes[0] * vector.x + self.axes[1] * vector.y + self.axes[2] * vector.z
     }
 
+    /// A frame given in this one, as seen from the reference frame.
+    #[must_use]
+    pub fn seen(&self, frame: &Self) -> Self {
+        Self { axes: frame.axes.map(|axis| self.vector(&axis)), origin: self.point(&frame.origin) }
+    }
+
     /// This frame's coordinates of a vector given in the reference frame.
     pub fn resolve(&self, vector: &Vector3<S>) -> Vector3<S> {
         Vector3::new(self.axes[0].dot(vector), self.axes[1].dot(vector), self.axes[2].dot(vector))
