@@ -12,7 +12,7 @@ use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Workspace};
 use crate::fit::Block;
 use crate::parameter::{JointField, Slot};
 use crate::scalar::{gradient, seeded};
-use crate::spatial::{Frame, Motion, rotate};
+use crate::spatial::{Frame, Motion, rotation_axes};
 
 /// Parameters seeded at once on an elastic arm.
 const CHUNK: usize = 8;
@@ -236,6 +236,6 @@ fn links(model: &Model, arm: &Arm<f64>, own: &[(usize, usize)]) -> Vec<Link> {
 /// Derivatives of a rotation exp(`[w]×`) with respect to the three coordinates of w, as the derivatives of its axes.
 fn turning(w: &Vector3<f64>) -> [Frame<f64>; 3] {
     let seeded_w: Vector3<DualSVec64<3>> = Vector3::from_fn(|i, _| seeded(w[i], Some(i)));
-    let axes = Frame::identity().axes.map(|axis| rotate(&seeded_w, &axis).map(|coordinate| gradient(&coordinate)));
+    let axes = rotation_axes(&seeded_w).map(|axis| axis.map(|coordinate| gradient(&coordinate)));
     std::array::from_fn(|k| Frame { axes: axes.map(|axis| axis.map(|g| g[k])), origin: Vector3::zeros() })
 }

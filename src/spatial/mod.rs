@@ -6,4 +6,4 @@ mod rotation;
 
 pub use frame::Frame;
 pub use motion::Motion;
-pub use rotation::{rotate, rotation_vector};
+pub use rotation::{rotate, rotation_axes, rotation_vector};
