@@ -26,7 +26,7 @@ const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
 const SETTLED: f64 = 1e-13;
 /// Directions seeded at once when the response to moments is differentiated.
-const CHUNK: usize = 8;
+const CHUNK: usize = 10;
 
 type Dual = DualSVec64<CHUNK>;
 

@@ -15,7 +15,7 @@ use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, Motion, rotation_axes};
 
 /// Parameters seeded at once on an elastic arm.
-const CHUNK: usize = 8;
+const CHUNK: usize = 10;
 
 type ChunkDual = DualSVec64<CHUNK>;
 
