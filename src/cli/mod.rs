@@ -5,6 +5,7 @@ mod identify;
 mod input;
 mod output;
 mod progress;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -22,6 +23,8 @@ struct Cli {
 enum Command {
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
+    /// Make measurements of a known arm on the virtual test rig.
+    Simulate(simulate::Arguments),
 }
 
 /// What a command says to the shell.
@@ -45,6 +48,7 @@ pub fn run() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

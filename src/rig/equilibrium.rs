@@ -26,8 +26,8 @@ pub(super) struct AtRest {
 impl AtRest {
     /// Lets the chain come to rest; `None` if it never does.
     ///
-    /// Each pass loads the chain as it stands and lets every hinge follow. Passes that overshoot, as in an arm that
-    /// hangs from soft joints, are followed in part.
+    /// Each pass loads the chain as it stands and lets every hinge follow. A pass that overshoots, as in an arm that
+    /// hangs from soft joints, is taken back and followed in part.
     pub fn find(chain: &Chain) -> Option<Self> {
         let count = chain.pieces.len();
         let mut rest = Self {
@@ -36,27 +36,28 @@ impl AtRest {
             motions: vec![Motion::default(); count],
             end: Frame::identity(),
         };
-        let mut wanted = vec![Motion::default(); count];
-        let (mut step, mut last_change) = (1.0, f64::INFINITY);
+        let mut from = rest.motions.clone();
+        let mut missing = rest.motions.clone();
+        let mut next_missing = rest.motions.clone();
+        let (mut step, mut least) = (1.0, f64::INFINITY);
         for _ in 0..MAX_PASSES {
             rest.place(chain);
-            rest.load(chain, &mut wanted);
-            let pairs = || rest.motions.iter().zip(&wanted);
-            let change: f64 =
-                pairs().map(|(is, to)| (to.rotation - is.rotation).norm() + (to.stretch - is.stretch).abs()).sum();
+            let change = rest.load(chain, &mut next_missing);
             if change <= SETTLED {
                 return Some(rest);
             }
-            if !change.is_finite() {
+            if step > LEAST_STEP && (change > least || !change.is_finite()) {
+                step /= 2.0;
+            } else if change.is_finite() {
+                least = change;
+                from.copy_from_slice(&rest.motions);
+                missing.copy_from_slice(&next_missing);
+            } else {
                 return None;
             }
-            if change > last_change {
-                step = f64::max(step / 2.0, LEAST_STEP);
-            }
-            last_change = change;
-            for (is, to) in rest.motions.iter_mut().zip(&wanted) {
-                is.rotation += (to.rotation - is.rotation) * step;
-                is.stretch += (to.stretch - is.stretch) * step;
+            for ((motion, from), missing) in rest.motions.iter_mut().zip(&from).zip(&missing) {
+                motion.rotation = from.rotation + missing.rotation * step;
+                motion.stretch = from.stretch + missing.stretch * step;
             }
         }
         None
@@ -80,8 +81,9 @@ impl AtRest {
         self.end = frame;
     }
 
-    /// Sums the loads from the tip inwards; `wanted` is what each hinge would do under its own.
-    fn load(&self, chain: &Chain, wanted: &mut [Motion]) {
+    /// Sums the loads from the tip inwards: how far each hinge is from what it does under its load, and their sum.
+    fn load(&self, chain: &Chain, missing: &mut [Motion]) -> f64 {
+        let mut sum = 0.0;
         let mut loads = chain.loads.iter().rev().peekable();
         // Moments about the origin of the base frame.
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
@@ -94,7 +96,12 @@ impl AtRest {
             }
             let hinge = &self.hinges[k];
             let about_hinge = moment - hinge.origin.cross(&force);
-            wanted[k] = piece.hinge.give(&hinge.resolve(&force), &hinge.resolve(&about_hinge));
+            let wanted = piece.hinge.give(&hinge.resolve(&force), &hinge.resolve(&about_hinge));
+            let motion = &self.motions[k];
+            missing[k] =
+                Motion { rotation: wanted.rotation - motion.rotation, stretch: wanted.stretch - motion.stretch };
+            sum += missing[k].rotation.norm() + missing[k].stretch.abs();
         }
+        sum
     }
 }

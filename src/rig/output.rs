@@ -107,6 +107,12 @@ impl Simulation {
         serde_json::to_string_pretty(&document).unwrap_or_default() + "\n"
     }
 
+    /// Names of the effects at work.
+    pub fn effect_names(&self) -> Vec<String> {
+        let name = |effect| described(effect, &self.joints)["effect"].as_str().unwrap_or_default().to_owned();
+        self.truth.effects.iter().map(name).collect()
+    }
+
     /// Number of rows that are held out.
     pub fn held_out(&self) -> usize {
         self.rows.iter().filter(|row| row.held_out).count()
