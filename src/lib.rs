@@ -8,6 +8,7 @@ pub mod model;
 pub mod parameter;
 pub mod problem;
 pub mod report;
+pub mod rig;
 pub mod scalar;
 pub mod solver;
 pub mod spatial;
