@@ -12,6 +12,10 @@ use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
 use crate::solver::{self, Bounds, BoundsError, Settings, Solution, State};
 
+/// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
+/// metres measured in units of their noise, and far below what any estimate's error would show.
+const COST_TOLERANCE: f64 = 1e-11;
+
 /// How far a fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
@@ -131,7 +135,8 @@ impl<'a> Stage<'a> {
         let fit = Fit::new(&residuals)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
-        let settings = Settings { max_iterations: self.max_steps, ..Settings::default() };
+        let settings =
+            Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
         let reporter = self.progress.map(|sink| Reporter {
             sink: Arc::clone(sink),
             unknowns: self.unknowns.len(),
