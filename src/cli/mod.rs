@@ -1,5 +1,7 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+mod compare;
+mod compensate;
 mod diagnostic;
 mod identify;
 mod input;
@@ -23,6 +25,10 @@ struct Cli {
 enum Command {
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
+    /// Put every strategy and solver, and every part of the elasticity left out, side by side.
+    Compare(compare::Arguments),
+    /// Find the joint commands that bring the arm, as identified, to desired positions.
+    Compensate(compensate::Arguments),
     /// Make measurements of a known arm on the virtual test rig.
     Simulate(simulate::Arguments),
 }
@@ -48,6 +54,8 @@ pub fn run() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
     };
     match outcome {

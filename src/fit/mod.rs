@@ -5,7 +5,9 @@
 
 mod derivative;
 mod identifiability;
+mod kernel;
 mod objective;
+mod singular;
 mod triangle;
 mod uncertainty;
 
@@ -16,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{BlindCombination, Identifiability};
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
+pub(crate) use singular::orthogonalise;
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 

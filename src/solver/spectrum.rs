@@ -3,9 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::factor::RADIUS_SLACK;
+use crate::fit::orthogonalise;
 
-/// Sweeps over all pairs of columns; five are usual.
-const SWEEPS: usize = 60;
 /// Newton steps allowed to the secular equation.
 const SECULAR_ITERATIONS: usize = 50;
 
@@ -87,46 +86,4 @@ impl Spectrum {
         }
         lambda
     }
-}
-
-/// Rotates pairs of columns until all are orthogonal, and the entries of `projected` with them.
-fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
-    let (rows, n) = columns.shape();
-    let tolerance = (rows.max(1) as f64).sqrt() * f64::EPSILON;
-    for _ in 0..SWEEPS {
-        let mut rotated = false;
-        for i in 0..n {
-            for j in i + 1..n {
-                let (head, tail) = columns.as_mut_slice().split_at_mut(j * rows);
-                let (a, b) = (&mut head[i * rows..(i + 1) * rows], &mut tail[..rows]);
-                let Some((cosine, sine)) = rotation(a, b, tolerance) else { continue };
-                rotated = true;
-                for (a, b) in a.iter_mut().zip(b) {
-                    (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
-                }
-                let (a, b) = (projected[i], projected[j]);
-                (projected[i], projected[j]) = (cosine * a - sine * b, sine * a + cosine * b);
-            }
-        }
-        if !rotated {
-            break;
-        }
-    }
-}
-
-/// Cosine and sine of the rotation that makes a and b orthogonal, unless they are.
-fn rotation(a: &[f64], b: &[f64], tolerance: f64) -> Option<(f64, f64)> {
-    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        aa += a * a;
-        bb += b * b;
-        ab += a * b;
-    }
-    if ab == 0.0 || ab.abs() <= tolerance * aa.sqrt() * bb.sqrt() {
-        return None;
-    }
-    let zeta = (bb - aa) / (2.0 * ab);
-    let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-    let cosine = tangent.hypot(1.0).recip();
-    Some((cosine, cosine * tangent))
 }
