@@ -25,7 +25,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("solver", &[&["scalar", "error", "fit"]]),
     // The physics knows no sensors; the test rig shares no physics.
     ("arm", &[&["scalar", "spatial", "error", "problem"]]),
-    ("rig", &[&["scalar", "spatial", "error", "problem"]]),
+    ("rig", &[&["scalar", "spatial", "units", "error", "problem"]]),
     ("parameter", &[&["scalar", "spatial", "error", "problem", "arm"]]),
     ("effect", &[&["scalar", "spatial", "error", "problem", "arm", "parameter"]]),
     ("model", &[&["scalar", "spatial", "error", "problem", "arm", "parameter", "effect", "fit"]]),

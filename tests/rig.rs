@@ -1,6 +1,7 @@
 //! The virtual test rig against golden positions, hand calculations, its effects, and the rest of the program.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::float_cmp, reason = "what is written reads back exactly")]
 
 #[path = "rig/bench.rs"]
 mod bench;
@@ -10,5 +11,7 @@ mod effects;
 mod golden;
 #[path = "rig/hand.rs"]
 mod hand;
+#[path = "rig/model.rs"]
+mod model;
 #[path = "rig/simulate.rs"]
 mod simulate;

@@ -13,6 +13,7 @@ mod chain;
 mod command;
 mod effect;
 mod equilibrium;
+mod link;
 mod output;
 mod parameters;
 mod ranges;

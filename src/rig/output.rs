@@ -1,13 +1,11 @@
 //! Simulations as text: the table of measurements, and what is true about it.
 
-use std::fmt::Write as _;
-
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
-use super::parameters::{ParameterKind, TrueParameter};
-use super::simulate::Simulation;
+use super::parameters::TrueParameter;
+use super::simulate::{Row, Simulation};
 use crate::problem::{Effect, Joint, JointKind};
 
 #[derive(Serialize)]
@@ -31,64 +29,58 @@ struct Parameter<'a> {
     value: f64,
 }
 
-impl<'a> Parameter<'a> {
-    fn of(known: &'a TrueParameter) -> Self {
-        let unit = match known.kind {
-            ParameterKind::Angle => "rad",
-            ParameterKind::Length => "m",
-            ParameterKind::Relative if known.name.ends_with(".stiffness") => "N·m/rad",
-            ParameterKind::Relative if known.name.ends_with(".EA") => "N",
-            ParameterKind::Relative => "N·m²",
-        };
-        Self { name: &known.name, unit, nominal: known.nominal, value: known.value }
-    }
-}
-
 impl Simulation {
     /// `measurements.csv`.
     pub fn csv(&self) -> String {
-        let moving: Vec<usize> = (0..self.joints.len()).filter(|&k| self.joints[k].kind != JointKind::Fixed).collect();
+        let rows = self.rows.iter().enumerate().map(|(index, row)| self.cells(index + 1, row));
+        let lines = std::iter::once(self.header()).chain(rows);
+        lines.flat_map(|cells| [cells.join(","), "\n".to_owned()]).collect()
+    }
+
+    /// Joints that take a q: index, and whether they turn.
+    fn moving(&self) -> impl Iterator<Item = (usize, bool)> {
+        let joints = self.joints.iter().map(|joint| joint.kind).enumerate();
+        joints.filter(|(_, kind)| *kind != JointKind::Fixed).map(|(index, kind)| (index, kind == JointKind::Revolute))
+    }
+
+    fn header(&self) -> Vec<String> {
         let ranges = &self.truth.poses;
-        let mut text = format!("pose,{}", self.split_column);
-        for &k in &moving {
-            let unit = if self.joints[k].kind == JointKind::Revolute { "deg" } else { "m" };
-            let _ = write!(text, ",q{}_{unit}", k + 1);
-        }
-        text.push_str(",x_mm,y_mm,z_mm");
+        let mut names = vec!["pose".to_owned(), self.split_column.clone()];
+        let unit = |turns| if turns { "deg" } else { "m" };
+        names.extend(self.moving().map(|(index, turns)| format!("q{}_{}", index + 1, unit(turns))));
         let columns = [
-            (!ranges.payloads.is_empty(), ",payload_kg"),
-            (ranges.hoist.is_some(), ",hoist_N"),
-            (ranges.temperature.is_some(), ",temperature_C"),
-            (true, ",time_s"),
+            (true, "x_mm"),
+            (true, "y_mm"),
+            (true, "z_mm"),
+            (!ranges.payloads.is_empty(), "payload_kg"),
+            (ranges.hoist.is_some(), "hoist_N"),
+            (ranges.temperature.is_some(), "temperature_C"),
+            (true, "time_s"),
         ];
-        text.extend(columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name));
+        names.extend(columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
         if ranges.approach {
-            moving.iter().for_each(|k| write!(text, ",approach{}", k + 1).unwrap_or_default());
+            names.extend(self.moving().map(|(index, _)| format!("approach{}", index + 1)));
         }
-        text.push('\n');
-        for (index, row) in self.rows.iter().enumerate() {
-            let set = &row.conditions;
-            let _ = write!(text, "{},{}", index + 1, if row.held_out { "validation" } else { "identification" });
-            for &k in &moving {
-                let q = set.configuration[k];
-                let _ = match self.joints[k].kind {
-                    JointKind::Revolute => write!(text, ",{:.6}", q.to_degrees()),
-                    _ => write!(text, ",{q:.9}"),
-                };
-            }
-            for x in &row.position {
-                let _ = write!(text, ",{:.6}", x * 1e3);
-            }
-            let _ = set.payload.map_or(Ok(()), |mass| write!(text, ",{mass}"));
-            let _ = set.hoist.map_or(Ok(()), |force| write!(text, ",{force:.3}"));
-            let _ = set.temperature.map_or(Ok(()), |temperature| write!(text, ",{temperature:.2}"));
-            let _ = write!(text, ",{:.1}", set.time);
-            if ranges.approach {
-                moving.iter().for_each(|&k| write!(text, ",{}", set.approach[k]).unwrap_or_default());
-            }
-            text.push('\n');
+        names
+    }
+
+    fn cells(&self, pose: usize, row: &Row) -> Vec<String> {
+        let set = &row.conditions;
+        let split = if row.held_out { "validation" } else { "identification" };
+        let mut cells = vec![pose.to_string(), split.to_owned()];
+        cells.extend(self.moving().map(|(index, turns)| match set.configuration[index] {
+            q if turns => format!("{:.6}", q.to_degrees()),
+            q => format!("{q:.9}"),
+        }));
+        cells.extend(row.position.iter().map(|x| format!("{:.6}", x * 1e3)));
+        cells.extend(set.payload.map(|mass| mass.to_string()));
+        cells.extend(set.hoist.map(|force| format!("{force:.3}")));
+        cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
+        cells.push(format!("{:.1}", set.time));
+        if self.truth.poses.approach {
+            cells.extend(self.moving().map(|(index, _)| set.approach[index].to_string()));
         }
-        text
+        cells
     }
 
     /// `truth.json`.
@@ -101,7 +93,7 @@ impl Simulation {
             position_sigma_mm: self.truth.noise_sigma * 1e3,
             segments: self.truth.segments,
             effects: self.truth.effects.iter().map(|effect| described(effect, &self.joints)).collect(),
-            parameters: self.parameters.iter().map(Parameter::of).collect(),
+            parameters: self.parameters.iter().map(parameter).collect(),
         };
         // Numbers and words always have a JSON text.
         serde_json::to_string_pretty(&document).unwrap_or_default() + "\n"
@@ -117,6 +109,10 @@ impl Simulation {
     pub fn held_out(&self) -> usize {
         self.rows.iter().filter(|row| row.held_out).count()
     }
+}
+
+fn parameter(known: &TrueParameter) -> Parameter<'_> {
+    Parameter { name: &known.name, unit: known.kind.symbol(), nominal: known.nominal, value: known.value }
 }
 
 /// An effect under its name, with arguments and values.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::SEGMENTS;
-use super::parameters::{self, ParameterKind, TrueParameter};
+use super::parameters::{self, TrueParameter};
 use super::truth::{Deviation, RandomRule, Truth};
 use super::{ranges, strengths};
 use crate::error::{InputError, InputErrorKind};
@@ -12,7 +12,7 @@ use crate::problem::item::{Document, Item};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
 use crate::problem::{HeldOut, Problem};
-use crate::units::LENGTH;
+use crate::units::{ANGLE, Kind, LENGTH, RELATIVE};
 
 pub(super) fn file(path: &Path, problem: &Problem) -> Result<Truth, InputError> {
     truth(&Document::read(path, InputErrorKind::TruthMissing)?, problem)
@@ -79,7 +79,7 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
             return Err(item.error(InputErrorKind::GivenTwice { first: first.suffix.to_owned() }));
         }
     };
-    if parameter.kind == ParameterKind::Relative && value <= 0.0 {
+    if parameter.kind.is_relative() && value <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value }));
     }
     Ok(Deviation { name: name.to_owned(), value })
@@ -88,23 +88,20 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
 /// `"joint*.alpha" = { sigma_deg = 0.3 }`.
 fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result<RandomRule, InputError> {
     let mut section = named(pattern, item)?;
-    let mut sigmas = [None; 3];
-    for (sigma, kind) in sigmas.iter_mut().zip(ParameterKind::ALL) {
-        if let Some((item, unit)) = section.pick("sigma", kind.units())? {
-            let value = item.number()?;
-            if value < 0.0 {
-                return Err(item.error(InputErrorKind::Negative { value }));
-            }
-            *sigma = Some((unit.to_si)(value));
-        }
-    }
+    let mut sigma = |kind: &Kind| match section.pick("sigma", kind)? {
+        Some((item, unit)) => match item.number()? {
+            value if value < 0.0 => Err(item.error(InputErrorKind::Negative { value })),
+            value => Ok(Some((unit.to_si)(value))),
+        },
+        None => Ok(None),
+    };
+    let (angle, length, relative) = (sigma(&ANGLE)?, sigma(&LENGTH)?, sigma(&RELATIVE)?);
     section.finish()?;
     let matched: Vec<_> = known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
     if matched.is_empty() {
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(item.error(InputErrorKind::MatchesNothing { known }));
     }
-    let [angle, length, relative] = sigmas;
     let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
     if matched.iter().all(|parameter| rule.sigma(parameter.kind).is_none()) {
         let write = matched[0].kind.units().spelled("sigma");

@@ -124,10 +124,7 @@ fn true_arm(problem: &Problem, truth: &Truth, mut random: ChaCha8Rng) -> (Proble
         } else if let Some(sigma) =
             truth.random.iter().rev().find(|rule| matches(&rule.pattern, &name)).and_then(|rule| rule.sigma(kind))
         {
-            *value = match kind {
-                parameters::ParameterKind::Relative => nominal * (sigma * drawn).exp(),
-                _ => nominal + sigma * drawn,
-            };
+            *value = kind.spread(nominal, sigma, drawn);
         }
         all.push(TrueParameter { name, kind, nominal, value: *value });
     });

@@ -99,7 +99,7 @@ impl RandomRule {
         match kind {
             ParameterKind::Angle => self.angle,
             ParameterKind::Length => self.length,
-            ParameterKind::Relative => self.relative,
+            _ => self.relative,
         }
     }
 }

@@ -82,7 +82,7 @@ fn the_wrong_number_of_values_is_refused() {
 }
 
 /// Checks that an effect does the same as a change of the arm or of what was set.
-fn check(cause: Effect, values: &[f64], change: impl Fn(&mut Problem, &mut Conditions)) {
+fn check(cause: &Effect, values: &[f64], change: impl Fn(&mut Problem, &mut Conditions)) {
     let (arm, conditions) = bench();
     let with = position(&arm, vec![effect(&arm, cause.clone(), values)], &conditions);
     let (mut changed, mut set) = (arm, conditions);
@@ -96,15 +96,15 @@ fn errors_of_a_joint_are_errors_of_its_angle() {
     let turn = |joint: usize, error: fn(f64) -> f64| {
         move |_: &mut Problem, set: &mut Conditions| set.configuration[joint - 1] += error(set.configuration[joint - 1])
     };
-    check(Effect::GearRatio { joint: 3 }, &[4e-4], turn(3, |q| 4e-4 * q));
+    check(&Effect::GearRatio { joint: 3 }, &[4e-4], turn(3, |q| 4e-4 * q));
     check(
-        Effect::JointHarmonic { joint: 2, orders: vec![1, 3] },
+        &Effect::JointHarmonic { joint: 2, orders: vec![1, 3] },
         &[1e-4, 2e-4, 3e-4, 4e-4],
         turn(2, |q| 1e-4 * q.sin() + 2e-4 * q.cos() + 3e-4 * (3.0 * q).sin() + 4e-4 * (3.0 * q).cos()),
     );
-    check(Effect::Backlash { joint: 2 }, &[6e-4], turn(2, |_| -3e-4));
-    check(Effect::JointThermalDrift { joint: 1 }, &[1e-5], turn(1, |_| 8e-5));
-    check(Effect::JointCoupling { joint: 4, from: 3 }, &[3e-4], |_, set| {
+    check(&Effect::Backlash { joint: 2 }, &[6e-4], turn(2, |_| -3e-4));
+    check(&Effect::JointThermalDrift { joint: 1 }, &[1e-5], turn(1, |_| 8e-5));
+    check(&Effect::JointCoupling { joint: 4, from: 3 }, &[3e-4], |_, set| {
         set.configuration[3] += 3e-4 * set.configuration[2];
     });
     let (arm, conditions) = bench();
@@ -120,16 +120,16 @@ fn errors_of_a_joint_are_errors_of_its_angle() {
 
 #[test]
 fn elastic_effects_are_softer_joints_and_links() {
-    check(Effect::JointCompliance { joint: 3 }, &[1e-5], |arm, _| {
+    check(&Effect::JointCompliance { joint: 3 }, &[1e-5], |arm, _| {
         arm.joints[2].stiffness = arm.joints[2].stiffness.map(|k| 1.0 / (1.0 / k + 1e-5));
     });
-    check(Effect::LinkBending { joint: 4 }, &[2e-5], |arm, _| {
+    check(&Effect::LinkBending { joint: 4 }, &[2e-5], |arm, _| {
         let beam = arm.joints[3].beam.as_mut().unwrap();
         for rigidity in [&mut beam.ei_y, &mut beam.ei_z] {
             *rigidity = rigidity.map(|ei| 1.0 / (1.0 / ei + 2e-5));
         }
     });
-    check(Effect::LinkBending { joint: 2 }, &[2e-5], |arm, _| {
+    check(&Effect::LinkBending { joint: 2 }, &[2e-5], |arm, _| {
         let mut beam = arm.joints[2].beam.clone().unwrap();
         (beam.mass, beam.ea, beam.gj, beam.hoist) = (0.0, None, None, None);
         (beam.ei_y, beam.ei_z) = (Some(5e4), Some(5e4));
@@ -140,18 +140,18 @@ fn elastic_effects_are_softer_joints_and_links() {
 
 #[test]
 fn effects_on_loads_are_other_loads() {
-    check(Effect::UnmodelledMass { link: "B".to_owned() }, &[0.4, 0.8], |arm, _| {
+    check(&Effect::UnmodelledMass { link: "B".to_owned() }, &[0.4, 0.8], |arm, _| {
         let mut body = arm.joints[2].bodies[0].clone();
         (body.mass, body.position) = (0.4, Vector3::new(0.8, 0.0, 0.0));
         arm.joints[3].beam.as_mut().unwrap().masses.push(body);
     });
-    check(Effect::PayloadMass, &[0.1], |_, set| set.payload = set.payload.map(|mass| mass + 0.1));
-    check(Effect::HoistForce, &[0.05], |_, set| set.hoist = set.hoist.map(|force| force * 1.05));
-    check(Effect::HoistDirection, &[0.02, 0.01, 0.0], |arm, _| {
+    check(&Effect::PayloadMass, &[0.1], |_, set| set.payload = set.payload.map(|mass| mass + 0.1));
+    check(&Effect::HoistForce, &[0.05], |_, set| set.hoist = set.hoist.map(|force| force * 1.05));
+    check(&Effect::HoistDirection, &[0.02, 0.01, 0.0], |arm, _| {
         let hoist = arm.joints[3].beam.as_mut().unwrap().hoist.as_mut().unwrap();
         hoist.direction = Vector3::new(0.02, 0.01, 1.0).normalize();
     });
-    check(Effect::GravityDirection, &[0.01, 0.02], |arm, _| {
+    check(&Effect::GravityDirection, &[0.01, 0.02], |arm, _| {
         arm.gravity = nalgebra::Rotation3::new(Vector3::new(0.01, 0.02, 0.0)) * arm.gravity;
     });
 }
