@@ -17,7 +17,8 @@ struct Problem {
     name: &'static str,
     analytic: Analytic,
     start: Vec<f64>,
-    /// ‖r‖² of every known local minimum (or infimum).
+    /// ‖r‖² of every known local minimum (or infimum); beyond the paper's, those that MINPACK's driver reports
+    /// (Osborne 2: norm 1.337840, Chebyquad n = 1: 1.886238 and 1.884248) and those derived where they stand.
     minima: Vec<f64>,
 }
 
@@ -42,26 +43,29 @@ fn problems() -> Vec<Problem> {
         problem!("Freudenstein–Roth (2)", freudenstein_roth, 2, [0.5, -2.0], [0.0, 48.984_253_679_240_01]),
         problem!("Powell badly scaled (3)", powell_badly_scaled, 2, [0.0, 1.0], [0.0]),
         problem!("Brown badly scaled (4)", brown_badly_scaled, 3, [1.0, 1.0], [0.0]),
-        problem!("Beale (5)", beale, 3, [1.0, 1.0], [0.0]),
-        problem!("Jennrich–Sampson (6)", jennrich_sampson, 10, [0.3, 0.4], [124.362_182_355_614_7]),
+        // Along x₂ → 1, x₁ (x₂ − 1) = const the residuals tend to yᵢ + i·const: infimum 14.203125 − 13.875²/14.
+        problem!("Beale (5)", beale, 3, [1.0, 1.0], [0.0, 14.203_125 - 13.875 * 13.875 / 14.0]),
+        // The second with one unknown at −∞ (one-dimensional minimisation by SciPy: 259.58019013425326).
+        problem!("Jennrich–Sampson (6)", jennrich_sampson, 10, [0.3, 0.4], [124.362_182_355_614_7, 259.580_190]),
         problem!("Helical valley (7)", helical_valley, 3, [-1.0, 0.0, 0.0], [0.0]),
         problem!("Bard (8)", bard, 15, [1.0, 1.0, 1.0], [8.214_877e-3, 17.4286]),
         problem!("Gaussian (9)", gaussian, 15, [0.4, 1.0, 0.0], [1.12793e-8]),
         problem!("Meyer (10)", meyer, 16, [0.02, 4000.0, 250.0], [87.945_8]),
         problem!("Gulf (11)", gulf, 99, [5.0, 2.5, 0.15], [0.0]),
-        problem!("Box three-dimensional (12)", box3, 10, [0.0, 10.0, 20.0], [0.0]),
+        // The second with x₂ → ∞ (SciPy least_squares from 0, 100, 200: 0.0755887407549974).
+        problem!("Box three-dimensional (12)", box3, 10, [0.0, 10.0, 20.0], [0.0, 0.075_588_740_755]),
         problem!("Powell singular (13)", powell_singular, 4, [3.0, -1.0, 0.0, 1.0], [0.0]),
         problem!("Wood (14)", wood, 6, [-3.0, -1.0, -3.0, -1.0], [0.0]),
         problem!("Kowalik–Osborne (15)", kowalik_osborne, 11, [0.25, 0.39, 0.415, 0.39], [3.075_056e-4, 1.02734e-3]),
         problem!("Brown–Dennis (16)", brown_dennis, 20, [25.0, 5.0, -5.0, -1.0], [85_822.201_626]),
         problem!("Osborne 1 (17)", osborne1, 33, [0.5, 1.5, -1.0, 0.01, 0.02], [5.464_895e-5]),
-        problem!("Biggs EXP6 (18)", biggs, 13, [1.0, 2.0, 1.0, 1.0, 1.0, 1.0], [0.0, 5.655_65e-3]),
+        problem!("Biggs EXP6 (18)", biggs, 13, [1.0, 2.0, 1.0, 1.0, 1.0, 1.0], [0.0, 5.655_65e-3, 0.306_366_8]),
         problem!(
             "Osborne 2 (19)",
             osborne2,
             65,
             [1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5],
-            [4.013_774e-2]
+            [4.013_774e-2, 1.789_814]
         ),
         problem!("Watson, n = 6 (20)", watson, 31, [0.0; 6], [2.287_670e-3]),
         problem!("Watson, n = 9 (20)", watson, 31, [0.0; 9], [1.399_760e-6]),
@@ -106,6 +110,24 @@ fn problems() -> Vec<Problem> {
     ]
 }
 
+/// Starts from which no minimum is reached, and why.
+const LOST: [(&str, u32); 9] = [
+    // x₂ = 100: the derivative with respect to x₂ is e⁻¹⁰⁰, the residual flat.
+    ("Powell badly scaled (3)", 100),
+    // e⁴⁰⁰ squared overflows: the start is outside the domain.
+    ("Jennrich–Sampson (6)", 100),
+    // Every derivative is zero at the start.
+    ("Gulf (11)", 100),
+    // Polynomials of degree n far outside [0, 1]: ‖r‖² falls by orders of magnitude, but not within the limit.
+    // MINPACK's driver tries these from the standard start only.
+    ("Chebyquad, n = 8 (35)", 10),
+    ("Chebyquad, n = 8 (35)", 100),
+    ("Chebyquad, n = 9 (35)", 10),
+    ("Chebyquad, n = 9 (35)", 100),
+    ("Chebyquad, n = 10 (35)", 10),
+    ("Chebyquad, n = 10 (35)", 100),
+];
+
 /// Whether ‖r‖² is one of the known minima to six digits (zero: to rounding of a residual of order one).
 fn is_minimum(squares: f64, minima: &[f64]) -> bool {
     minima.iter().any(|&m| if m == 0.0 { squares < 1e-14 } else { (squares / m - 1.0).abs() < 1e-5 })
@@ -120,12 +142,12 @@ fn known_minima_from_three_starts() {
         max_iterations: 3000,
         ..Settings::default()
     };
-    let mut unexplained = Vec::new();
+    let mut lost = Vec::new();
     for problem in problems() {
-        for factor in [1.0, 10.0, 100.0] {
+        for factor in [1_u32, 10, 100] {
             // A start at zero is its own multiple; the driver of MINPACK uses the factor itself.
-            let zero = problem.start.iter().all(|&x| x == 0.0);
-            let start = problem.start.iter().map(|&x| if zero && factor > 1.0 { factor } else { factor * x });
+            let zero = factor > 1 && problem.start.iter().all(|&x| x == 0.0);
+            let start = problem.start.iter().map(|&x| f64::from(factor) * if zero { 1.0 } else { x });
             let start = DVector::from_iterator(problem.start.len(), start);
             let solution = minimise(Fit::new(&problem.analytic), start, &settings);
             let squares = 2.0 * solution.cost;
@@ -140,9 +162,9 @@ fn known_minima_from_three_starts() {
             assert!(solution.x.iter().all(|v| v.is_finite()), "{}", problem.name);
             assert_ne!(solution.termination, Termination::DerivativesNotFinite, "{}", problem.name);
             if !found {
-                unexplained.push((problem.name, factor as u32));
+                lost.push((problem.name, factor));
             }
         }
     }
-    assert_eq!(unexplained, []);
+    assert_eq!(lost, LOST);
 }

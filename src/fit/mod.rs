@@ -5,6 +5,7 @@
 
 mod derivative;
 mod identifiability;
+mod kernel;
 mod objective;
 mod triangle;
 mod uncertainty;
@@ -15,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{BlindCombination, Identifiability};
+pub(crate) use kernel::dot;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::triangle::sum_of_squares;
+use super::kernel::sum_of_squares;
 use super::{Block, LeastSquares, Linearisation, Objective, Triangle};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.

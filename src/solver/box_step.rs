@@ -215,14 +215,17 @@ mod tests {
     #[test]
     fn interior_point_and_polish_agree_on_a_badly_scaled_box() {
         let n = 8;
-        let matrix = DMatrix::from_fn(n, n, |i, j| {
-            let spread = 10.0_f64.powi(6 * i32::try_from(j).unwrap() / 8);
-            if i <= j { spread * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 }
-        });
+        let spread = |j: usize| 10.0_f64.powf(0.75 * j as f64);
+        let matrix =
+            DMatrix::from_fn(
+                n,
+                n,
+                |i, j| if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 },
+            );
         let constant = DVector::from_fn(n, |i, _| 1.0 + i as f64);
         let factor = Factor::new(matrix, constant, 1e-13);
-        let mut lower = DVector::from_element(n, -0.5);
-        let upper = DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 });
+        let mut lower = DVector::from_fn(n, |j, _| -0.5 / spread(j));
+        let upper = DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 / spread(j) });
         lower[2] = f64::NEG_INFINITY;
         for lambda in [0.0, 1e-3, 10.0] {
             let mut problem = BoxProblem::new(&factor, lower.clone(), upper.clone(), vec![None; n]);

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::pivoted::Pivoted;
 use super::spectrum::Spectrum;
 
 /// A length within this fraction of the radius fills it [Moré 1978].
@@ -10,23 +11,22 @@ pub(super) const RADIUS_SLACK: f64 = 0.1;
 /// min ‖B q + c‖ factorised once, to be solved for any damping.
 ///
 /// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
-/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, the Gauss–Newton step comes from it. Every other question goes to B = U Σ Vᵀ; without
-/// full rank, singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
+/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ, where singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
 /// combinations that the rows cannot see stay where they are.
 #[derive(Debug, Clone)]
 pub struct Factor {
     matrix: DMatrix<f64>,
     constant: DVector<f64>,
     tolerance: f64,
-    full_rank_step: Option<DVector<f64>>,
+    pivoted: Option<Pivoted>,
     spectrum: Option<Spectrum>,
 }
 
 impl Factor {
     /// Prepares min ‖B q + c‖; singular values up to `tolerance`·σ₁ count as zero.
     pub fn new(matrix: DMatrix<f64>, constant: DVector<f64>, tolerance: f64) -> Self {
-        let full_rank_step = pivoted_solution(&matrix, &constant, tolerance);
-        Self { matrix, constant, tolerance, full_rank_step, spectrum: None }
+        let pivoted = Pivoted::new(&matrix, &constant, tolerance);
+        Self { matrix, constant, tolerance, pivoted, spectrum: None }
     }
 
     /// B.
@@ -56,8 +56,8 @@ impl Factor {
 
     /// The Gauss–Newton step: the shortest minimiser of ‖B q + c‖.
     pub fn gauss_newton(&mut self) -> DVector<f64> {
-        match &self.full_rank_step {
-            Some(step) => step.clone(),
+        match &self.pivoted {
+            Some(pivoted) => pivoted.solution(),
             None => self.damped(0.0),
         }
     }
@@ -72,52 +72,18 @@ impl Factor {
 
     /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
-        if let Some(step) = &self.full_rank_step
-            && step.norm() <= (1.0 + RADIUS_SLACK) * radius
-        {
-            return (step.clone(), 0.0);
+        if let Some(found) = self.pivoted.as_ref().and_then(|pivoted| pivoted.limited(radius)) {
+            return found;
         }
         let lambda = self.spectrum().secular_root(radius);
         (self.damped(lambda), lambda)
     }
 
     fn spectrum(&mut self) -> &Spectrum {
-        let Self { matrix, constant, tolerance, full_rank_step, spectrum } = self;
-        let cut = if full_rank_step.is_some() { 0.0 } else { spectral_cut(matrix, *tolerance) };
+        let Self { matrix, constant, tolerance, pivoted, spectrum } = self;
+        let cut = if pivoted.is_some() { 0.0 } else { spectral_cut(matrix, *tolerance) };
         spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, cut))
     }
-}
-
-/// −B⁻¹c (least squares) by column-pivoted QR, or nothing when B has not full rank.
-fn pivoted_solution(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
-    let n = matrix.ncols();
-    if n == 0 || matrix.nrows() < n {
-        return None;
-    }
-    let sizes = column_sizes(matrix);
-    let mut unit = matrix.clone();
-    for (mut column, size) in unit.column_iter_mut().zip(&sizes) {
-        column /= *size;
-    }
-    let qr = unit.col_piv_qr();
-    let mut projected = -constant;
-    qr.q_tr_mul(&mut projected);
-    let r = qr.r();
-    let largest = r[(0, 0)].abs();
-    if r.diagonal().iter().any(|d| d.abs() <= tolerance * largest) {
-        return None;
-    }
-    let mut step = r.solve_upper_triangular(&projected.rows(0, n))?;
-    qr.p().inv_permute_rows(&mut step);
-    for (q, size) in step.iter_mut().zip(&sizes) {
-        *q /= size;
-    }
-    Some(step)
-}
-
-/// Lengths of the columns, one for a column of zeros.
-fn column_sizes(matrix: &DMatrix<f64>) -> Vec<f64> {
-    matrix.column_iter().map(|c| c.norm()).map(|size| if size > 0.0 { size } else { 1.0 }).collect()
 }
 
 /// The fraction of σ₁ that counts as zero, lowered (down to rounding) to keep short columns.
@@ -133,7 +99,8 @@ mod tests {
     use super::*;
 
     fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let matrix = DMatrix::from_fn(n, n, |i, j| if i <= j { ((3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
+        let matrix =
+            DMatrix::from_fn(n, n, |i, j| if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
         (matrix, DVector::from_fn(n, |i, _| (i as f64 + 0.5).cos()))
     }
 
@@ -169,6 +136,10 @@ mod tests {
         let step = factor.gauss_newton();
         assert!((step[0] - step[3]).abs() < 1e-12 * step.norm());
         assert!(step[4].abs() < 1e-14);
+        let (short, lambda) = factor.limited(0.1 * step.norm());
+        assert!((short.norm() / step.norm() - 0.1).abs() < 0.0101 && lambda > 0.0);
+        let normal = factor.matrix().tr_mul(&(factor.image(&short) + &constant)) + lambda * &short;
+        assert!(normal.norm() <= 1e-10 * factor.gradient().norm());
         assert_eq!(Factor::new(DMatrix::zeros(5, 5), constant, 1e-12).gauss_newton(), DVector::zeros(5));
     }
 }

@@ -6,7 +6,9 @@ mod bounded;
 mod box_step;
 mod factor;
 mod levenberg_marquardt;
+mod pivoted;
 mod run;
+mod settings;
 mod spectrum;
 mod termination;
 mod trust_region;
@@ -15,5 +17,6 @@ pub use bounded::{AtBound, Bounds, BoundsError, BoxConstrained, bounded_levenber
 pub use factor::Factor;
 pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use run::{Solution, minimise, minimise_bounded, minimise_bounded_observed, minimise_observed};
+pub use settings::Settings;
 pub use termination::Termination;
-pub use trust_region::{Settings, State, Step, Subproblem, TrustRegion};
+pub use trust_region::{State, Step, Subproblem, TrustRegion};

@@ -28,6 +28,43 @@ pub struct Solution {
 }
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
+///
+/// ```
+/// use std::ops::Range;
+///
+/// use flexcal::fit::{Block, Fit, LeastSquares};
+/// use flexcal::solver::{Settings, minimise};
+/// use nalgebra::{DVector, dvector};
+///
+/// /// Readings of an exponential decay y = x₀ exp(−x₁ t) at t = 0, 1, 2, 3.
+/// struct Decay([f64; 4]);
+///
+/// impl LeastSquares for Decay {
+///     fn parameters(&self) -> usize { 2 }
+///     fn items(&self) -> usize { 4 }
+///     fn rows_per_item(&self) -> usize { 1 }
+///
+///     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+///         for (out, t) in out.iter_mut().zip(items) {
+///             *out = self.0[t] - x[0] * (-x[1] * t as f64).exp();
+///         }
+///     }
+///
+///     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+///         self.residuals(x, items.clone(), block.column_mut(2));
+///         for (row, t) in items.enumerate() {
+///             let decay = (-x[1] * t as f64).exp();
+///             block.column_mut(0)[row] = -decay;
+///             block.column_mut(1)[row] = x[0] * t as f64 * decay;
+///         }
+///     }
+/// }
+///
+/// let decay = Decay([2.0, 1.0, 0.5, 0.25]);
+/// let solution = minimise(Fit::new(&decay), dvector![1.0, 0.0], &Settings::default());
+/// assert!(solution.termination.converged());
+/// assert!((solution.x[1] - 2.0_f64.ln()).abs() < 1e-9);
+/// ```
 pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
     run(objective, start, levenberg_marquardt(*settings), settings, None::<Silent>)
 }

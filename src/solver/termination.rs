@@ -4,6 +4,9 @@ use std::fmt;
 
 /// Why a solver stopped, with the inequality that held.
 ///
+/// The tests on cost and step are those of MINPACK (info 1 to 8), with one exception: a step that only the radius kept
+/// short and that went as predicted (λ > 0 and ρ ≥ ¾) is not judged, since the next one will be longer.
+///
 /// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction of ½‖r‖²; ε = 2⁻⁵².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Termination {

@@ -4,7 +4,7 @@ use argmin::core::{ArgminError, Error, IterState, KV, Problem, Solver, State as 
 use argmin::kv;
 use nalgebra::DVector;
 
-use super::Termination;
+use super::{Settings, Termination};
 use crate::fit::{Linearisation, Objective};
 
 /// The part of argmin's state in use: x and ½‖r‖².
@@ -14,36 +14,6 @@ pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 const ACCEPT: f64 = 1e-4;
 /// The radius grows when ρ reaches this.
 const GOOD: f64 = 0.75;
-
-/// When to stop, and how boldly to start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Largest cosine between residual and derivatives at a minimum; default 1e-10.
-    pub gradient_tolerance: f64,
-    /// Smallest relative reduction of the cost worth a step; default 1e-12.
-    pub cost_tolerance: f64,
-    /// Smallest step worth taking, relative to x, both scaled; default 1e-10.
-    pub step_tolerance: f64,
-    /// Singular values of the scaled Jacobian up to this fraction of the largest count as zero; default 1e-12.
-    pub rank_tolerance: f64,
-    /// First radius as a multiple of ‖D x‖; default 100.
-    pub initial_radius: f64,
-    /// Largest number of steps tried, taken or not; default 500.
-    pub max_iterations: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            gradient_tolerance: 1e-10,
-            cost_tolerance: 1e-12,
-            step_tolerance: 1e-10,
-            rank_tolerance: 1e-12,
-            initial_radius: 100.0,
-            max_iterations: 500,
-        }
-    }
-}
 
 /// A step within the radius, as the linearised problem sees it.
 #[derive(Debug, Clone)]
@@ -95,15 +65,13 @@ pub struct TrustRegion<S> {
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
-    /// Whether the linearisation at x is in the subproblem.
-    prepared: bool,
     termination: Option<Termination>,
 }
 
 impl<S: Subproblem> TrustRegion<S> {
     /// The loop around `subproblem`.
     pub fn new(subproblem: S, settings: Settings) -> Self {
-        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, prepared: false, termination: None }
+        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, termination: None }
     }
 
     /// Why it stopped, once it has.
@@ -135,6 +103,9 @@ impl<S: Subproblem> TrustRegion<S> {
             return Some(Termination::ZeroResidual);
         }
         let norms = DVector::from_iterator(x.len(), triangle.column_iter().map(|c| c.norm()));
+        if !norms.iter().all(|norm| norm.is_finite()) {
+            return Some(Termination::DerivativesNotFinite);
+        }
         self.scale = match self.radius {
             None => norms.map(|norm| if norm == 0.0 { 1.0 } else { norm }),
             Some(_) => self.scale.sup(&norms),
@@ -154,7 +125,7 @@ impl<S: Subproblem> TrustRegion<S> {
         if self.radius.is_none() {
             let length = self.scale.component_mul(x).norm();
             let factor = self.settings.initial_radius;
-            self.radius = Some(if length > 0.0 { factor * length } else { factor });
+            self.radius = Some(residual.max(if length > 0.0 { factor * length } else { factor }));
         }
         None
     }
@@ -250,7 +221,6 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         } else {
             Some(Termination::OutsideDomainAtStart)
         };
-        self.prepared = true;
         let state = state.param(x).cost(linearisation.cost);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
     }
@@ -258,13 +228,6 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
     fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         let cost = state.get_cost();
-        if !self.prepared {
-            let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
-            if let Some(termination) = self.take_in(&x, &linearisation) {
-                return Ok((self.stop(state.param(x).cost(cost), termination), None));
-            }
-            self.prepared = true;
-        }
         let first = state.get_iter() == 0;
         let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
         let step = self.subproblem.step(&x, radius);
@@ -277,9 +240,12 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let taken = trial.ratio >= ACCEPT;
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
-        let termination = self.judge(&trial, size);
+        let mut termination = self.judge(&trial, size);
         let state = if taken {
-            self.prepared = false;
+            if termination.is_none() {
+                let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
+                termination = self.take_in(&step.point, &linearisation);
+            }
             state.param(step.point).cost(trial.cost)
         } else {
             state.param(x).cost(cost)

@@ -238,7 +238,7 @@ pub fn variable<D: Scalar>(x: &[D]) -> Vec<D> {
 
 pub fn trigonometric<D: Scalar>(x: &[D]) -> Vec<D> {
     let n = x.len() as f64;
-    let cosines = sum(x.iter().map(|x| x.cos()));
+    let cosines = sum(x.iter().map(DualNum::cos));
     x.iter().zip(1..).map(|(x, i)| -cosines + n + (-x.cos() + 1.0) * f64::from(i) - x.sin()).collect()
 }
 

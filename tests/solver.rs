@@ -1,0 +1,21 @@
+//! Solvers against certified results, and what they promise at the edges: rank deficiency, bounds, threads.
+
+#![expect(clippy::unwrap_used, reason = "tests may panic")]
+
+mod common;
+
+#[path = "solver/bounds.rs"]
+mod bounds;
+#[path = "solver/derivatives.rs"]
+mod derivatives;
+#[path = "solver/edges.rs"]
+mod edges;
+#[path = "more_garbow_hillstrom/functions.rs"]
+#[expect(dead_code, reason = "only some of the functions are needed here")]
+mod functions;
+#[path = "solver/nist.rs"]
+mod nist;
+#[path = "solver/speed.rs"]
+mod speed;
+#[path = "solver/threads.rs"]
+mod threads;
