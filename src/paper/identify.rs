@@ -1,0 +1,230 @@
+//! The paper's procedure: stiffness by linear least squares, then geometry by the iterated pseudo-inverse, eq. 42-45.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::form::{Form, Misprint, Reading};
+use super::loads::Setup;
+use super::{EndPoint, Parameters};
+use crate::fit::{Block, Fit, LeastSquares};
+use crate::problem::Problem;
+use crate::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse};
+
+/// Implicit QR steps allowed to a singular value decomposition.
+const SVD_STEPS: usize = 1000;
+
+/// A pose with its measured position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured<'a> {
+    /// What was set.
+    pub setup: Setup<'a>,
+    /// `PE_meas`, measuring frame [m].
+    pub position: Vector3<f64>,
+}
+
+/// How to identify.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Which formulas.
+    pub reading: Reading,
+    /// Singular values of the elastic Jacobian, its columns multiplied by the nominal flexibilities, up to this fraction of
+    /// the largest are dropped: those combinations keep their nominal value. Default 0.01.
+    pub stiffness_tolerance: f64,
+    /// The iteration of eq. 45.
+    pub iteration: PseudoInverseSettings,
+}
+
+impl From<Form> for Options {
+    fn from(form: Form) -> Self {
+        let iteration = PseudoInverseSettings { tolerance: 1e-6, ..PseudoInverseSettings::default() };
+        Self { reading: form.into(), stiffness_tolerance: 1e-2, iteration }
+    }
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identified {
+    /// E and S; flexibilities come out as the data have them, even below zero.
+    pub parameters: Parameters,
+    /// The iteration of eq. 45: why it stopped, after how many steps; its x are the errors e from nominal.
+    pub iteration: Solution,
+}
+
+/// Poses that the procedure cannot use.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum IdentifyError {
+    /// Three coordinates a pose are fewer equations than the 5n unknowns of eq. 42.
+    #[error("identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}")]
+    TooFewPoses {
+        /// Unknowns of eq. 42.
+        unknowns: usize,
+        /// Poses needed.
+        needed: usize,
+        /// Poses given.
+        poses: usize,
+    },
+    /// A configuration of another arm.
+    #[error("pose {pose} has {found} joints, the arm {expected}")]
+    Joints {
+        /// Number of the pose, from 1.
+        pose: usize,
+        /// Joints of the pose.
+        found: usize,
+        /// Joints of the arm.
+        expected: usize,
+    },
+    /// Residuals of the stiffness stage are not finite.
+    #[error("a measured position or a deflection at nominal geometry is not finite")]
+    NotFinite,
+}
+
+/// x = A⁺ b with singular values up to `tolerance`·σ₁ dropped                             [Chen2021, eq. 43, 44]
+///
+/// `None` where A or b is not finite, or they differ in rows.
+pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
+    if a.nrows() != b.len() || !a.iter().chain(b.iter()).all(|value| value.is_finite()) {
+        return None;
+    }
+    if a.is_empty() {
+        return Some(DVector::zeros(a.ncols()));
+    }
+    let svd = a.clone().try_svd(true, true, f64::EPSILON, SVD_STEPS)?;
+    let cut = tolerance.max(0.0) * svd.singular_values.max();
+    svd.solve(b, cut).ok()
+}
+
+/// Identifies stiffness, then geometry, from measured positions; one sweep.
+///
+/// 1. At nominal geometry `D_f` is linear in the flexibilities: c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀] (§3.3: stiffness
+///    comes first; the paper does not print its equations).
+/// 2. With these fixed, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`], E_{j+1} = E_j + e_{j+1}, until e
+///    is negligible                                                                     [Chen2021, eq. 45]
+///
+/// All flexibilities that the problem gives and all 5n geometric parameters are unknown, whatever `[parameters]` says; base
+/// and target are known. Printed differently: `BetaLeftOut`, the text to eq. 45 has E_j = [α a θ d]ᵀ, so that β stays
+/// nominal, though e has it and table 2 identifies it.
+///
+/// # Errors
+/// The poses do not fit the arm, are too few for eq. 42, or are not finite. A diverging iteration is not an error: it is
+/// told in [`Identified::iteration`].
+pub fn identify(problem: &Problem, poses: &[Measured], options: &Options) -> Result<Identified, IdentifyError> {
+    let expected = problem.joints.len();
+    for (pose, measured) in poses.iter().enumerate() {
+        let found = measured.setup.configuration.len();
+        if found != expected {
+            return Err(IdentifyError::Joints { pose: pose + 1, found, expected });
+        }
+    }
+    let unknowns = geometric_unknowns(expected, &options.reading);
+    let needed = unknowns.len().div_ceil(3);
+    if poses.len() < needed {
+        return Err(IdentifyError::TooFewPoses { unknowns: unknowns.len(), needed, poses: poses.len() });
+    }
+    let mut parameters = stiffness(problem, poses, options).ok_or(IdentifyError::NotFinite)?;
+    let geometry = GeometryResiduals { problem, poses, parameters: &parameters, unknowns, reading: options.reading };
+    let start = DVector::zeros(geometry.unknowns.len());
+    let iteration = minimise_pseudo_inverse(Fit::new(&geometry), start, &options.iteration);
+    let identified = geometry.at(&iteration.x);
+    parameters.geometry = identified.geometry;
+    Ok(Identified { parameters, iteration })
+}
+
+/// Flexibilities by linear least squares at nominal geometry; `None` where something is not finite.
+pub fn stiffness(problem: &Problem, poses: &[Measured], options: &Options) -> Option<Parameters> {
+    let mut parameters = Parameters::nominal(problem);
+    let unknowns = parameters.flexibilities();
+    let mut columns = DMatrix::zeros(3 * poses.len(), unknowns.len());
+    let mut rest = DVector::zeros(3 * poses.len());
+    for (row, pose) in poses.iter().enumerate() {
+        let end = EndPoint::new(problem, &parameters, &pose.setup, &options.reading);
+        rest.fixed_rows_mut::<3>(3 * row).copy_from(&(pose.position - end.position(&parameters)));
+        for (column, &which) in unknowns.iter().enumerate() {
+            let derivative = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
+            columns.fixed_view_mut::<3, 1>(3 * row, column).copy_from(&derivative);
+        }
+    }
+    let relative = least_squares(&columns, &rest, options.stiffness_tolerance)?;
+    for (&which, change) in unknowns.iter().zip(&relative) {
+        parameters.set(which, parameters.get(which) * (1.0 + change));
+    }
+    Some(parameters)
+}
+
+/// The geometric parameters that eq. 45 corrects, as places in e = [e₁ … e_n].
+fn geometric_unknowns(joints: usize, reading: &Reading) -> Vec<usize> {
+    let beta = 4;
+    (0..5 * joints).filter(|k| k % 5 != beta || !reading.keeps(Misprint::BetaLeftOut)).collect()
+}
+
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
+///
+/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near the minimum of ‖r‖, not
+/// in it.
+pub struct GeometryResiduals<'a> {
+    problem: &'a Problem,
+    poses: &'a [Measured<'a>],
+    parameters: &'a Parameters,
+    unknowns: Vec<usize>,
+    reading: Reading,
+}
+
+impl<'a> GeometryResiduals<'a> {
+    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are places in
+    /// e = [e₁ … e_n], and every pose has as many joints as the arm.
+    pub fn new(
+        problem: &'a Problem,
+        poses: &'a [Measured<'a>],
+        parameters: &'a Parameters,
+        unknowns: Vec<usize>,
+        reading: Reading,
+    ) -> Self {
+        Self { problem, poses, parameters, unknowns, reading }
+    }
+
+    /// The parameters at errors `x` of the unknowns.
+    pub fn at(&self, x: &DVector<f64>) -> Parameters {
+        let mut parameters = self.parameters.clone();
+        for (&place, x) in self.unknowns.iter().zip(x) {
+            *parameters.geometry[place / 5].fields_mut()[place % 5] += x;
+        }
+        parameters
+    }
+}
+
+impl LeastSquares for GeometryResiduals<'_> {
+    fn parameters(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn items(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        3
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        let parameters = self.at(x);
+        for (pose, out) in self.poses[items].iter().zip(out.chunks_exact_mut(3)) {
+            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
+            out.copy_from_slice((pose.position - end.position(&parameters)).as_slice());
+        }
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        let parameters = self.at(x);
+        for (item, pose) in self.poses[items].iter().enumerate() {
+            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
+            let rows = 3 * item..3 * item + 3;
+            let jacobian = end.jacobian();
+            for (column, &place) in self.unknowns.iter().enumerate() {
+                let derivative = -jacobian.column(place);
+                block.column_mut(column)[rows.clone()].copy_from_slice(derivative.as_slice());
+            }
+            let residual = pose.position - end.position(&parameters);
+            block.column_mut(self.unknowns.len())[rows].copy_from_slice(residual.as_slice());
+        }
+    }
+}
