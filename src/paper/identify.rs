@@ -7,12 +7,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::form::{Form, Misprint, Reading};
 use super::loads::Setup;
 use super::{EndPoint, Parameters};
-use crate::fit::{Block, Fit, LeastSquares};
+use crate::fit::{Block, Fit, LeastSquares, Triangle};
 use crate::problem::Problem;
-use crate::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse};
-
-/// Implicit QR steps allowed to a singular value decomposition.
-const SVD_STEPS: usize = 1000;
+use crate::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
 
 /// A pose with its measured position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,12 +83,14 @@ pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Opti
     if a.nrows() != b.len() || !a.iter().chain(b.iter()).all(|value| value.is_finite()) {
         return None;
     }
-    if a.is_empty() {
-        return Some(DVector::zeros(a.ncols()));
+    let mut block = Block::zeros(a.nrows(), a.ncols());
+    for (j, column) in a.column_iter().enumerate() {
+        block.column_mut(j).iter_mut().zip(&column).for_each(|(to, from)| *to = *from);
     }
-    let svd = a.clone().try_svd(true, true, f64::EPSILON, SVD_STEPS)?;
-    let cut = tolerance.max(0.0) * svd.singular_values.max();
-    svd.solve(b, cut).ok()
+    block.column_mut(a.ncols()).iter_mut().zip(b).for_each(|(to, from)| *to = -from);
+    let mut triangle = Triangle::new(a.ncols());
+    triangle.absorb(&mut block);
+    Some(minimum_norm_step(&triangle.into_linearisation(), tolerance))
 }
 
 /// Identifies stiffness, then geometry, from measured positions; one sweep.

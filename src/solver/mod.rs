@@ -22,7 +22,7 @@ pub use factor::Factor;
 pub use gauss_newton::{GaussNewtonSettings, minimise_gauss_newton};
 pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use pseudo_inverse::{
-    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed,
+    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed, minimum_norm_step,
 };
 pub use run::{Solution, minimise, minimise_bounded, minimise_bounded_observed, minimise_observed};
 pub use settings::Settings;

@@ -80,6 +80,14 @@ impl PseudoInverse {
     }
 }
 
+/// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁ are dropped.
+///
+/// R and Qᵀr must be finite.
+pub fn minimum_norm_step(linearisation: &Linearisation, tolerance: f64) -> DVector<f64> {
+    let Linearisation { triangle, projected, .. } = linearisation;
+    Spectrum::new(triangle, projected, tolerance.max(0.0)).solution(0.0, projected.len())
+}
+
 /// x out of argmin's state.
 fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
     let text = "a solver needs a start".to_owned();
@@ -110,9 +118,7 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         let x = take_point(&mut state)?;
         let step = self.linearisation.take().map_or_else(
             || DVector::zeros(x.len()),
-            |Linearisation { triangle, projected, .. }| {
-                Spectrum::new(&triangle, &projected, self.settings.tolerance).solution(0.0, x.len())
-            },
+            |linearisation| minimum_norm_step(&linearisation, self.settings.tolerance),
         );
         let length = step.norm();
         let point = &x + step;
