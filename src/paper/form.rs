@@ -11,33 +11,39 @@ pub enum Form {
 }
 
 /// A misprint that changes a formula; each is documented where the formula stands.
+///
+/// Sizes: the largest change of the end point on the lunar sampler over the 40 poses of `tests/golden`, of a deflection of up
+/// to 62 mm at nominal geometry, or of 49 mm of geometric error at table 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Misprint {
-    /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³.
+    /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³; 2.8 mm.
     TipForceLever,
-    /// Eq. 4: the hoist stretches link B but does not bend it.
+    /// Eq. 4: the hoist stretches link B but does not bend it; 3.1 mm.
     HoistBending,
-    /// Eq. 4, 5, 7: slopes stand in each other's places, or without their sign.
+    /// Eq. 4, 5, 7: slopes stand in each other's places, or without their sign; 3.4 mm.
     SlopePlaces,
-    /// Eq. 6: q l²/(EA) for q l²/(2EA).
+    /// Eq. 6: q l²/(EA) for q l²/(2EA); 0.0012 mm.
     Stretch,
-    /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
+    /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it; 28 mm.
     HoistBeyond,
-    /// Eq. 10: joint 2 has the length of joint 3.
+    /// Eq. 10: joint 2 has the length of joint 3; none for the nominal arm, 2.2 mm with the offsets of table 2.
     JointTwoLength,
-    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same for β = 0.
+    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same for β = 0, 0.0009 mm at table 2.
     JointAxis,
-    /// Eq. 16: `U_i` for `U_{i+1}`.
+    /// Eq. 16: `U_i` for `U_{i+1}`; 21 mm.
     TransferIndex,
-    /// Eq. 21: the deflection acts at the link's root, not at its tip.
+    /// Eq. 21: the deflection acts at the link's root, not at its tip; 31 mm.
     LinkSide,
-    /// Eq. 23-25: carried to the end point by the frames before the link, not by those after it.
+    /// Eq. 23-25: carried to the end point by the frames before the link, not by those after it; 49 mm as in eq. 25,
+    /// 44 mm as in eq. 24.
     LinkTransfer,
-    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` for `T_i` `Δ_i`.
+    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` for `T_i` `Δ_i`; 101 mm at table 2.
     GeometricSide,
-    /// Eq. 37, 39: motions of the end frame are taken for motions in the measuring frame.
+    /// Eq. 37, 39: motions of the end frame are taken for motions in the measuring frame; 92 mm of deflection,
+    /// 92 mm of geometric error at table 2.
     EndFrame,
-    /// Eq. 45: `E_j` has no β.
+    /// Eq. 45: `E_j` has no β. Those of table 2 move the end point by 21 mm; other parameters make up for most of it where
+    /// the axes are parallel: 0.03 mm more are left after eq. 45.
     BetaLeftOut,
 }
 

@@ -73,8 +73,8 @@ pub struct Loads {
     pub joints: Vec<JointLoads>,
 }
 
-/// A force somewhere on the arm, base frame.
-struct Force {
+/// A force [N] somewhere on the arm [m], base frame.
+struct Load {
     at: Vector3<f64>,
     force: Vector3<f64>,
     hoist: bool,
@@ -86,7 +86,7 @@ impl Loads {
         let gravity = problem.gravity;
         let n = problem.joints.len();
         let mut forces = Vec::new();
-        let push = |forces: &mut Vec<Force>, at, force, hoist| forces.push(Force { at, force, hoist });
+        let push = |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
         let (axes, origin) = split(&chain.before[n]);
         let payload = setup.payload.unwrap_or(problem.tool.payload_mass);
         push(&mut forces, origin + axes * problem.tool.payload_at, gravity * payload, false);
@@ -137,8 +137,8 @@ fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -
 }
 
 /// Sum of the weights or of the hoists, with moments about a point, base frame.
-fn about(forces: &[Force], point: Vector3<f64>, hoist: bool) -> Wrench {
-    forces.iter().filter(|force| force.hoist == hoist).fold(Wrench::default(), |sum, load| Wrench {
+fn about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
+    forces.iter().filter(|load| load.hoist == hoist).fold(Wrench::default(), |sum, load| Wrench {
         force: sum.force + load.force,
         moment: sum.moment + (load.at - point).cross(&load.force),
     })

@@ -42,7 +42,7 @@ mod transfer;
 pub use end_point::EndPoint;
 pub use form::{Form, Misprint, Reading};
 pub use identify::{
-    GeometryResiduals, Identified, IdentifyError, Measured, Options, identify, least_squares, stiffness,
+    GeometryResiduals, Identified, IdentifyError, Measured, Options, StiffnessStage, identify, least_squares, stiffness,
 };
 pub use kinematics::{Chain, Mdh};
 pub use link::{LinkFlexibility, LinkTerms};

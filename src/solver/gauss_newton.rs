@@ -45,22 +45,22 @@ pub fn minimise_gauss_newton<O: Objective>(
         termination: None,
     });
     let adapter = Adapter { objective, seen };
-    let unfinished = |termination| Solution {
+    let mut solution = Solution {
         at_bound: vec![None; start.len()],
-        x: start.clone(),
+        x: start,
         cost: f64::INFINITY,
-        termination,
+        termination: Termination::SizeMismatch,
         iterations: 0,
         cost_evaluations: 0,
         linearisations: 0,
     };
-    if adapter.objective.parameters() != start.len() {
-        return unfinished(Termination::SizeMismatch);
+    if adapter.objective.parameters() != solution.x.len() {
+        return solution;
     }
     let method = GaussNewton::new();
     let method = method.clone().with_tolerance(settings.tolerance).unwrap_or(method);
     let result = Executor::new(&adapter, method)
-        .configure(|state: GaussNewtonState| state.param(start.clone()).max_iters(settings.max_iterations))
+        .configure(|state: GaussNewtonState| state.param(solution.x.clone()).max_iters(settings.max_iterations))
         .ctrlc(false)
         .timer(false)
         .run();
@@ -77,7 +77,7 @@ pub fn minimise_gauss_newton<O: Objective>(
         Err(_) => (Termination::Singular, None),
     };
     let Seen { last, best, linearisations, termination, .. } = adapter.seen.into_inner();
-    let mut solution = unfinished(termination.unwrap_or(finished));
+    solution.termination = termination.unwrap_or(finished);
     solution.iterations = iterations.unwrap_or_else(|| linearisations.saturating_sub(1));
     solution.linearisations = linearisations;
     (solution.x, solution.cost) = match last {

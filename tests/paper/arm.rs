@@ -76,6 +76,16 @@ pub fn rigid_problem() -> Problem {
     problem
 }
 
+/// The same arm in general position: base and gravity askew, a link along −x, so that every term matters.
+pub fn askew(mut problem: Problem) -> Problem {
+    problem.gravity = Vector3::new(2.0, -3.0, -9.0);
+    problem.base.translation = Vector3::new(0.5, -0.2, 0.1);
+    problem.base.rotation = Vector3::new(0.3, -0.8, 1.1);
+    problem.joints[2].a = -1.95;
+    problem.joints[3].kind = flexcal::problem::JointKind::Prismatic;
+    problem
+}
+
 pub fn table_2() -> Vec<Mdh> {
     let row = |[alpha, a, theta, d, beta]: [f64; 5]| Mdh {
         alpha: alpha.to_radians(),

@@ -6,7 +6,7 @@ use flexcal::paper::{
 use flexcal::parameter::{BeamField, JointField, Slot};
 use nalgebra::{DVector, Matrix4, Vector6};
 
-use super::arm::{both, dual_jacobian, end, model, problem, rows};
+use super::arm::{askew, both, dual_jacobian, end, model, problem, rows};
 
 fn near(a: f64, b: f64) {
     assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{a} {b}");
@@ -163,38 +163,39 @@ fn d_f_of_eq_27_agrees_with_the_independent_simulator_only_when_corrected() {
 
 #[test]
 fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
-    let problem = problem();
-    let model = model(&problem);
     let soft = 1e-10_f64;
     let mut worst = 0.0_f64;
-    for parameters in both(&problem) {
-        // x = ln(stiffness / nominal): everything 10¹⁰ times as stiff.
-        let geometry = parameters.geometry.clone();
-        let x = DVector::from_iterator(
-            model.parameters.len(),
-            model.parameters.iter().map(|parameter| match super::arm::place_in_e(parameter) {
-                Some(place) => *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal,
-                None => -soft.ln(),
-            }),
-        );
-        for row in rows("first_order.csv") {
-            let dual = dual_jacobian(&model, &row, &x);
-            let end = end(&problem, &parameters, &row, Form::Corrected);
-            for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
-                let which = match parameter.slot {
-                    Slot::Joint { joint, field: JointField::Stiffness } => Flexibility::Joint(joint),
-                    Slot::Beam { joint, field } => match field {
-                        BeamField::Axial => Flexibility::Axial(joint),
-                        BeamField::Bending => Flexibility::Bending(joint),
-                        BeamField::BendingY => Flexibility::BendingY(joint),
-                        BeamField::BendingZ => Flexibility::BendingZ(joint),
-                        BeamField::Twist => Flexibility::Twist(joint),
-                    },
-                    _ => continue,
-                };
-                // ∂p/∂x = −c ∂p/∂c, at c = nominal · soft.
-                let closed = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
-                worst = worst.max((closed + column / soft).amax());
+    for problem in [problem(), askew(problem())] {
+        let model = model(&problem);
+        for parameters in both(&problem) {
+            // x = ln(stiffness / nominal): everything 10¹⁰ times as stiff.
+            let geometry = parameters.geometry.clone();
+            let x = DVector::from_iterator(
+                model.parameters.len(),
+                model.parameters.iter().map(|parameter| match super::arm::place_in_e(parameter) {
+                    Some(place) => *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal,
+                    None => -soft.ln(),
+                }),
+            );
+            for row in rows("first_order.csv") {
+                let dual = dual_jacobian(&model, &row, &x);
+                let end = end(&problem, &parameters, &row, Form::Corrected);
+                for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
+                    let which = match parameter.slot {
+                        Slot::Joint { joint, field: JointField::Stiffness } => Flexibility::Joint(joint),
+                        Slot::Beam { joint, field } => match field {
+                            BeamField::Axial => Flexibility::Axial(joint),
+                            BeamField::Bending => Flexibility::Bending(joint),
+                            BeamField::BendingY => Flexibility::BendingY(joint),
+                            BeamField::BendingZ => Flexibility::BendingZ(joint),
+                            BeamField::Twist => Flexibility::Twist(joint),
+                        },
+                        _ => continue,
+                    };
+                    // ∂p/∂x = −c ∂p/∂c, at c = nominal · soft.
+                    let closed = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
+                    worst = worst.max((closed + column / soft).amax());
+                }
             }
         }
     }

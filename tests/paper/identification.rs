@@ -1,7 +1,9 @@
 //! The paper's procedure end to end, eq. 42-45, on positions of the dual-number model.
 
 use flexcal::arm::{Equilibrated, Workspace};
-use flexcal::paper::{Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading, identify};
+use flexcal::paper::{
+    Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading, StiffnessStage, identify,
+};
 use flexcal::problem::Problem;
 use flexcal::solver::Termination;
 use nalgebra::{DVector, Vector3};
@@ -36,42 +38,74 @@ fn mean_error(problem: &Problem, rows: &[Row], poses: &[Measured], parameters: &
     errors.sum::<f64>() / rows.len() as f64
 }
 
+struct Case<'a> {
+    problem: &'a Problem,
+    rows: &'a [Row],
+    poses: Vec<Measured<'a>>,
+}
+
+impl Case<'_> {
+    /// Identifies, and judges by the mean error on the other poses [mm].
+    fn run(&self, options: Options) -> (Identified, f64) {
+        let found = identify(self.problem, &self.poses[..FITTED], &options).unwrap();
+        let error = self.judge(&found.parameters, options.reading);
+        let Identified { iteration, .. } = &found;
+        println!("{error:.4} mm; {} after {} steps", iteration.termination, iteration.iterations);
+        (found, error)
+    }
+
+    fn judge(&self, parameters: &Parameters, reading: Reading) -> f64 {
+        mean_error(self.problem, &self.rows[FITTED..], &self.poses[FITTED..], parameters, reading)
+    }
+}
+
+const KNOWN: StiffnessStage = StiffnessStage::Nominal;
+
 #[test]
-fn procedure_with_stiffness_known_well_enough_finds_the_arm() {
-    let problem = problem();
-    let rows = rows("equilibrium.csv");
-    for (part, stiffness, limit) in [(0.0, 0.8, 1e9), (1.0, 1.0, 1e9), (1.0, 0.8, 1e9)] {
-        let poses = measured(&problem, &rows, part, stiffness);
-        let judge = |parameters: &Parameters, reading: Reading| {
-            mean_error(&problem, &rows[FITTED..], &poses[FITTED..], parameters, reading)
-        };
-        let nominal = judge(&Parameters::nominal(&problem), Reading::default());
-        for options in [
-            Options::from(Form::Corrected),
-            Options {
-                reading: Reading::default().with(Misprint::BetaLeftOut, Form::Printed),
-                ..Form::Corrected.into()
-            },
-            Options::from(Form::Printed),
-            Options { stiffness_tolerance: 1.0, ..Form::Corrected.into() },
-            Options { stiffness_tolerance: 0.1, ..Form::Corrected.into() },
-            Options { stiffness_tolerance: 0.0, ..Form::Corrected.into() },
-        ] {
-            let Identified { parameters, iteration } = identify(&problem, &poses[..FITTED], &options).unwrap();
-            println!(
-                "e × {part}, k × {stiffness}: held out {nominal:.3} -> {:.5} mm; {} after {}",
-                judge(&parameters, options.reading),
-                iteration.termination,
-                iteration.iterations
-            );
-            let c = parameters
-                .flexibilities()
-                .iter()
-                .map(|&w| parameters.get(w) / Parameters::nominal(&problem).get(w))
-                .collect::<Vec<_>>();
-            println!("   {c:.3?}");
-        }
-        assert!(limit > 0.0);
+fn stiffness_first_works_where_the_geometry_is_nominal() {
+    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 0.0, 0.8) };
+    assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 7.0);
+    let (found, error) = case.run(Form::Corrected.into());
+    assert!(error < 0.2 && found.iteration.termination.converged());
+    // What is left is of second order: positions bend round corners, D_f does not.
+    let (_, error) = case.run(Options { stiffness: KNOWN, ..Form::Corrected.into() });
+    assert!((1.0..2.5).contains(&error), "a stiffness known wrongly by a fifth is made up for by geometry, in part");
+}
+
+#[test]
+fn geometry_is_found_with_the_stiffness_known() {
+    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
+    assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 40.0);
+    let (found, error) = case.run(Options { stiffness: KNOWN, ..Form::Corrected.into() });
+    assert!(error < 0.1 && found.iteration.termination.converged() && found.iteration.iterations <= 10);
+}
+
+#[test]
+fn one_sweep_takes_geometric_errors_for_deflection() {
+    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
+    let (found, error) = case.run(Form::Corrected.into());
+    assert!((5.0..15.0).contains(&error));
+    let nominal = Parameters::nominal(&problem);
+    let times: Vec<f64> = nominal.flexibilities().iter().map(|&c| found.parameters.get(c) / nominal.get(c)).collect();
+    println!("flexibilities over nominal {times:.2?}");
+    assert!(times.iter().any(|&c| c > 5.0) && times.iter().any(|&c| c < 0.0));
+}
+
+#[test]
+fn printed_forms_do_not_find_the_arm() {
+    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
+    for stiffness in [KNOWN, Options::from(Form::Printed).stiffness] {
+        let (found, error) = case.run(Options { stiffness, ..Form::Printed.into() });
+        assert!(error > 20.0 && found.iteration.termination == Termination::Diverged);
+    }
+    for misprint in Misprint::ALL {
+        let reading = Reading::default().with(misprint, Form::Printed);
+        print!("{misprint:?} alone: ");
+        case.run(Options { reading, stiffness: KNOWN, ..Form::Corrected.into() });
     }
 }
 
@@ -90,5 +124,4 @@ fn poses_that_cannot_be_used_are_named() {
     let mut broken = poses;
     broken[0].position = Vector3::from_element(f64::NAN);
     assert_eq!(identify(&problem, &broken, &options).unwrap_err(), IdentifyError::NotFinite);
-    assert_ne!(Termination::Diverged, Termination::Singular);
 }

@@ -8,7 +8,7 @@ use flexcal::solver::{
 };
 use nalgebra::{DVector, Vector3};
 
-use super::arm::{Row, model, rigid_problem, rows, x_of_table_2};
+use super::arm::{Row, model, rigid_problem, rows};
 
 /// Poses of the rigid arm measured with the geometry of table 2, exactly.
 fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
@@ -91,7 +91,7 @@ fn gauss_newton_reports_a_singular_jacobian() {
     let problem = rigid_problem();
     let model = model(&problem);
     let rows = rows("rigid.csv");
-    // d of joint 1 and the target on axis 4: nothing there for β of joint 4 to move.
+    // The target on axis 4: nothing there for θ₄ to move.
     let mut on_axis = problem.clone();
     on_axis.tool.target.fill(0.0);
     let hidden = Model::new(&on_axis, &[String::new()], &[String::new()]).unwrap();
