@@ -1,5 +1,7 @@
 //! The command line as users meet it: exit status, messages, and that bad input leaves nothing behind.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -38,13 +38,15 @@ pub(super) struct Element<'a, S> {
 /// An element that has bent.
 ///
 /// Deflections are taken relative to the chord from root to tip and forces are resolved along it: what the closed form
-/// neglects (the axial force's lever on the bent axis, the shortening of a bent axis) is then small of higher order.
+/// neglects (the axial force's lever on the bent axis, the shortening of a bent axis) is then small of higher order. The
+/// chord's frame has half the tip's twist, as the section in the middle has: rotations and bending planes then err alike
+/// on both sides of it, and the error of n elements falls with n².
 pub(super) struct BentElement<'a, S> {
     element: &'a Element<'a, S>,
     cantilever: Cantilever<'a, S>,
-    /// Frame at the root, x along the chord.
+    /// Frame at the root, x along the chord, turned about it by half the twist.
     chord: Frame<S>,
-    /// Rotation vector from the undeflected axis to the chord [rad].
+    /// Rotation vector from the undeflected section at the root to the chord's frame [rad].
     lean: Vector3<S>,
 }
 
@@ -100,7 +102,7 @@ impl<S: Scalar> Element<'_, S> {
     pub fn bend<'p>(&'p self, root: &Frame<S>, points: &'p mut Vec<(S, Wrench<S>)>) -> BentElement<'p, S> {
         let lean_of = |tip: &Deflection<S>| {
             let slope = tip.displacement / self.length;
-            Vector3::new(S::from(0.0), -slope.z, slope.y)
+            Vector3::new(tip.rotation.x * 0.5, -slope.z, slope.y)
         };
         let leaning = |lean: &Vector3<S>| {
             let mut chord = *root;

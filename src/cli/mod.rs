@@ -1,5 +1,7 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+mod compare;
+mod compensate;
 mod diagnostic;
 mod identify;
 mod input;
@@ -22,6 +24,10 @@ struct Cli {
 enum Command {
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
+    /// Put every strategy and solver, and every part of the elasticity left out, side by side.
+    Compare(compare::Arguments),
+    /// Find the joint commands that bring the arm, as identified, to desired positions.
+    Compensate(compensate::Arguments),
 }
 
 /// What a command says to the shell.
@@ -45,6 +51,8 @@ pub fn run() -> ExitCode {
     };
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Compensate(arguments) => compensate::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

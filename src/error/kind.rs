@@ -92,6 +92,8 @@ pub enum InputErrorKind {
     NoOrders,
     #[error("order {order} stands twice")]
     RepeatedOrder { order: u32 },
+    #[error("this version reads effects but does not model them yet; leave the section out")]
+    EffectNotModelled,
     #[error("declared already on line {line}")]
     RepeatedEffect { line: usize },
 

@@ -4,6 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::singular::SingularValues;
+
 /// A scaled singular value below this part of the largest counts as zero.
 ///
 /// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above 1e-5.
@@ -48,13 +50,10 @@ impl Identifiability {
         for (mut column, (norm, scale)) in scaled.column_iter_mut().zip(norms.iter().zip(&scale)) {
             column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
         }
-        let svd = scaled.clone().svd(false, true);
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
-        let singular_values: Vec<f64> = order.iter().map(|&k| svd.singular_values[k]).collect();
+        let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
         let threshold = BLIND_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
-        let null = DMatrix::from_fn(n - rank, n, |i, j| svd.v_t.as_ref().map_or(0.0, |v| v[(order[rank + i], j)]));
+        let null = complement(&right.columns(0, rank).into_owned());
         let visible = (0..n).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
         let blind = named(null.clone(), &scaled);
         let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
@@ -64,9 +63,8 @@ impl Identifiability {
     /// Ratio of the largest singular value to the smallest that is not zero.
     pub fn condition_number(&self) -> f64 {
         match self.singular_values[..self.rank] {
-            [] => 1.0,
             [largest, .., smallest] => largest / smallest,
-            [_] => 1.0,
+            [] | [_] => 1.0,
         }
     }
 
@@ -85,6 +83,21 @@ impl Identifiability {
             used.iter().map(|value| value.recip()).sum::<f64>().recip(),
         ]
     }
+}
+
+/// Orthonormal rows that span what the orthonormal columns of `basis` leave out.
+fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, r) = basis.shape();
+    let mut rest = DMatrix::identity(n, n) - basis * basis.transpose();
+    let mut rows = DMatrix::zeros(n - r, n);
+    for mut row in rows.row_iter_mut() {
+        let longest = (0..n).max_by(|&i, &j| rest.column(i).norm().total_cmp(&rest.column(j).norm())).unwrap_or(0);
+        let direction = rest.column(longest).normalize();
+        let along = direction.transpose() * &rest;
+        rest -= &direction * along;
+        row.copy_from(&direction.transpose());
+    }
+    rows
 }
 
 /// The reduced row echelon form of the null space: a basis that depends on the space alone, with few unknowns in each

@@ -7,6 +7,7 @@ mod derivative;
 mod identifiability;
 mod kernel;
 mod objective;
+mod singular;
 mod triangle;
 mod uncertainty;
 
@@ -16,8 +17,8 @@ use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{BlindCombination, Identifiability};
-pub(crate) use kernel::dot;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
+pub(crate) use singular::orthogonalise;
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 

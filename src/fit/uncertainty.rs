@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::singular::SingularValues;
+
 /// Weight that turns gauge rows into constraints: their variance falls below rounding.
 const HARD: f64 = 1e5;
 /// Scaled singular values below this part of the largest carry no information.
@@ -17,7 +19,7 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// (RᵀR / s² + PᵀP)⁻¹ on the free unknowns, with the blind combinations held.
+    /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the blind combinations held.
     ///
     /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's prior, `gauge` rows that
     /// span the blind combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
@@ -75,7 +77,7 @@ impl Uncertainty {
     }
 }
 
-/// (AᵀA)⁺ through the singular values of A with its columns scaled to unit norm.
+/// (`AᵀA`)⁺ through the singular values of A with its columns scaled to unit norm.
 fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {
@@ -85,10 +87,9 @@ fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     for (mut column, scale) in a.column_iter_mut().zip(scale.iter()) {
         column.unscale_mut(*scale);
     }
-    let svd = a.qr().unpack_r().svd(false, true);
-    let largest = svd.singular_values.max();
-    let Some(mut v) = svd.v_t.map(|v_t| v_t.transpose()) else { return DMatrix::zeros(n, n) };
-    for (mut column, &value) in v.column_iter_mut().zip(svd.singular_values.iter()) {
+    let SingularValues { values, right: mut v } = SingularValues::of(&a);
+    let largest = values[0];
+    for (mut column, &value) in v.column_iter_mut().zip(&values) {
         column.scale_mut(if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
     }
     for (mut row, scale) in v.row_iter_mut().zip(scale.iter()) {

@@ -48,7 +48,7 @@ enum Inner {
     /// Link by link; `frames` are those before each link of the pose at hand.
     Rigid { links: Vec<Link>, frames: Vec<Frame<f64>> },
     /// In chunks through the statics.
-    Elastic { response: Box<Response>, chunks: Vec<Chunk>, real: Workspace<f64>, ws: Workspace<ChunkDual> },
+    Elastic { response: Box<Response>, chunks: Vec<Chunk>, memory: Box<(Workspace<f64>, Workspace<ChunkDual>)> },
 }
 
 /// A link of a rigid arm with its five parameters seeded, and their columns.
@@ -95,7 +95,7 @@ impl Linearised {
                 columns: part.iter().map(|&(column, _)| column).collect(),
             });
             let response = Box::new(Response::new(&arm));
-            Inner::Elastic { response, chunks: chunks.collect(), real: Workspace::default(), ws: Workspace::default() }
+            Inner::Elastic { response, chunks: chunks.collect(), memory: Box::default() }
         } else {
             Inner::Rigid { links: links(model, &arm, &own), frames: Vec::new() }
         };
@@ -161,7 +161,7 @@ impl Inner {
                 }
                 Some(frame)
             }
-            Self::Elastic { real, .. } => arm.equilibrate(&pose.setup, real, rest).ok().map(|()| rest.frame),
+            Self::Elastic { memory, .. } => arm.equilibrate(&pose.setup, &mut memory.0, rest).ok().map(|()| rest.frame),
         }
     }
 
@@ -179,12 +179,12 @@ impl Inner {
                     after = moved.map(|coordinate| coordinate.re);
                 }
             }
-            Self::Elastic { response, chunks, ws, .. } => {
+            Self::Elastic { response, chunks, memory } => {
                 if !chunks.is_empty() {
                     response.adjoint(&pose.setup, &target.position, rest);
                 }
                 for chunk in chunks {
-                    let position = chunk.arm.target_position(&pose.setup, &target.position, rest, ws);
+                    let position = chunk.arm.target_position(&pose.setup, &target.position, rest, &mut memory.1);
                     let gradients = position.map(|coordinate| gradient(&coordinate));
                     for (k, &column) in chunk.columns.iter().enumerate() {
                         rows.put(column, &base.frame.vector(&gradients.map(|g| g[k])));

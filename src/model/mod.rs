@@ -1,15 +1,18 @@
 //! The model: an arm, its bases and targets, and where each free parameter enters. Immutable; knows no files and no
 //! sensors.
 
+mod ablation;
+mod command;
 mod derivative;
 mod poses;
 
+pub use ablation::Ablation;
 pub use poses::{Pose, PoseResiduals};
 
 use nalgebra::Vector3;
 
 use crate::arm::{Angle, Arm};
-use crate::error::InputError;
+use crate::error::{InputError, InputErrorKind};
 use crate::parameter::{BeamField, JointField, Parameter, Slot, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
@@ -19,29 +22,26 @@ use crate::spatial::Frame;
 #[derive(Debug, Clone)]
 pub struct Model {
     nominal: Arm<f64>,
-    base: BasePose,
-    target: Vector3<f64>,
+    bases: Vec<BasePose>,
+    targets: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
-    /// Number of bases.
-    pub bases: usize,
-    /// Number of targets.
-    pub targets: usize,
 }
 
 impl Model {
     /// The declared arm with one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` does not fit the parameters there are.
+    /// A rule of `[parameters]` does not fit the parameters there are, or an effect is declared.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
+        if let Some(declared) = problem.effects.first() {
+            return Err(declared.location.clone().error(InputErrorKind::EffectNotModelled));
+        }
         Ok(Self {
             nominal: Arm::nominal(problem),
-            base: problem.base.clone(),
-            target: problem.tool.target,
+            bases: vec![problem.base.clone(); bases.len()],
+            targets: vec![problem.tool.target; targets.len()],
             parameters: resolve(problem, bases, targets)?,
-            bases: bases.len(),
-            targets: targets.len(),
         })
     }
 
@@ -83,7 +83,7 @@ impl Model {
 
     /// Base poses in the measuring frame: translation [m] and rotation vector [rad].
     pub fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
-        let mut bases = vec![self.base.clone(); self.bases];
+        let mut bases = self.bases.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let Slot::Base { base, axis } = parameter.slot {
                 if axis < 3 {
@@ -103,7 +103,7 @@ impl Model {
 
     /// Targets in the last frame [m].
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
-        let mut targets = vec![self.target; self.targets];
+        let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let Slot::Target { target, axis } = parameter.slot {
                 targets[target][axis] += x;

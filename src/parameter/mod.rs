@@ -70,6 +70,11 @@ impl Parameter {
         if self.unit().is_relative() { self.nominal * x.exp() } else { self.nominal + x }
     }
 
+    /// x of a value, SI; the inverse of [`Parameter::value`].
+    pub fn deviation(&self, value: f64) -> f64 {
+        if self.unit().is_relative() { (value / self.nominal).ln() } else { value - self.nominal }
+    }
+
     /// Standard error of the value from that of x, SI.
     pub fn value_error(&self, x: f64, error: f64) -> f64 {
         if self.unit().is_relative() { self.value(x) * error } else { error }

@@ -30,6 +30,7 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
     let theta = section.number("theta", &ANGLE)?.unwrap_or(0.0);
     let d = section.number("d", &LENGTH)?.unwrap_or(0.0);
     let beta = section.number("beta", &ANGLE)?.unwrap_or(0.0);
+    let limits = limits(&mut section, kind)?;
     let stiffness = stiff(&mut section, "stiffness", &STIFFNESS)?;
     let beam = match section.section("beam")? {
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
@@ -38,7 +39,22 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
     };
     let bodies = bodies(&mut section, "body", "com", false)?;
     section.finish()?;
-    Ok(Joint { name, kind, alpha, a, theta, d, beta, stiffness, beam, bodies })
+    Ok(Joint { name, kind, alpha, a, theta, d, beta, limits, stiffness, beam, bodies })
+}
+
+/// Range of q, infinite where none is given.
+fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), InputError> {
+    let unit = match kind {
+        JointKind::Revolute => &ANGLE,
+        JointKind::Prismatic => &LENGTH,
+        JointKind::Fixed => return Ok((f64::NEG_INFINITY, f64::INFINITY)),
+    };
+    let min = section.number("min", unit)?.unwrap_or(f64::NEG_INFINITY);
+    let max = section.number("max", unit)?.unwrap_or(f64::INFINITY);
+    if min > max {
+        return Err(section.location().error(InputErrorKind::MinAboveMax { min, max }));
+    }
+    Ok((min, max))
 }
 
 fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, InputError> {

@@ -87,6 +87,8 @@ pub struct Joint {
     pub d: f64,
     /// β [rad].
     pub beta: f64,
+    /// Range of q [rad] or [m], infinite where none is given; commands keep to it.
+    pub limits: (f64, f64),
     /// Torsional stiffness about `z_i` [N·m/rad]; `None`: rigid.
     pub stiffness: Option<f64>,
     /// Elastic link along this joint's a.

@@ -10,7 +10,7 @@ use crate::study::{AxisValues, ErrorSummary, Errors, Estimate, Identification, N
 
 /// An error summary in millimetres.
 #[derive(Debug, Serialize)]
-struct Summary {
+pub(super) struct Summary {
     n: usize,
     mean_mm: Axes,
     max_mm: Axes,
@@ -26,7 +26,7 @@ struct Axes {
 }
 
 #[derive(Debug, Serialize)]
-struct Both {
+pub(super) struct Both {
     identification: Summary,
     held_out: Summary,
 }
@@ -166,8 +166,12 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
             .map(|(a, b, correlation)| Correlation { parameters: [a, b], correlation: *correlation })
             .collect(),
     };
-    // Text keys and numbers always serialise; numbers that are not finite become null.
-    let mut text = serde_json::to_string_pretty(&document).unwrap_or_default();
+    to_text(&document)
+}
+
+/// JSON text that ends in a line break; text keys and numbers always serialise, numbers that are not finite as null.
+pub(super) fn to_text(document: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(document).unwrap_or_default();
     text.push('\n');
     text
 }

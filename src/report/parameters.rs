@@ -1,5 +1,7 @@
 //! The table of parameters, and what the data cannot tell.
 
+use std::fmt::Write as _;
+
 use super::quantity::{Display, decimals, number, table};
 use crate::fit::BlindCombination;
 use crate::solver::AtBound;
@@ -60,13 +62,16 @@ pub(super) fn blind_text(result: &Identification) -> String {
     if blind.is_empty() {
         return "The data see every combination of the parameters.\n".to_owned();
     }
-    let lines: String = blind.iter().map(|combination| format!("  {}\n", words(combination, result))).collect();
-    format!(
+    let mut text = format!(
         "{} of {} combinations cannot be seen in these data (their parameters can change together in these\n\
-         proportions, each scaled by its effect, and no predicted position moves):\n{lines}",
+         proportions, each scaled by its effect, and no predicted position moves):\n",
         blind.len(),
         result.unknowns.len()
-    )
+    );
+    for combination in blind {
+        let _ = writeln!(text, "  {}", words(combination, result));
+    }
+    text
 }
 
 fn words(combination: &BlindCombination, result: &Identification) -> String {
@@ -75,7 +80,9 @@ fn words(combination: &BlindCombination, result: &Identification) -> String {
         return format!("{} alone", name(k));
     }
     let mut named: Vec<&(usize, f64)> = combination.weights.iter().filter(|(_, weight)| weight.abs() > NAMED).collect();
-    named.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()).then(a.0.cmp(&b.0)));
+    // Equal weights differ by rounding from machine to machine: sort by what is shown.
+    let shown = |weight: f64| (weight.abs() * 100.0).round();
+    named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
     let terms: Vec<String> = named
         .iter()
         .map(|(k, weight)| format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k)))
@@ -92,10 +99,10 @@ pub(super) fn correlation_text(result: &Identification) -> String {
     let mut text = "Correlated by more than 0.9 (their sum or difference is known better than each):\n".to_owned();
     for (a, b, correlation) in pairs.iter().take(SHOWN_CORRELATIONS) {
         let sign = if *correlation < 0.0 { '−' } else { '+' };
-        text.push_str(&format!("  {a} and {b}: {sign}{:.3}\n", correlation.abs()));
+        let _ = writeln!(text, "  {a} and {b}: {sign}{:.3}", correlation.abs());
     }
     if pairs.len() > SHOWN_CORRELATIONS {
-        text.push_str(&format!("  and {} more in estimate.json\n", pairs.len() - SHOWN_CORRELATIONS));
+        let _ = writeln!(text, "  and {} more in estimate.json", pairs.len() - SHOWN_CORRELATIONS);
     }
     text
 }

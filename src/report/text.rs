@@ -12,7 +12,6 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
         errors(result),
         noise(problem, result),
         parameter_table(result),
-        String::new(),
         conditioning(result),
         blind_text(result),
         correlation_text(result),

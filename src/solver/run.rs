@@ -27,6 +27,13 @@ pub struct Solution {
     pub at_bound: Vec<Option<AtBound>>,
 }
 
+impl Solution {
+    /// Evaluations of the residual, with derivatives or without.
+    pub fn evaluations(&self) -> u64 {
+        self.cost_evaluations + self.linearisations
+    }
+}
+
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
 ///
 /// ```

@@ -3,10 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::factor::RADIUS_SLACK;
-use crate::fit::dot;
+use crate::fit::orthogonalise;
 
-/// Sweeps over all pairs of columns; five are usual.
-const SWEEPS: usize = 60;
 /// Newton steps allowed to the secular equation.
 const SECULAR_ITERATIONS: usize = 50;
 
@@ -88,50 +86,4 @@ impl Spectrum {
         }
         lambda
     }
-}
-
-/// Rotates pairs of columns until all are orthogonal, and the entries of `projected` with them.
-fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
-    let (rows, n) = columns.shape();
-    let tolerance = (rows.max(1) as f64).sqrt() * f64::EPSILON;
-    for _ in 0..SWEEPS {
-        let mut rotated = false;
-        let mut squares: Vec<f64> = columns.as_slice().chunks_exact(rows.max(1)).map(|c| dot(c, c)).collect();
-        for i in 0..n {
-            for j in i + 1..n {
-                let (head, tail) = columns.as_mut_slice().split_at_mut(j * rows);
-                let (a, b) = (&mut head[i * rows..(i + 1) * rows], &mut tail[..rows]);
-                let product = dot(a, b);
-                if product.abs() <= tolerance * squares[i].sqrt() * squares[j].sqrt() {
-                    continue;
-                }
-                rotated = true;
-                let (cosine, tangent) = rotation(squares[i], squares[j], product);
-                let sine = cosine * tangent;
-                for (a, b) in a.iter_mut().zip(&mut *b) {
-                    (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
-                }
-                squares[i] = updated(squares[i], -tangent * product, a);
-                squares[j] = updated(squares[j], tangent * product, b);
-                let (a, b) = (projected[i], projected[j]);
-                (projected[i], projected[j]) = (cosine * a - sine * b, sine * a + cosine * b);
-            }
-        }
-        if !rotated {
-            break;
-        }
-    }
-}
-
-/// Cosine and tangent of the rotation that makes a and b orthogonal, from `aᵀa`, `bᵀb` and `aᵀb`.
-fn rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
-    let zeta = (bb - aa) / (2.0 * ab);
-    let tangent = (zeta.abs() + (zeta * zeta + 1.0).sqrt()).recip().copysign(zeta);
-    ((tangent * tangent + 1.0).sqrt().recip(), tangent)
-}
-
-/// `square` + `change`, formed again from the column where that cancels.
-fn updated(square: f64, change: f64, column: &[f64]) -> f64 {
-    let sum = square + change;
-    if sum > 0.25 * square { sum } else { dot(column, column) }
 }

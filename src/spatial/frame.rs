@@ -1,6 +1,6 @@
 //! A right-handed frame.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::rotate;
 use crate::scalar::Scalar;
@@ -88,12 +88,5 @@ impl<S: Scalar> Frame<S> {
     /// This frame's coordinates of a vector given in the reference frame.
     pub fn resolve(&self, vector: &Vector3<S>) -> Vector3<S> {
         Vector3::new(self.axes[0].dot(vector), self.axes[1].dot(vector), self.axes[2].dot(vector))
-    }
-}
-
-impl Frame<f64> {
-    /// The axes as the columns of a rotation matrix.
-    pub fn rotation(&self) -> Matrix3<f64> {
-        Matrix3::from_columns(&self.axes)
     }
 }

@@ -4,4 +4,4 @@ mod frame;
 mod rotation;
 
 pub use frame::Frame;
-pub use rotation::{rotate, rotation_vector};
+pub use rotation::rotate;

@@ -9,12 +9,14 @@ use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strateg
 use crate::measurement::{Measurements, Split};
 use crate::model::{Model, PoseResiduals};
 use crate::parameter::Parameter;
-use crate::solver::{AtBound, Termination};
+use crate::solver::{AtBound, Settings, Termination};
 
 /// Sweeps after which a sequential strategy is given up.
-const MAX_SWEEPS: usize = 500;
+const MAX_SWEEPS: usize = 2000;
 /// A sequential strategy has settled when a sweep lowers the cost by less than this part.
-const SWEEP_SETTLED: f64 = 1e-9;
+const SWEEP_SETTLED: f64 = 1e-6;
+/// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage changes are wasted.
+const SWEEP_STEPS: u64 = 2;
 
 /// What all fits of an identification share.
 pub(super) struct Fitting<'a> {
@@ -37,6 +39,7 @@ pub(super) struct FitEnd {
     pub x: DVector<f64>,
     pub termination: Termination,
     pub iterations: u64,
+    pub evaluations: u64,
     /// For each unknown of the fit.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
@@ -45,8 +48,9 @@ pub(super) struct FitEnd {
 impl From<StageEnd> for FitEnd {
     fn from(end: StageEnd) -> Self {
         let StageEnd { x, solution, gauge } = end;
+        let evaluations = solution.evaluations();
         let (termination, iterations) = (solution.termination, solution.iterations);
-        Self { x, termination, iterations, at_bound: solution.at_bound, gauge }
+        Self { x, termination, iterations, evaluations, at_bound: solution.at_bound, gauge }
     }
 }
 
@@ -63,6 +67,7 @@ impl<'a> Fitting<'a> {
             poses: self.placement.poses(self.measurements, rows, self.sigma),
             unknowns,
             solver: self.solver,
+            max_steps: Settings::default().max_iterations,
             progress: self.progress,
         }
     }
@@ -90,8 +95,14 @@ impl<'a> Fitting<'a> {
     /// The nominal arm with bases and targets fitted where they are free.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
-        let rows: Vec<usize> = self.split.identification.iter().chain(&self.late.rows).copied().collect();
-        register(self.model, &self.placement.poses(self.measurements, &rows, self.sigma), &mut x);
+        let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
+        let mut known = vec![false; self.model.bases];
+        for pose in &poses {
+            known[pose.base] = true;
+        }
+        let late = self.placement.poses(self.measurements, &self.late.rows, self.sigma);
+        poses.extend(late.into_iter().filter(|pose| !known[pose.base]));
+        register(self.model, &poses, &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
         if !placements.is_empty() {
             x = self.stage(&self.split.identification, placements).run(&x)?.x;
@@ -113,18 +124,25 @@ impl<'a> Fitting<'a> {
             x: start.clone(),
             termination: Termination::IterationLimit,
             iterations: 0,
+            evaluations: 0,
             at_bound: vec![None; whole.unknowns.len()],
             gauge: whole.gauge(start),
         };
         let mut cost = f64::INFINITY;
+        let once = self.strategy == Strategy::OneSweep;
         for _ in 0..MAX_SWEEPS {
-            let mut termination = end.termination;
             for chosen in self.strategy.stages() {
-                let stage = self.stage(&self.split.identification, self.choose(chosen));
+                let mut stage = self.stage(&self.split.identification, self.choose(chosen));
+                if !once {
+                    stage.max_steps = SWEEP_STEPS;
+                }
                 let StageEnd { x, solution, .. } = stage.run(&end.x)?;
                 end.x = x;
                 end.iterations += solution.iterations;
-                termination = solution.termination;
+                end.evaluations += solution.evaluations();
+                if once {
+                    end.termination = solution.termination;
+                }
                 for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
                     if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
                         end.at_bound[j] = at_bound;
@@ -132,9 +150,12 @@ impl<'a> Fitting<'a> {
                 }
             }
             let next = whole.cost(&end.x);
-            if !termination.converged() || cost - next <= SWEEP_SETTLED * next {
-                end.termination = termination;
-                return Ok(end);
+            let settled = cost - next <= SWEEP_SETTLED * next;
+            if settled && !once {
+                end.termination = Termination::Cost;
+            }
+            if settled || once {
+                break;
             }
             cost = next;
         }

@@ -109,6 +109,8 @@ pub struct Identification {
     pub termination: Termination,
     /// Steps tried, over all stages.
     pub iterations: u64,
+    /// Evaluations of the residual, with derivatives or without, over all stages.
+    pub evaluations: u64,
     /// Time taken [s].
     pub seconds: f64,
     /// Where the noise comes from.
@@ -159,9 +161,21 @@ pub fn identify(
     split: &Split,
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
-    let clock = Instant::now();
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    identify_model(&model, problem, measurements, split, options)
+}
+
+/// As [`identify`], with a model of the problem that the caller has changed.
+pub(super) fn identify_model(
+    model: &Model,
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let clock = Instant::now();
+    let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(&model.parameters));
     if solver != SolverChoice::Bounded && model.parameters.iter().any(Parameter::is_bounded) {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
@@ -169,11 +183,11 @@ pub fn identify(
     let declared = problem.data.position_sigma;
     let noise_is_declared = declared.is_some() || measurements.sigma.is_some();
     let mut fitting = Fitting {
-        model: &model,
+        model,
         measurements,
         split,
         placement: &placement,
-        late: placement.late(&model, split),
+        late: placement.late(model, split),
         strategy,
         solver,
         progress: options.progress.as_ref(),
@@ -216,6 +230,7 @@ pub fn identify(
         solver,
         termination: end.termination,
         iterations: end.iterations,
+        evaluations: end.evaluations,
         noise: if noise_is_declared { Noise::Declared } else { Noise::Estimated(fitting.sigma) },
         registered,
         fitted: fitting.errors(&end.x),

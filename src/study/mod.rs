@@ -1,5 +1,7 @@
 //! What to fit, in which order, and what came of it.
 
+mod compare;
+mod compensate;
 mod errors;
 mod fitting;
 mod identification;
@@ -9,6 +11,8 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use compare::{Comparison, compare};
+pub use compensate::{Command, compensate};
 pub use errors::{AxisValues, ErrorSummary};
 pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
 pub use placement::Placement;

@@ -46,6 +46,8 @@ pub(super) struct Stage<'a> {
     /// Which parameters vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
+    /// Steps after which the solver is stopped.
+    pub max_steps: u64,
     pub progress: Option<&'a ProgressSink>,
 }
 
@@ -129,7 +131,7 @@ impl<'a> Stage<'a> {
         let fit = Fit::new(&residuals)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
-        let settings = Settings::default();
+        let settings = Settings { max_iterations: self.max_steps, ..Settings::default() };
         let reporter = self.progress.map(|sink| Reporter {
             sink: Arc::clone(sink),
             unknowns: self.unknowns.len(),

@@ -10,6 +10,8 @@ pub enum Strategy {
     Joint,
     /// Stiffness, then geometry [Chen2021, sec. 3.3], repeated until it settles.
     Sequential,
+    /// Stiffness, then geometry, once: the paper's order.
+    OneSweep,
     /// Geometry; stiffnesses stay at their nominal values.
     GeometryOnly,
     /// Stiffnesses; geometry stays at its nominal values.
@@ -29,11 +31,16 @@ pub enum SolverChoice {
 }
 
 impl Strategy {
+    /// Every strategy.
+    pub const EACH: [Self; 5] =
+        [Self::Joint, Self::Sequential, Self::OneSweep, Self::GeometryOnly, Self::StiffnessOnly];
+
     /// Name on the command line and in results.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Joint => "joint",
             Self::Sequential => "sequential",
+            Self::OneSweep => "sequential-one-sweep",
             Self::GeometryOnly => "geometry-only",
             Self::StiffnessOnly => "stiffness-only",
         }
@@ -46,7 +53,7 @@ impl Strategy {
         const GEOMETRY: fn(&Parameter) -> bool = |p| !p.slot.is_elastic();
         match self {
             Self::Joint => &[ALL],
-            Self::Sequential => &[STIFFNESS, GEOMETRY],
+            Self::Sequential | Self::OneSweep => &[STIFFNESS, GEOMETRY],
             Self::GeometryOnly => &[GEOMETRY],
             Self::StiffnessOnly => &[STIFFNESS],
         }
@@ -54,6 +61,9 @@ impl Strategy {
 }
 
 impl SolverChoice {
+    /// Every solver.
+    pub const EACH: [Self; 2] = [Self::LevenbergMarquardt, Self::Bounded];
+
     /// Name on the command line and in results.
     pub fn as_str(self) -> &'static str {
         match self {

@@ -1,4 +1,10 @@
-//! Residual functions written once, generic over the scalar, as problems with exact derivatives.
+//! What several tests share: residual functions written once, generic over the scalar, as problems with exact
+//! derivatives; arms and measurements that the model itself makes.
+
+#![allow(dead_code, reason = "each test takes what it needs")]
+
+pub mod arms;
+pub mod made;
 
 use std::ops::Range;
 

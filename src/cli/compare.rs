@@ -1,0 +1,47 @@
+//! `flexcal compare`.
+
+use std::error::Error;
+
+use clap::Args;
+use flexcal::{report, study};
+
+use super::input::{Common, Input};
+use super::progress::Line;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal compare problems/lunar-sampler
+  flexcal compare problems/lunar-sampler --json --out results")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Compares, writes `compare.json`, and prints the tables.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let Input { problem, measurements, split } = common.read()?;
+    let line = common.talks().then(Line::new);
+    let result = study::compare(&problem, &measurements, &split, line.as_ref().map(Line::sink));
+    if let Some(line) = line {
+        line.clear();
+    }
+    let comparison = result?;
+    let json = report::compare_json(&problem, &comparison);
+    let path = output::write(&common.folder(&problem), "compare.json", &json)?;
+    if common.json {
+        output::print(&json)?;
+    } else if common.talks() {
+        output::print(&report::compare_text(&problem, &comparison))?;
+        output::print(&format!("\nWritten to {}\n", path.display()))?;
+    }
+    if comparison.joint.is_trusted() {
+        return Ok(Outcome::Done);
+    }
+    if !common.quiet {
+        diagnostic::warn(&report::why_not_trusted(&comparison.joint));
+    }
+    Ok(Outcome::NotTrusted)
+}

@@ -1,0 +1,97 @@
+//! `flexcal compensate`.
+
+use std::collections::HashMap;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use flexcal::measurement::Measurements;
+use flexcal::model::Model;
+use flexcal::problem::Problem;
+use flexcal::{report, study};
+use serde::Deserialize;
+
+use super::input::Common;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal compensate`.
+#[derive(Debug, Args)]
+#[command(after_help = "The targets are a table like measurements: x_mm, y_mm, z_mm are where the arm should be, and \
+q1_deg, … where to start from; of the configurations that reach a target the nearest to that is taken. Ranges of joints \
+are kept where the problem gives them (min_deg, max_deg of a joint). A column session says whose base to use.
+
+Examples:
+  flexcal identify problems/lunar-sampler
+  flexcal compensate problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data targets.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// The estimate.json of an identification of the same problem
+    #[arg(long, value_name = "FILE")]
+    estimate: PathBuf,
+}
+
+#[derive(Debug, Deserialize)]
+struct Estimates {
+    parameters: Vec<Estimated>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Estimated {
+    name: String,
+    estimate: f64,
+}
+
+/// An estimate that cannot be used.
+#[derive(Debug, thiserror::Error)]
+enum EstimateError {
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable { file: PathBuf, source: std::io::Error },
+    #[error("{}: not an estimate.json: {source}", file.display())]
+    Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
+    Missing { file: PathBuf, name: String },
+    #[error("no targets; name them with --data")]
+    NoTargets,
+}
+
+/// Finds commands, writes `commands.csv`, and says what they reach.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    if common.data.is_empty() {
+        return Err(EstimateError::NoTargets.into());
+    }
+    let mut problem = Problem::read(&common.problem)?;
+    // Targets are not split: every row is one.
+    problem.data.held_out = None;
+    let (targets, warnings) = Measurements::read(&common.data, &problem)?;
+    if !common.quiet {
+        diagnostic::print_warnings(&warnings);
+    }
+    let placement = study::Placement::of(&targets);
+    let model = Model::new(&problem, &placement.bases, &placement.targets)?;
+    let values = read(&arguments.estimate)?;
+    let x = model
+        .vector_of(|name| values.get(name).copied())
+        .map_err(|name| EstimateError::Missing { file: arguments.estimate.clone(), name })?;
+    let commands = study::compensate(&problem, &model, &x, &targets)?;
+    let folder = common.folder(&problem);
+    let path = output::write(&folder, "commands.csv", &report::commands_csv(&problem, &targets, &commands))?;
+    if common.json {
+        output::print(&report::commands_json(&problem, &commands))?;
+    } else if common.talks() {
+        output::print(&report::commands_text(&problem, &targets, &commands))?;
+        output::print(&format!("\nWritten to {}\n", path.display()))?;
+    }
+    let all = commands.iter().all(study::Command::is_reached);
+    Ok(if all { Outcome::Done } else { Outcome::NotTrusted })
+}
+
+fn read(file: &Path) -> Result<HashMap<String, f64>, EstimateError> {
+    let text =
+        fs::read_to_string(file).map_err(|source| EstimateError::Unreadable { file: file.to_owned(), source })?;
+    let estimates: Estimates =
+        serde_json::from_str(&text).map_err(|source| EstimateError::Syntax { file: file.to_owned(), source })?;
+    Ok(estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect())
+}

@@ -1,0 +1,65 @@
+//! A model whose unknowns are the joint commands.
+
+use nalgebra::DVector;
+
+use super::Model;
+use crate::parameter::{JointField, Parameter, Slot};
+use crate::problem::{JointKind, Problem};
+
+impl Model {
+    /// The arm with parameters `x`, whose free parameters are now the corrections to its moving joints' commands.
+    ///
+    /// A correction to q is one to θ of a revolute joint and to d of a prismatic one. Bases and targets stay as in `x`.
+    #[must_use]
+    pub fn commanded(&self, problem: &Problem, x: &DVector<f64>) -> Self {
+        let arm = self.arm(|k| x[k]);
+        let parameters = problem
+            .joints
+            .iter()
+            .zip(&arm.joints)
+            .enumerate()
+            .filter_map(|(joint, (declared, own))| {
+                let (field, nominal) = match declared.kind {
+                    JointKind::Revolute => (JointField::Theta, own.theta),
+                    JointKind::Prismatic => (JointField::D, own.d),
+                    JointKind::Fixed => return None,
+                };
+                Some(Parameter {
+                    name: format!("q{}", joint + 1),
+                    slot: Slot::Joint { joint, field },
+                    nominal,
+                    sigma: None,
+                    lower: f64::NEG_INFINITY,
+                    upper: f64::INFINITY,
+                })
+            })
+            .collect();
+        Self {
+            nominal: arm,
+            bases: self.base_poses(x.as_slice()),
+            targets: self.target_positions(x.as_slice()),
+            parameters,
+        }
+    }
+
+    /// The full parameter vector for values [SI] by name, or the first name that `value` does not know.
+    ///
+    /// # Errors
+    /// A free parameter has no value.
+    pub fn vector_of(&self, value: impl Fn(&str) -> Option<f64>) -> Result<DVector<f64>, String> {
+        let entries = self.parameters.iter().map(|parameter| {
+            let value = value(&parameter.name).ok_or_else(|| parameter.name.clone())?;
+            Ok(parameter.deviation(value))
+        });
+        entries.collect::<Result<Vec<f64>, String>>().map(DVector::from_vec)
+    }
+
+    /// Joints that the parameters of a commanded model move, in their order.
+    pub fn moving_joints(&self) -> Vec<usize> {
+        let joint = |parameter: &Parameter| match parameter.slot {
+            Slot::Joint { joint, .. } => Some(joint),
+            Slot::Beam { .. } | Slot::Base { .. } | Slot::Target { .. } => None,
+        };
+        self.parameters.iter().filter_map(joint).collect()
+    }
+}

@@ -1,0 +1,124 @@
+//! What `compare` prints: the paper's tables 2 and 3 for the problem at hand, then every strategy and every ablation.
+
+use super::quantity::{number, table};
+use crate::problem::Problem;
+use crate::study::{AxisValues, Comparison, ErrorSummary, Identification};
+
+/// Table 3 of [Chen2021], 50 poses, mm: before, with elasticity, geometry alone; x, y, z and sum of each.
+const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [
+    ("max", [[20.91, 22.72, 39.54, 48.9644], [2.5783, 3.4383, 4.3451, 5.5416], [7.8739, 4.1964, 5.9496, 6.4815]]),
+    ("mean", [[6.1646, 13.3304, 21.9786, 27.2506], [0.6845, 0.9578, 1.5093, 2.1358], [1.1303, 1.7519, 2.6873, 3.9673]]),
+];
+const TABLE_3: [&str; 8] = ["held out, mm", "axis", "before", "with elasticity", "ignoring it", "", "published:", ""];
+
+/// A comparison as text, ending in a line break.
+pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
+    let Comparison { joint, rigid, strategies, ablations } = comparison;
+    [
+        format!(
+            "{}\n{} poses to identify, {} held out\n",
+            problem.title, joint.fitted.identification.n, joint.fitted.held_out.n
+        ),
+        geometry(problem, joint),
+        errors(joint, rigid),
+        rows("strategy", strategies.iter().map(|result| (result.strategy.as_str(), result))),
+        rows("elasticity", ablations.iter().map(|(ablation, result)| (ablation.as_str(), result))),
+    ]
+    .join("\n")
+}
+
+/// Table 2: nominal, identified, error of each joint's geometry.
+fn geometry(problem: &Problem, joint: &Identification) -> String {
+    let mut body = Vec::new();
+    for (number_of, declared) in problem.joints.iter().enumerate() {
+        let nominal = [declared.alpha, declared.a, declared.theta, declared.d, declared.beta];
+        let mut row = vec![(number_of + 1).to_string()];
+        let identified = ["alpha", "a", "theta", "d", "beta"].iter().zip(nominal).map(|(field, nominal)| {
+            let name = format!("joint{}.{field}", number_of + 1);
+            joint.estimates.iter().find(|estimate| estimate.name == name).map_or(nominal, |found| found.estimate)
+        });
+        let identified: Vec<f64> = identified.collect();
+        let is_angle = [true, false, true, false, true];
+        let show = |values: &mut dyn Iterator<Item = f64>| -> Vec<String> {
+            values
+                .zip(is_angle)
+                .map(|(value, angle)| if angle { number(value.to_degrees(), 3) } else { number(value * 1e3, 2) })
+                .collect()
+        };
+        row.extend(show(&mut nominal.iter().copied()));
+        row.extend(show(&mut identified.iter().copied()));
+        row.extend(show(&mut identified.iter().zip(nominal).map(|(found, nominal)| found - nominal)));
+        body.push(row);
+    }
+    let header = [
+        "joint",
+        "α °",
+        "a mm",
+        "θ °",
+        "d mm",
+        "β °",
+        "→ α °",
+        "a mm",
+        "θ °",
+        "d mm",
+        "β °",
+        "Δ α °",
+        "a mm",
+        "θ °",
+        "d mm",
+        "β °",
+    ];
+    format!("Geometry, nominal → identified, and the difference\n{}", table(&header, body, &[]))
+}
+
+/// Table 3: errors before, with elasticity, ignoring it; the published figures beside them.
+fn errors(joint: &Identification, rigid: &Identification) -> String {
+    let columns = [&joint.registered.held_out, &joint.fitted.held_out, &rigid.fitted.held_out];
+    let of_kind = |summary: &ErrorSummary, kind: &str| -> [f64; 4] {
+        let AxisValues { x, y, z, norm } = if kind == "max" { summary.max } else { summary.mean };
+        [x, y, z, norm]
+    };
+    let mut body = Vec::new();
+    for (kind, published) in PUBLISHED {
+        for (axis, name) in ["x", "y", "z", "norm"].iter().enumerate() {
+            let mut row = vec![if axis == 0 { kind.to_owned() } else { String::new() }, (*name).to_owned()];
+            row.extend(columns.iter().map(|summary| number(of_kind(summary, kind)[axis] * 1e3, 4)));
+            row.extend(published.iter().map(|values| number(values[axis], 4)));
+            body.push(row);
+        }
+    }
+    let text = table(&TABLE_3, body, &[0, 1]);
+    format!("{text}  published: [Chen2021, table 3], before, with elasticity, ignoring it; measured on another arm\n")
+}
+
+fn rows<'a>(title: &str, results: impl Iterator<Item = (&'a str, &'a Identification)>) -> String {
+    let body = results
+        .map(|(name, result)| {
+            vec![
+                name.to_owned(),
+                result.solver.as_str().to_owned(),
+                number(result.fitted.held_out.mean.norm * 1e3, 4),
+                number(result.fitted.held_out.rms.norm * 1e3, 4),
+                number(result.fitted.identification.rms.norm * 1e3, 4),
+                result.iterations.to_string(),
+                result.evaluations.to_string(),
+                number(result.seconds * 1e3, 1),
+                format!("{:.1e}", result.identifiability.condition_number()),
+                result.termination.as_str().to_owned(),
+            ]
+        })
+        .collect();
+    let header = [
+        title,
+        "solver",
+        "held out mean",
+        "rms, mm",
+        "fitted rms",
+        "steps",
+        "evaluations",
+        "ms",
+        "condition",
+        "termination",
+    ];
+    table(&header, body, &[0, 1, 9])
+}

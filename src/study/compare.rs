@@ -1,0 +1,64 @@
+//! Every strategy with every solver, and every part of the elasticity left out in turn, on one problem.
+
+use super::identification::identify_model;
+use super::{Identification, IdentifyError, Options, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::measurement::{Measurements, Split};
+use crate::model::{Ablation, Model};
+use crate::parameter::Parameter;
+use crate::problem::Problem;
+
+/// Strategies and solvers side by side.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The declared model, everything fitted at once by the solver that `auto` takes.
+    pub joint: Identification,
+    /// The same without elasticity: geometry alone.
+    pub rigid: Identification,
+    /// One identification per strategy and solver; `None` where the strategy has nothing to vary.
+    pub strategies: Vec<Identification>,
+    /// One identification per ablation, everything fitted at once.
+    pub ablations: Vec<(Ablation, Identification)>,
+}
+
+/// Runs every strategy with every solver, and every ablation, on the identification rows.
+///
+/// Strategies that have nothing to vary are left out, and so are solvers that cannot keep bounds where there are any.
+///
+/// # Errors
+/// Problem and data do not fit each other.
+pub fn compare(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    progress: Option<ProgressSink>,
+) -> Result<Comparison, IdentifyError> {
+    let placement = Placement::of(measurements);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let run = |model: &Model, strategy, solver| {
+        let options = Options { strategy, solver, progress: progress.clone() };
+        identify_model(model, problem, measurements, split, &options)
+    };
+    let bounded = model.parameters.iter().any(Parameter::is_bounded);
+    let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
+    let mut strategies = Vec::new();
+    for strategy in Strategy::EACH {
+        for &solver in solvers.clone() {
+            match run(&model, strategy, solver) {
+                Ok(identification) => strategies.push(identification),
+                Err(IdentifyError::NothingToFit { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+    let mut ablations = Vec::new();
+    for ablation in Ablation::EACH {
+        let identification = run(&model.ablated(ablation), Strategy::Joint, SolverChoice::Auto)?;
+        ablations.push((ablation, identification));
+    }
+    Ok(Comparison {
+        joint: run(&model, Strategy::Joint, SolverChoice::Auto)?,
+        rigid: run(&model.ablated(Ablation::Rigid), Strategy::Joint, SolverChoice::Auto)?,
+        strategies,
+        ablations,
+    })
+}

@@ -1,0 +1,80 @@
+//! The purpose of it all: commands that bring the arm as it is to where it should be.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::Placement;
+use crate::fit::{Fit, LinearRows};
+use crate::measurement::Measurements;
+use crate::model::{Model, PoseResiduals};
+use crate::problem::Problem;
+use crate::solver::{self, Bounds, Settings};
+
+use super::stage::StageError;
+
+/// 1 σ of the target position against 1 σ = 1 (rad or m) of the way from the seed: the position decides, the seed breaks
+/// ties [m].
+const POSITION_WEIGHT: f64 = 1e-6;
+/// A target counts as reached within this distance [m].
+const REACHED: f64 = 1e-6;
+
+/// A command for one target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Command {
+    /// Row of the target.
+    pub row: usize,
+    /// Configuration, shape = (joints) [rad] or [m]; the seed's value at fixed joints.
+    pub configuration: Vec<f64>,
+    /// Desired − predicted position [m].
+    pub miss: Vector3<f64>,
+    /// Distance to the target before: with the seed as command [m].
+    pub seed_miss: f64,
+}
+
+impl Command {
+    /// Whether the arm gets there.
+    pub fn is_reached(&self) -> bool {
+        self.miss.norm() <= REACHED
+    }
+}
+
+/// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the
+/// row's position, within the joint limits of `problem`.
+///
+/// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖q − seed‖²: Newton's method on the position by dual numbers, with
+/// redundancy resolved towards the seed.
+///
+/// # Errors
+/// A seed lies outside the joint limits so far that no configuration is left (limits that exclude each other).
+pub fn compensate(
+    problem: &Problem,
+    model: &Model,
+    x: &DVector<f64>,
+    targets: &Measurements,
+) -> Result<Vec<Command>, StageError> {
+    let placement = Placement::of(targets);
+    let arm = model.commanded(problem, x);
+    let rows: Vec<usize> = (0..targets.len()).collect();
+    let unknowns: Vec<usize> = (0..arm.parameters.len()).collect();
+    let moving = arm.moving_joints();
+    let mut commands = Vec::with_capacity(rows.len());
+    for (row, pose) in placement.poses(targets, &rows, POSITION_WEIGHT).into_iter().enumerate() {
+        let seed = targets.configuration(row);
+        let bound = |pick: fn((f64, f64)) -> f64| {
+            DVector::from_iterator(moving.len(), moving.iter().map(|&j| pick(problem.joints[j].limits) - seed[j]))
+        };
+        let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
+        let n = moving.len();
+        let residuals = PoseResiduals::new(&arm, vec![pose], unknowns.clone(), DVector::zeros(n));
+        let near = LinearRows { matrix: DMatrix::identity(n, n), constant: DVector::zeros(n) };
+        let fit = Fit::new(&residuals).with_rows(near)?;
+        let solution = solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default());
+        let miss = residuals.position_errors(&solution.x)[0];
+        let mut configuration = seed.to_vec();
+        for (&joint, step) in moving.iter().zip(solution.x.iter()) {
+            configuration[joint] += step;
+        }
+        let seed_miss = residuals.position_errors(&DVector::zeros(n))[0].norm();
+        commands.push(Command { row, configuration, miss, seed_miss });
+    }
+    Ok(commands)
+}

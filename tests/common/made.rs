@@ -1,0 +1,128 @@
+//! Measurements that the model itself makes.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+use std::path::PathBuf;
+
+use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::parameter::Unit;
+use flexcal::problem::{JointKind, Problem};
+use flexcal::study::Placement;
+use nalgebra::{DVector, Vector3};
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
+
+/// `count` configurations, angles within ±`reach` [rad] and offsets within ±0.3 m; positions are still to be measured.
+pub fn at_random(problem: &Problem, count: usize, reach: f64, rng: &mut ChaCha8Rng) -> Measurements {
+    let kinds: Vec<JointKind> = problem.joints.iter().map(|joint| joint.kind).collect();
+    let configurations = (0..count)
+        .flat_map(|_| kinds.iter().copied())
+        .map(|kind| match kind {
+            JointKind::Revolute => rng.random_range(-reach..reach),
+            JointKind::Prismatic => rng.random_range(-0.3..0.3),
+            JointKind::Fixed => 0.0,
+        })
+        .collect();
+    Measurements {
+        files: vec![PathBuf::from("made.csv")],
+        origin: (2_u32..).take(count).map(|line| (0, line)).collect(),
+        joints: kinds.len(),
+        configurations,
+        positions: vec![Vector3::zeros(); count],
+        sigma: None,
+        payload: None,
+        hoist: None,
+        temperature: None,
+        time: (0_u32..).take(count).map(f64::from).collect(),
+        time_measured: false,
+        approach: None,
+        session: Labels { names: vec![String::new()], of_row: vec![0; count] },
+        target: None,
+        marked_held_out: None,
+    }
+}
+
+/// Labels of the rows, in order of appearance.
+pub fn labels<'a>(words: impl Iterator<Item = &'a str>) -> Labels {
+    let mut labels = Labels::default();
+    for word in words {
+        let known = labels.names.iter().position(|name| name == word);
+        labels.of_row.push(known.unwrap_or(labels.names.len()));
+        if known.is_none() {
+            labels.names.push(word.to_owned());
+        }
+    }
+    labels
+}
+
+/// The rows with these numbers.
+pub fn part(measurements: &Measurements, rows: impl IntoIterator<Item = usize>) -> Measurements {
+    let rows: Vec<usize> = rows.into_iter().collect();
+    let n = measurements.joints;
+    let pick = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
+    let wide = |column: &[f64]| rows.iter().flat_map(|&row| column[row * n..(row + 1) * n].to_vec()).collect();
+    let label = |all: &Labels| labels(rows.iter().map(|&row| all.names[all.of_row[row]].as_str()));
+    Measurements {
+        files: measurements.files.clone(),
+        origin: rows.iter().map(|&row| measurements.origin[row]).collect(),
+        joints: n,
+        configurations: wide(&measurements.configurations),
+        positions: rows.iter().map(|&row| measurements.positions[row]).collect(),
+        sigma: measurements.sigma.as_deref().map(pick),
+        payload: measurements.payload.as_deref().map(pick),
+        hoist: measurements.hoist.as_deref().map(pick),
+        temperature: measurements.temperature.as_deref().map(pick),
+        time: pick(&measurements.time),
+        time_measured: measurements.time_measured,
+        approach: measurements.approach.as_deref().map(wide),
+        session: label(&measurements.session),
+        target: measurements.target.as_ref().map(label),
+        marked_held_out: measurements
+            .marked_held_out
+            .as_ref()
+            .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+    }
+}
+
+/// The model of a problem with the bases and targets of its measurements.
+pub fn model_of(problem: &Problem, measurements: &Measurements) -> Model {
+    let placement = Placement::of(measurements);
+    Model::new(problem, &placement.bases, &placement.targets).unwrap()
+}
+
+/// Positions of every row at the full parameter vector `x` [m].
+pub fn predicted(problem: &Problem, measurements: &Measurements, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+    let model = model_of(problem, measurements);
+    let rows: Vec<usize> = (0..measurements.len()).collect();
+    let poses = Placement::of(measurements).poses(measurements, &rows, 1.0);
+    let errors = PoseResiduals::new(&model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0));
+    measurements.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect()
+}
+
+/// Measures every row on the arm at `x`, with noise of 1 σ = `sigma` [m] on each coordinate.
+pub fn measure(problem: &Problem, rows: &mut Measurements, x: &DVector<f64>, sigma: f64, rng: &mut ChaCha8Rng) {
+    rows.positions = predicted(problem, rows, x);
+    for position in &mut rows.positions {
+        *position += Vector3::from_fn(|_, _| sigma * normal(rng));
+    }
+}
+
+/// Deviations drawn from the priors; parameters without one vary by `size`.
+pub fn draw(model: &Model, size: impl Fn(Unit) -> f64, rng: &mut ChaCha8Rng) -> DVector<f64> {
+    let drawn = model.parameters.iter().map(|parameter| {
+        let sigma = parameter.sigma.unwrap_or_else(|| size(parameter.unit()));
+        sigma * normal(rng)
+    });
+    DVector::from_iterator(model.parameters.len(), drawn)
+}
+
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// The first `count` rows to identify with, the others held out.
+pub fn split_at(count: usize, measurements: &Measurements) -> Split {
+    Split { identification: (0..count).collect(), held_out: (count..measurements.len()).collect() }
+}
