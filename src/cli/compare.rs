@@ -24,7 +24,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
     let line = common.talks().then(Line::new);
-    let result = study::compare(&problem, &measurements, &split, line.as_ref().map(Line::sink));
+    let sink = line.as_ref().map(Line::sink);
+    let result = study::compare(&problem, &measurements, &split, sink.as_ref());
     if let Some(line) = line {
         line.clear();
     }

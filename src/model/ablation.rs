@@ -36,8 +36,8 @@ impl Ablation {
     fn keeps(self, slot: Slot) -> bool {
         match (self, slot) {
             (Self::Rigid, slot) => !slot.is_elastic(),
-            (Self::JointsOnly, Slot::Beam { .. }) => false,
-            (Self::LinksOnly | Self::BendingOnly, Slot::Joint { field: JointField::Stiffness, .. })
+            (Self::JointsOnly, Slot::Beam { .. })
+            | (Self::LinksOnly | Self::BendingOnly, Slot::Joint { field: JointField::Stiffness, .. })
             | (Self::BendingOnly, Slot::Beam { field: BeamField::Axial | BeamField::Twist, .. }) => false,
             _ => true,
         }

@@ -30,12 +30,12 @@ pub fn compare(
     problem: &Problem,
     measurements: &Measurements,
     split: &Split,
-    progress: Option<ProgressSink>,
+    progress: Option<&ProgressSink>,
 ) -> Result<Comparison, IdentifyError> {
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let run = |model: &Model, strategy, solver| {
-        let options = Options { strategy, solver, progress: progress.clone() };
+        let options = Options { strategy, solver, progress: progress.cloned() };
         identify_model(model, problem, measurements, split, &options)
     };
     let bounded = model.parameters.iter().any(Parameter::is_bounded);

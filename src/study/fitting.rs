@@ -96,7 +96,7 @@ impl<'a> Fitting<'a> {
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
-        let mut known = vec![false; self.model.bases];
+        let mut known = vec![false; self.placement.bases.len()];
         for pose in &poses {
             known[pose.base] = true;
         }
