@@ -1,6 +1,6 @@
 //! Frames of the rigid arm, eq. 1-2.
 
-use nalgebra::{Matrix4, Rotation3, Vector3};
+use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
 
 use crate::problem::{Joint, JointKind, Problem};
 use crate::spatial::Frame;
@@ -67,7 +67,7 @@ fn shift(translation: Vector3<f64>) -> Matrix4<f64> {
 }
 
 /// The axes of a transform, as a rotation matrix, and its origin [m].
-pub(super) fn split(transform: &Matrix4<f64>) -> (nalgebra::Matrix3<f64>, Vector3<f64>) {
+pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     (transform.fixed_view::<3, 3>(0, 0).into_owned(), transform.fixed_view::<3, 1>(0, 3).into_owned())
 }
 
@@ -109,7 +109,7 @@ impl Chain {
         }
         after.reverse();
         let frame = Frame::from_rotation_vector(problem.base.translation, &problem.base.rotation);
-        let mut base = frame.rotation().to_homogeneous();
+        let mut base = Matrix3::from_columns(&frame.axes).to_homogeneous();
         base.fixed_view_mut::<3, 1>(0, 3).copy_from(&frame.origin);
         Self { links, base, before, after }
     }

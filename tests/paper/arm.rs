@@ -1,7 +1,5 @@
 //! The lunar sampler, its golden positions, and what the dual-number model says of it.
 
-use std::path::Path;
-
 use flexcal::arm;
 use flexcal::fit::jacobian;
 use flexcal::model::{Model, Pose, PoseResiduals};
@@ -10,13 +8,7 @@ use flexcal::parameter::Parameter;
 use flexcal::problem::{Equilibrium, Freedom, Problem, Quantities};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Table 2 of [Chen2021]: identified α°, a m, θ°, d m, β° of each joint.
-const TABLE_2: [[f64; 5]; 4] = [
-    [0.019, 0.0, -0.008, 0.097, 0.304],
-    [89.996, -0.002, 0.304, -0.084, 0.007],
-    [-0.001, 1.974, 0.189, -0.095, 0.0],
-    [-0.019, 1.766, -0.790, -0.092, 0.005],
-];
+use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
 
 /// A row of `tests/golden`: values in m, three a group.
 pub struct Row {
@@ -36,10 +28,6 @@ impl Row {
     }
 }
 
-fn golden(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
-}
-
 pub fn rows(name: &str) -> Vec<Row> {
     let mut reader = csv::Reader::from_path(golden(name)).unwrap();
     let row = |record: csv::StringRecord| {
@@ -54,11 +42,19 @@ pub fn rows(name: &str) -> Vec<Row> {
     reader.records().map(|record| row(record.unwrap())).collect()
 }
 
-/// The sampler with loads on the rigid arm, every parameter of the arm free and without prior.
+/// The lunar sampler with loads on the rigid arm, every parameter of the arm free and without prior.
 pub fn problem() -> Problem {
-    let mut problem = Problem::read(&golden("problem.toml")).unwrap();
+    prepared(golden_problem())
+}
+
+/// An arm in general position, so that every term matters, prepared likewise.
+pub fn odd_problem() -> Problem {
+    prepared(parse(ODD))
+}
+
+fn prepared(mut problem: Problem) -> Problem {
     problem.statics.equilibrium = Equilibrium::Undeflected;
-    problem.parameters.retain(|rule| !rule.pattern.starts_with("tool"));
+    problem.parameters.retain(|rule| !["tool.*", "base.*"].contains(&rule.pattern.as_str()));
     for rule in &mut problem.parameters {
         let none = Quantities::default();
         rule.freedom = Freedom::Free { sigma: none, min: none, max: none };
@@ -66,24 +62,21 @@ pub fn problem() -> Problem {
     problem
 }
 
-/// The same without elasticity.
-pub fn rigid_problem() -> Problem {
-    let mut problem = problem();
-    for joint in &mut problem.joints {
-        (joint.stiffness, joint.beam) = (None, None);
-    }
+/// A prepared problem without elasticity.
+pub fn rigid(problem: Problem) -> Problem {
+    let mut problem = without_elasticity(problem);
     problem.parameters.retain(|rule| rule.pattern.starts_with("joint") && rule.pattern != "joint*.stiffness");
     problem
 }
 
-/// The same arm in general position: base and gravity askew, a link along −x, so that every term matters.
-pub fn askew(mut problem: Problem) -> Problem {
-    problem.gravity = Vector3::new(2.0, -3.0, -9.0);
-    problem.base.translation = Vector3::new(0.5, -0.2, 0.1);
-    problem.base.rotation = Vector3::new(0.3, -0.8, 1.1);
-    problem.joints[2].a = -1.95;
-    problem.joints[3].kind = flexcal::problem::JointKind::Prismatic;
-    problem
+/// A configuration of the odd arm for each of the sampler's.
+pub fn odd_rows(name: &str) -> Vec<Row> {
+    let mut rows = rows(name);
+    for row in &mut rows {
+        let [a, b, c, d] = row.q[..] else { continue };
+        row.q = vec![a, 0.0, b, 0.2 * c, d];
+    }
+    rows
 }
 
 pub fn table_2() -> Vec<Mdh> {
@@ -134,11 +127,4 @@ pub fn place_in_e(parameter: &Parameter) -> Option<usize> {
     let (joint, field) = parameter.name.strip_prefix("joint")?.split_once('.')?;
     let field = ["alpha", "a", "theta", "d", "beta"].iter().position(|name| *name == field)?;
     Some(5 * (joint.parse::<usize>().unwrap() - 1) + field)
-}
-
-/// The model's x at the geometry of table 2.
-pub fn x_of_table_2(problem: &Problem, model: &Model) -> DVector<f64> {
-    let e = table_2_errors(problem);
-    let x = model.parameters.iter().map(|parameter| place_in_e(parameter).map_or(0.0, |place| e[place]));
-    DVector::from_iterator(model.parameters.len(), x)
 }

@@ -6,7 +6,7 @@ use flexcal::paper::{
 use flexcal::parameter::{BeamField, JointField, Slot};
 use nalgebra::{DVector, Matrix4, Vector6};
 
-use super::arm::{askew, both, dual_jacobian, end, model, problem, rows};
+use super::arm::{both, dual_jacobian, end, model, odd_problem, odd_rows, problem, rows};
 
 fn near(a: f64, b: f64) {
     assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{a} {b}");
@@ -36,7 +36,7 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let (f_r, f_n, s, m_f) = (f * phi_3.sin(), f * phi_3.cos(), 0.95, -f * 0.06 * phi_3.sin());
 
     let terms = LinkTerms::new(loads.links[3].as_ref().unwrap(), &Form::Corrected.into());
-    near(terms.stretch, (q_r * l * l + 2.0 * (c_r * r + g_r * l + f_r * s)) / 2.0);
+    near(terms.stretch, q_r * l * l / 2.0 + c_r * r + g_r * l + f_r * s);
     let hoist = f_n * s * s * (3.0 * l - s) / 6.0 + m_f * s * (2.0 * l - s) / 2.0;
     let f_y1 = q_n * l.powi(4) + 4.0 * (m_v * l * l + c_n * r * r * (l - r));
     near(terms.bend_y.0, f_y1 / 8.0 + (c_n * r.powi(3) + g_n * l.powi(3)) / 3.0 + hoist);
@@ -165,37 +165,43 @@ fn d_f_of_eq_27_agrees_with_the_independent_simulator_only_when_corrected() {
 fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
     let soft = 1e-10_f64;
     let mut worst = 0.0_f64;
-    for problem in [problem(), askew(problem())] {
-        let model = model(&problem);
-        for parameters in both(&problem) {
-            // x = ln(stiffness / nominal): everything 10¹⁰ times as stiff.
-            let geometry = parameters.geometry.clone();
-            let x = DVector::from_iterator(
-                model.parameters.len(),
-                model.parameters.iter().map(|parameter| match super::arm::place_in_e(parameter) {
-                    Some(place) => *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal,
-                    None => -soft.ln(),
-                }),
-            );
-            for row in rows("first_order.csv") {
-                let dual = dual_jacobian(&model, &row, &x);
-                let end = end(&problem, &parameters, &row, Form::Corrected);
-                for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
-                    let which = match parameter.slot {
-                        Slot::Joint { joint, field: JointField::Stiffness } => Flexibility::Joint(joint),
-                        Slot::Beam { joint, field } => match field {
-                            BeamField::Axial => Flexibility::Axial(joint),
-                            BeamField::Bending => Flexibility::Bending(joint),
-                            BeamField::BendingY => Flexibility::BendingY(joint),
-                            BeamField::BendingZ => Flexibility::BendingZ(joint),
-                            BeamField::Twist => Flexibility::Twist(joint),
-                        },
-                        _ => continue,
-                    };
-                    // ∂p/∂x = −c ∂p/∂c, at c = nominal · soft.
-                    let closed = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
-                    worst = worst.max((closed + column / soft).amax());
-                }
+    let sampler = problem();
+    let [nominal, table_2] = both(&sampler);
+    let odd = odd_problem();
+    let rows = rows("first_order.csv");
+    for (problem, parameters, rows) in [
+        (&sampler, nominal, &rows),
+        (&sampler, table_2, &rows),
+        (&odd, Parameters::nominal(&odd), &odd_rows("first_order.csv")),
+    ] {
+        let model = model(problem);
+        // x = ln(stiffness / nominal): everything 10¹⁰ times as stiff.
+        let geometry = parameters.geometry.clone();
+        let x = DVector::from_iterator(
+            model.parameters.len(),
+            model.parameters.iter().map(|parameter| match super::arm::place_in_e(parameter) {
+                Some(place) => *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal,
+                None => -soft.ln(),
+            }),
+        );
+        for row in rows {
+            let dual = dual_jacobian(&model, row, &x);
+            let end = end(problem, &parameters, row, Form::Corrected);
+            for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
+                let which = match parameter.slot {
+                    Slot::Joint { joint, field: JointField::Stiffness } => Flexibility::Joint(joint),
+                    Slot::Beam { joint, field } => match field {
+                        BeamField::Axial => Flexibility::Axial(joint),
+                        BeamField::Bending => Flexibility::Bending(joint),
+                        BeamField::BendingY => Flexibility::BendingY(joint),
+                        BeamField::BendingZ => Flexibility::BendingZ(joint),
+                        BeamField::Twist => Flexibility::Twist(joint),
+                    },
+                    _ => continue,
+                };
+                // ∂p/∂x = −c ∂p/∂c, at c = nominal · soft.
+                let closed = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
+                worst = worst.max((closed + column / soft).amax());
             }
         }
     }

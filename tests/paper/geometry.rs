@@ -4,7 +4,7 @@ use flexcal::paper::{Chain, Form, Parameters, least_squares};
 use nalgebra::{DMatrix, DVector};
 
 use super::arm::{
-    askew, both, dual_jacobian, end, model, place_in_e, problem, rigid_problem, rows, table_2_errors, x_of_table_2,
+    both, dual_jacobian, end, model, odd_problem, odd_rows, place_in_e, problem, rigid, rows, table_2, table_2_errors,
 };
 
 #[test]
@@ -22,18 +22,25 @@ fn frames_of_eq_1_and_2_meet_the_independent_simulator() {
 #[test]
 fn j_g_of_eq_31_to_38_equals_dual_numbers() {
     let mut worst = 0.0_f64;
-    for problem in [rigid_problem(), askew(rigid_problem())] {
+    let sampler = rigid(problem());
+    let at_table_2 = {
+        let mut problem = sampler.clone();
+        for (joint, link) in problem.joints.iter_mut().zip(table_2()) {
+            (joint.alpha, joint.a, joint.theta, joint.d, joint.beta) =
+                (link.alpha, link.a, link.theta, link.d, link.beta);
+        }
+        problem
+    };
+    let rows = rows("rigid.csv");
+    for (problem, rows) in [(sampler, &rows), (at_table_2, &rows), (rigid(odd_problem()), &odd_rows("rigid.csv"))] {
         let model = model(&problem);
         let zero = DVector::zeros(model.parameters.len());
-        for row in rows("rigid.csv") {
-            let errors = [zero.clone(), x_of_table_2(&problem, &model)];
-            for (parameters, x) in both(&problem).iter().zip(&errors) {
-                let closed = end(&problem, parameters, &row, Form::Corrected).jacobian();
-                let dual = dual_jacobian(&model, &row, x);
-                for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
-                    let Some(place) = place_in_e(parameter) else { continue };
-                    worst = worst.max((closed.column(place) - column).amax());
-                }
+        assert_eq!(zero.len(), 5 * problem.joints.len());
+        for row in rows {
+            let closed = end(&problem, &Parameters::nominal(&problem), row, Form::Corrected).jacobian();
+            let dual = dual_jacobian(&model, row, &zero);
+            for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
+                worst = worst.max((closed.column(place_in_e(parameter).unwrap()) - column).amax());
             }
         }
     }

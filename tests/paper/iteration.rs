@@ -8,7 +8,7 @@ use flexcal::solver::{
 };
 use nalgebra::{DVector, Vector3};
 
-use super::arm::{Row, model, rigid_problem, rows};
+use super::arm::{Row, model, problem, rigid, rows};
 
 /// Poses of the rigid arm measured with the geometry of table 2, exactly.
 fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
@@ -35,7 +35,7 @@ fn rms(errors: &[Vector3<f64>]) -> f64 {
 
 #[test]
 fn converges_on_identifiable_parameters() {
-    let problem = rigid_problem();
+    let problem = rigid(problem());
     let model = model(&problem);
     let rows = rows("rigid.csv");
     let poses = poses(&rows);
@@ -60,7 +60,7 @@ fn converges_on_identifiable_parameters() {
 
 #[test]
 fn with_all_redundant_columns_diverges_untruncated_and_says_so() {
-    let problem = rigid_problem();
+    let problem = rigid(problem());
     let model = model(&problem);
     let rows = rows("rigid.csv");
     let n = model.parameters.len();
@@ -88,7 +88,7 @@ fn with_all_redundant_columns_diverges_untruncated_and_says_so() {
 
 #[test]
 fn gauss_newton_reports_a_singular_jacobian() {
-    let problem = rigid_problem();
+    let problem = rigid(problem());
     let model = model(&problem);
     let rows = rows("rigid.csv");
     // The target on axis 4: nothing there for θ₄ to move.
@@ -107,7 +107,7 @@ fn gauss_newton_reports_a_singular_jacobian() {
 
 #[test]
 fn starts_that_cannot_be_used_are_named() {
-    let problem = rigid_problem();
+    let problem = rigid(problem());
     let model = model(&problem);
     let rows = rows("rigid.csv");
     let n = model.parameters.len();
