@@ -1,13 +1,12 @@
 //! The paper's procedure: stiffness by linear least squares, then geometry by the iterated pseudo-inverse, eq. 42-45.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::form::{Form, Misprint, Reading};
 use super::loads::Setup;
+use super::residuals::GeometryResiduals;
 use super::{EndPoint, Parameters};
-use crate::fit::{Block, Fit, LeastSquares, Triangle};
+use crate::fit::{Block, Fit, Triangle};
 use crate::problem::Problem;
 use crate::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
 
@@ -143,8 +142,8 @@ pub fn identify(problem: &Problem, poses: &[Measured], options: &Options) -> Res
             stiffness(problem, poses, &options.reading, tolerance).ok_or(IdentifyError::NotFinite)?
         }
     };
-    let geometry = GeometryResiduals { problem, poses, parameters: &parameters, unknowns, reading: options.reading };
-    let start = DVector::zeros(geometry.unknowns.len());
+    let start = DVector::zeros(unknowns.len());
+    let geometry = GeometryResiduals::new(problem, poses, &parameters, unknowns, options.reading);
     let iteration = minimise_pseudo_inverse(Fit::new(&geometry), start, &options.iteration);
     let identified = geometry.at(&iteration.x);
     parameters.geometry = identified.geometry;
@@ -176,76 +175,4 @@ pub fn stiffness(problem: &Problem, poses: &[Measured], reading: &Reading, toler
 fn geometric_unknowns(joints: usize, reading: &Reading) -> Vec<usize> {
     let beta = 4;
     (0..5 * joints).filter(|k| k % 5 != beta || !reading.keeps(Misprint::BetaLeftOut)).collect()
-}
-
-/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
-///
-/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near the minimum of ‖r‖, not
-/// in it.
-pub struct GeometryResiduals<'a> {
-    problem: &'a Problem,
-    poses: &'a [Measured<'a>],
-    parameters: &'a Parameters,
-    unknowns: Vec<usize>,
-    reading: Reading,
-}
-
-impl<'a> GeometryResiduals<'a> {
-    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are places in
-    /// e = [e₁ … e_n], and every pose has as many joints as the arm.
-    pub fn new(
-        problem: &'a Problem,
-        poses: &'a [Measured<'a>],
-        parameters: &'a Parameters,
-        unknowns: Vec<usize>,
-        reading: Reading,
-    ) -> Self {
-        Self { problem, poses, parameters, unknowns, reading }
-    }
-
-    /// The parameters at errors `x` of the unknowns.
-    pub fn at(&self, x: &DVector<f64>) -> Parameters {
-        let mut parameters = self.parameters.clone();
-        for (&place, x) in self.unknowns.iter().zip(x) {
-            *parameters.geometry[place / 5].fields_mut()[place % 5] += x;
-        }
-        parameters
-    }
-}
-
-impl LeastSquares for GeometryResiduals<'_> {
-    fn parameters(&self) -> usize {
-        self.unknowns.len()
-    }
-
-    fn items(&self) -> usize {
-        self.poses.len()
-    }
-
-    fn rows_per_item(&self) -> usize {
-        3
-    }
-
-    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-        let parameters = self.at(x);
-        for (pose, out) in self.poses[items].iter().zip(out.chunks_exact_mut(3)) {
-            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
-            out.copy_from_slice((pose.position - end.position(&parameters)).as_slice());
-        }
-    }
-
-    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
-        let parameters = self.at(x);
-        for (item, pose) in self.poses[items].iter().enumerate() {
-            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
-            let rows = 3 * item..3 * item + 3;
-            let jacobian = end.jacobian();
-            for (column, &place) in self.unknowns.iter().enumerate() {
-                let derivative = -jacobian.column(place);
-                block.column_mut(column)[rows.clone()].copy_from_slice(derivative.as_slice());
-            }
-            let residual = pose.position - end.position(&parameters);
-            block.column_mut(self.unknowns.len())[rows].copy_from_slice(residual.as_slice());
-        }
-    }
 }

@@ -34,10 +34,10 @@ pub struct LinkTerms {
 }
 
 /// Loads of one bending plane: forces across the link and moments that bend the same way.
-struct Plane<'a> {
+struct Plane {
     spread: f64,
     tip: (f64, f64),
-    points: &'a dyn Fn(&PointLoad) -> (f64, f64),
+    points: fn(&PointLoad) -> (f64, f64),
 }
 
 impl LinkTerms {
@@ -74,12 +74,12 @@ impl LinkTerms {
         let y = Plane {
             spread: loads.spread.y,
             tip: (tip.force.y, tip.moment.z),
-            points: &|p| (p.wrench.force.y, p.wrench.moment.z),
+            points: |p| (p.wrench.force.y, p.wrench.moment.z),
         };
         let z = Plane {
             spread: loads.spread.z,
             tip: (tip.force.z, -tip.moment.y),
-            points: &|p| (p.wrench.force.z, -p.wrench.moment.y),
+            points: |p| (p.wrench.force.z, -p.wrench.moment.y),
         };
         // A link along −x: its flexibilities enter with the sign of l.
         let sign = l.signum();
@@ -118,7 +118,7 @@ impl LinkTerms {
     }
 }
 
-impl Plane<'_> {
+impl Plane {
     /// EI times deflection and slope of the tip; `lever` is what the tip force is multiplied by.
     fn bend(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
         let (force, moment) = self.tip;

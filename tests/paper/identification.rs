@@ -83,6 +83,16 @@ fn geometry_is_found_with_the_stiffness_known() {
 }
 
 #[test]
+fn untruncated_iteration_of_all_5n_parameters_diverges_and_says_so() {
+    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
+    let mut options = Options { stiffness: KNOWN, ..Form::Corrected.into() };
+    options.iteration.tolerance = 0.0;
+    let (found, _) = case.run(options);
+    assert_eq!(found.iteration.termination, Termination::Diverged);
+}
+
+#[test]
 fn one_sweep_takes_geometric_errors_for_deflection() {
     let (problem, rows) = (problem(), rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
