@@ -9,6 +9,7 @@ pub mod paper;
 pub mod parameter;
 pub mod problem;
 pub mod report;
+pub mod rig;
 pub mod scalar;
 pub mod solver;
 pub mod spatial;

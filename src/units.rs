@@ -36,12 +36,42 @@ pub(crate) const TIME: Kind = Kind { noun: "a time", units: &[si("s")] };
 /// Relative to a nominal value.
 pub(crate) const RELATIVE: Kind = Kind { noun: "a ratio", units: &[si("relative")] };
 
+/// Angle per moment.
+pub(crate) const COMPLIANCE: Kind = Kind { noun: "a compliance", units: &[si("rad_per_N_m")] };
+/// Angle per cube of a moment.
+pub(crate) const CUBIC_COMPLIANCE: Kind = Kind { noun: "a cubic compliance", units: &[si("rad_per_N3_m3")] };
+/// Curvature per moment.
+pub(crate) const FLEXIBILITY: Kind = Kind { noun: "a flexibility", units: &[si("per_N_m2")] };
+pub(crate) const ANGLE_PER_DEGREE: Kind =
+    Kind { noun: "an angle per °C", units: &[Unit { suffix: "deg_per_C", to_si: f64::to_radians }, si("rad_per_C")] };
+pub(crate) const LENGTH_PER_DEGREE: Kind = Kind {
+    noun: "a length per °C",
+    units: &[si("m_per_C"), Unit { suffix: "mm_per_C", to_si: |length| length / 1000.0 }],
+};
+pub(crate) const STRAIN_PER_DEGREE: Kind = Kind { noun: "a strain per °C", units: &[si("per_C")] };
+pub(crate) const CURVATURE_PER_DEGREE: Kind = Kind { noun: "a curvature per °C", units: &[si("per_m_C")] };
+pub(crate) const PER_LENGTH: Kind = Kind { noun: "a number per length", units: &[si("per_m")] };
+pub(crate) const SPEED: Kind = Kind {
+    noun: "a speed",
+    units: &[
+        si("m_per_s"),
+        Unit { suffix: "mm_per_s", to_si: |speed| speed / 1000.0 },
+        Unit { suffix: "mm_per_h", to_si: |speed| speed / 3.6e6 },
+    ],
+};
+
 const ALL: [&Kind; 9] = [&ANGLE, &LENGTH, &MASS, &FORCE, &RIGIDITY, &STIFFNESS, &ACCELERATION, &TEMPERATURE, &TIME];
 
 impl Kind {
     /// The unit of this kind with that suffix.
     pub fn unit(&self, suffix: &str) -> Option<Unit> {
         self.units.iter().copied().find(|unit| unit.suffix == suffix)
+    }
+
+    /// Suffix of the SI unit.
+    pub fn si_suffix(&self) -> &'static str {
+        let is_si = |unit: &&Unit| (unit.to_si)(1.0).to_bits() == 1.0_f64.to_bits();
+        self.units.iter().find(is_si).map_or("", |unit| unit.suffix)
     }
 
     /// How to write a quantity of this kind: `alpha_deg or alpha_rad`.

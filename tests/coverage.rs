@@ -163,7 +163,7 @@ fn ur10() -> Trial {
 
 #[test]
 fn errors_cover_the_truth_with_priors() {
-    lunar_sampler().check("lunar sampler", 100);
+    lunar_sampler().check("lunar sampler", 200);
 }
 
 #[test]

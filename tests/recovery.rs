@@ -118,10 +118,9 @@ fn stiffnesses_come_back_from_exact_positions() {
 
 #[test]
 fn geometry_and_stiffness_come_back_together() {
-    let problem = with_parameters(
-        "tests/golden/problem.toml",
-        "\"joint*\" = { free = true }\n\"A.*\" = { free = true }\n\"B.*\" = { free = true }",
-    );
+    // The stretch of a link is hardly seen: without a prior its EA may run away.
+    let rules = "\"joint*\" = { free = true }\n\"*.EI\" = { free = true }\n\"*.GJ\" = { free = true }";
+    let problem = with_parameters("tests/golden/problem.toml", rules);
     let mut rows = measured(&problem, &["tests/cases/h-none-large.csv"]);
     let model = model_of(&problem, &rows);
     let truth = table_2_deviations(&model.parameters)

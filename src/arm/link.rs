@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::Flexibility;
 use crate::problem::{self, Equilibrium, JointKind, Problem};
 use crate::scalar::Scalar;
-use crate::spatial::Frame;
+use crate::spatial::{Frame, Motion};
 
 /// An angle with its sine and cosine, taken once per arm rather than once per pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,6 +139,15 @@ impl<S: Scalar> Arm<S> {
         self.joints.iter().any(|joint| joint.flexibility.is_some() || joint.beam.is_some())
     }
 
+    /// The last frame of the arm that does not deflect, arm base frame.
+    pub(super) fn rigid_frame(&self, setup: &Setup) -> Frame<S> {
+        let mut frame = Frame::identity();
+        for (joint, &q) in self.joints.iter().zip(setup.configuration) {
+            joint.advance(&mut frame, q);
+        }
+        frame
+    }
+
     /// Payload of a pose [kg].
     pub(super) fn payload(&self, setup: &Setup) -> f64 {
         setup.payload.unwrap_or(self.payload_mass)
@@ -218,16 +227,16 @@ impl<S: Scalar> Joint<S> {
         frame.rotate_y(self.beta.sin_cos);
     }
 
-    /// Carries a point [m] given after the whole rigid `T_i` to its coordinates before it.
-    pub fn carry(&self, point: &Vector3<f64>, q: f64) -> Vector3<S> {
+    /// The rigid `T_i` as one motion for each of α, a, θ, d, β.
+    pub fn motions(&self, q: f64) -> [Motion<S>; 5] {
         let (angle, offset) = self.coordinates(q);
-        let turn = |(sin, cos): (S, S), u: S, v: S| (u * cos - v * sin, u * sin + v * cos);
-        let (sin, cos) = self.beta.sin_cos;
-        let x = cos * point.x + sin * point.z;
-        let z = cos * point.z - sin * point.x + offset;
-        let (x, y) = turn(angle.sin_cos(), x, S::from(point.y));
-        let (y, z) = turn(self.alpha.sin_cos, y, z);
-        Vector3::new(x + self.a, y, z)
+        [
+            Motion::RotateX(self.alpha.sin_cos),
+            Motion::TranslateX(self.a),
+            Motion::RotateZ(angle.sin_cos()),
+            Motion::TranslateZ(offset),
+            Motion::RotateY(self.beta.sin_cos),
+        ]
     }
 
     /// θ and d of a configuration: q adds to one of them.
@@ -240,7 +249,7 @@ impl<S: Scalar> Joint<S> {
     }
 
     /// Moves `frame` through the whole rigid `T_i`.
-    pub fn advance(&self, frame: &mut Frame<S>, q: f64) {
+    fn advance(&self, frame: &mut Frame<S>, q: f64) {
         frame.rotate_x(self.alpha.sin_cos);
         frame.translate_x(self.a);
         self.turn(frame, q, None);

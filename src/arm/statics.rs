@@ -26,7 +26,7 @@ const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
 const SETTLED: f64 = 1e-13;
 /// Directions seeded at once when the response to moments is differentiated.
-const CHUNK: usize = 8;
+const CHUNK: usize = 10;
 
 type Dual = DualSVec64<CHUNK>;
 
@@ -102,7 +102,7 @@ impl Arm<f64> {
         pose.adjoint.clear();
         pose.moments.clear();
         if !self.is_elastic() {
-            pose.frame = self.walk(setup, Bend::Rigid, ws);
+            pose.frame = self.rigid_frame(setup);
             return Ok(());
         }
         self.gather_forces(setup, ws);
@@ -219,7 +219,7 @@ impl<S: Scalar> Arm<S> {
     ) -> Vector3<S> {
         let target = target.map(S::from);
         if pose.moments.is_empty() {
-            return self.walk(setup, Bend::Rigid, ws).point(&target);
+            return self.rigid_frame(setup).point(&target);
         }
         self.gather_forces(setup, ws);
         let mut moments = std::mem::take(&mut ws.moments);

@@ -7,6 +7,7 @@ mod identify;
 mod input;
 mod output;
 mod progress;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
+    /// Make measurements of a known arm on the virtual test rig.
+    Simulate(simulate::Arguments),
 }
 
 /// What a command says to the shell.
@@ -53,6 +56,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -16,6 +16,8 @@ pub enum InputErrorKind {
     // Files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
+    #[error("no such file; give the TRUTH.toml that describes the simulation")]
+    TruthMissing,
     #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
     DataFileMissing { path: PathBuf },
     #[error("cannot be read: {source}")]
@@ -120,6 +122,20 @@ pub enum InputErrorKind {
 
     #[error("the nominal arm has no equilibrium under its loads here; check stiffnesses and masses")]
     NoEquilibrium,
+
+    // The truth of a simulation.
+    #[error("no such parameter; {}", list("there are", known, "the arm has none"))]
+    UnknownParameter { known: Vec<String> },
+    #[error("a range is two numbers, the lower one first; found {found}")]
+    NotARange { found: usize },
+    #[error("no strength; write {write}")]
+    NoStrength { write: String },
+    #[error("the test rig is always in equilibrium; write 1")]
+    AlwaysInEquilibrium,
+    #[error("needs temperatures; write {write}")]
+    NeedsTemperature { write: &'static str },
+    #[error("the problem holds out session \"{session}\", and a simulation has no sessions; use column or fraction")]
+    NoSessions { session: String },
 
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]

@@ -1,26 +1,23 @@
 //! Predicted positions with their derivatives, by dual numbers where the structure of the arm keeps them small.
 //!
-//! A base or a target moves the position rigidly. On a rigid arm so does every link: its five parameters are carried
-//! through its own transform only, and chained with the frames before and the point after it in plain numbers. On an
+//! A base or a target moves the position rigidly. On a rigid arm so does every parameter of a link: the point beyond is
+//! carried through its one motion in dual numbers, and the frame before that motion chains on in plain numbers. On an
 //! elastic arm every load moves too, so the parameters go through the whole statics in chunks.
 
 use nalgebra::{DVector, Vector3};
-use num_dual::DualSVec64;
+use num_dual::{Dual64, DualSVec64};
 
 use super::{Model, Pose};
 use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Workspace};
 use crate::fit::Block;
 use crate::parameter::{JointField, Slot};
 use crate::scalar::{gradient, seeded};
-use crate::spatial::{Frame, rotate};
+use crate::spatial::{Frame, Motion, rotation_axes};
 
 /// Parameters seeded at once on an elastic arm.
-const CHUNK: usize = 8;
-/// Geometric parameters of a link.
-const LINK: usize = 5;
+const CHUNK: usize = 10;
 
 type ChunkDual = DualSVec64<CHUNK>;
-type LinkDual = DualSVec64<LINK>;
 
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
@@ -45,16 +42,31 @@ struct Target {
 
 /// How the arm's own parameters are differentiated.
 enum Inner {
-    /// Link by link; `frames` are those before each link of the pose at hand.
-    Rigid { links: Vec<Link>, frames: Vec<Frame<f64>> },
+    /// Motion by motion; `passed` are those of the pose at hand.
+    Rigid { links: Vec<Link>, passed: Vec<Passed> },
     /// In chunks through the statics.
-    Elastic { response: Box<Response>, chunks: Vec<Chunk>, memory: Box<(Workspace<f64>, Workspace<ChunkDual>)> },
+    Elastic(Box<Elastic>),
 }
 
-/// A link of a rigid arm with its five parameters seeded, and their columns.
+/// An elastic arm, chunk by chunk, with memory for its walks.
+struct Elastic {
+    response: Response,
+    chunks: Vec<Chunk>,
+    real: Workspace<f64>,
+    ws: Workspace<ChunkDual>,
+}
+
+/// A link of a rigid arm with each of its five parameters seeded, and their columns.
 struct Link {
-    joint: Joint<LinkDual>,
-    columns: [Option<usize>; LINK],
+    joint: Joint<Dual64>,
+    columns: [Option<usize>; 5],
+}
+
+/// A motion of a rigid arm, its parameter seeded, with the frame before it (measuring frame) and its column.
+struct Passed {
+    motion: Motion<Dual64>,
+    before: Frame<f64>,
+    column: Option<usize>,
 }
 
 /// The arm with up to [`CHUNK`] of its parameters seeded, and their columns.
@@ -94,10 +106,14 @@ impl Linearised {
                 arm: model.arm(|k| seeded(x[k], part.iter().position(|&(_, seeded)| seeded == k))),
                 columns: part.iter().map(|&(column, _)| column).collect(),
             });
-            let response = Box::new(Response::new(&arm));
-            Inner::Elastic { response, chunks: chunks.collect(), memory: Box::default() }
+            Inner::Elastic(Box::new(Elastic {
+                response: Response::new(&arm),
+                chunks: chunks.collect(),
+                real: Workspace::default(),
+                ws: Workspace::default(),
+            }))
         } else {
-            Inner::Rigid { links: links(model, &arm, &own), frames: Vec::new() }
+            Inner::Rigid { links: links(model, &arm, &own), passed: Vec::new() }
         };
         Self { arm, bases, targets, inner, rest: Equilibrated::default() }
     }
@@ -106,22 +122,22 @@ impl Linearised {
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
         let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
-        let Some(last) = self.inner.last_frame(&self.arm, pose, &mut self.rest) else {
+        let Some(last) = self.inner.last_frame(&self.arm, pose, base, &mut self.rest) else {
             rows.put(rows.block.parameters(), &Vector3::from_element(f64::NAN));
             return;
         };
-        let in_arm = last.point(&target.position);
-        let predicted = base.frame.point(&in_arm);
+        let predicted = last.point(&target.position);
         rows.put(rows.block.parameters(), &(predicted - pose.measured));
         for (axis, &column) in base.columns.iter().enumerate() {
             if axis < 3 {
                 rows.put_if(column, || Vector3::ith(axis, 1.0));
             } else {
-                rows.put_if(column, || base.turning[axis - 3].vector(&in_arm));
+                let in_arm = || base.frame.resolve(&(predicted - base.frame.origin));
+                rows.put_if(column, || base.turning[axis - 3].vector(&in_arm()));
             }
         }
         for (axis, &column) in target.columns.iter().enumerate() {
-            rows.put_if(column, || base.frame.vector(&last.axes[axis]));
+            rows.put_if(column, || last.axes[axis]);
         }
         self.inner.write(pose, base, target, &mut self.rest, &mut rows);
     }
@@ -149,42 +165,44 @@ impl Rows<'_> {
 }
 
 impl Inner {
-    /// The last frame of a pose, arm base frame; `None` where it has no equilibrium.
-    fn last_frame(&mut self, arm: &Arm<f64>, pose: &Pose, rest: &mut Equilibrated) -> Option<Frame<f64>> {
+    /// The last frame of a pose, measuring frame; `None` where it has no equilibrium.
+    fn last_frame(&mut self, arm: &Arm<f64>, pose: &Pose, base: &Base, rest: &mut Equilibrated) -> Option<Frame<f64>> {
         match self {
-            Self::Rigid { frames, .. } => {
-                let mut frame = Frame::identity();
-                frames.clear();
-                for (joint, &q) in arm.joints.iter().zip(pose.setup.configuration) {
-                    frames.push(frame);
-                    joint.advance(&mut frame, q);
+            Self::Rigid { links, passed } => {
+                let mut frame = base.frame;
+                passed.clear();
+                for (link, &q) in links.iter().zip(pose.setup.configuration) {
+                    for (motion, column) in link.joint.motions(q).into_iter().zip(link.columns) {
+                        passed.push(Passed { motion, before: frame, column });
+                        motion.re().apply(&mut frame);
+                    }
                 }
                 Some(frame)
             }
-            Self::Elastic { memory, .. } => arm.equilibrate(&pose.setup, &mut memory.0, rest).ok().map(|()| rest.frame),
+            Self::Elastic(elastic) => {
+                arm.equilibrate(&pose.setup, &mut elastic.real, rest).ok().map(|()| base.frame.seen(&rest.frame))
+            }
         }
     }
 
     /// Writes the derivatives with respect to the arm's own parameters, once its last frame is known.
     fn write(&mut self, pose: &Pose, base: &Base, target: &Target, rest: &mut Equilibrated, rows: &mut Rows) {
         match self {
-            Self::Rigid { links, frames } => {
+            Self::Rigid { passed, .. } => {
                 let mut after = target.position;
-                for (i, (link, frame)) in links.iter().zip(frames).enumerate().rev() {
-                    let moved = link.joint.carry(&after, pose.setup.configuration[i]);
-                    let gradients = moved.map(|coordinate| gradient(&coordinate));
-                    for (k, &column) in link.columns.iter().enumerate() {
-                        rows.put_if(column, || base.frame.vector(&frame.vector(&gradients.map(|g| g[k]))));
-                    }
+                for Passed { motion, before, column } in passed.iter().rev() {
+                    let moved = motion.carry(&after);
+                    rows.put_if(*column, || before.vector(&moved.map(|coordinate| coordinate.eps)));
                     after = moved.map(|coordinate| coordinate.re);
                 }
             }
-            Self::Elastic { response, chunks, memory } => {
+            Self::Elastic(elastic) => {
+                let Elastic { response, chunks, ws, .. } = &mut **elastic;
                 if !chunks.is_empty() {
                     response.adjoint(&pose.setup, &target.position, rest);
                 }
                 for chunk in chunks {
-                    let position = chunk.arm.target_position(&pose.setup, &target.position, rest, &mut memory.1);
+                    let position = chunk.arm.target_position(&pose.setup, &target.position, rest, ws);
                     let gradients = position.map(|coordinate| gradient(&coordinate));
                     for (k, &column) in chunk.columns.iter().enumerate() {
                         rows.put(column, &base.frame.vector(&gradients.map(|g| g[k])));
@@ -197,17 +215,14 @@ impl Inner {
 
 /// The links of a rigid arm, each with its own parameters seeded.
 fn links(model: &Model, arm: &Arm<f64>, own: &[(usize, usize)]) -> Vec<Link> {
-    let seed = |joint: &Joint<f64>| {
-        let mut seeded_joint: Joint<LinkDual> = joint.lift();
-        seeded_joint.alpha = Angle::new(seeded(joint.alpha.value, Some(0)));
-        seeded_joint.a = seeded(joint.a, Some(1));
-        seeded_joint.theta = seeded(joint.theta, Some(2));
-        seeded_joint.d = seeded(joint.d, Some(3));
-        seeded_joint.beta = Angle::new(seeded(joint.beta.value, Some(4)));
-        seeded_joint
+    let seed = |value: f64| Dual64::from(value).derivative();
+    let link = |joint: &Joint<f64>| {
+        let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
+        let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
+        let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
+        Link { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, columns: [None; 5] }
     };
-    let mut links: Vec<Link> =
-        arm.joints.iter().map(|joint| Link { joint: seed(joint), columns: [None; LINK] }).collect();
+    let mut links: Vec<Link> = arm.joints.iter().map(link).collect();
     for &(column, k) in own {
         if let Slot::Joint { joint, field } = model.parameters[k].slot
             && let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field)
@@ -221,6 +236,6 @@ fn links(model: &Model, arm: &Arm<f64>, own: &[(usize, usize)]) -> Vec<Link> {
 /// Derivatives of a rotation exp(`[w]×`) with respect to the three coordinates of w, as the derivatives of its axes.
 fn turning(w: &Vector3<f64>) -> [Frame<f64>; 3] {
     let seeded_w: Vector3<DualSVec64<3>> = Vector3::from_fn(|i, _| seeded(w[i], Some(i)));
-    let axes = Frame::identity().axes.map(|axis| rotate(&seeded_w, &axis).map(|coordinate| gradient(&coordinate)));
+    let axes = rotation_axes(&seeded_w).map(|axis| axis.map(|coordinate| gradient(&coordinate)));
     std::array::from_fn(|k| Frame { axes: axes.map(|axis| axis.map(|g| g[k])), origin: Vector3::zeros() })
 }

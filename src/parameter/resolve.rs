@@ -2,6 +2,7 @@
 
 use super::{BeamField, JointField, Parameter, Slot, Unit};
 use crate::error::{InputError, InputErrorKind};
+use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
 
 /// A scalar of the model that a rule may free.
@@ -140,34 +141,5 @@ fn of_kind(quantities: &Quantities, unit: Unit) -> Option<f64> {
         Unit::Angle => quantities.angle,
         Unit::Length => quantities.length,
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => quantities.relative,
-    }
-}
-
-/// Whether `name` fits `pattern`, in which `*` stands for any run of characters.
-fn matches(pattern: &str, name: &str) -> bool {
-    let mut parts = pattern.split('*');
-    let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else { return false };
-    let mut parts: Vec<&str> = parts.collect();
-    let Some(last) = parts.pop() else { return rest.is_empty() };
-    for part in parts {
-        let Some(found) = rest.find(part) else { return false };
-        rest = &rest[found + part.len()..];
-    }
-    rest.ends_with(last)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::matches;
-
-    #[test]
-    fn stars_match_any_run() {
-        assert!(matches("joint*.alpha", "joint12.alpha"));
-        assert!(matches("*", "tool.x"));
-        assert!(matches("base[*].r*", "base[A].rx"));
-        assert!(matches("A.EI", "A.EI"));
-        assert!(!matches("A.EI", "A.EIy"));
-        assert!(!matches("joint*.a", "joint1.alpha"));
-        assert!(!matches("ab*ba", "aba"));
     }
 }

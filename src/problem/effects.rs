@@ -9,7 +9,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::units::TIME;
 
 /// The effects by name.
-pub(super) const NAMES: [&str; 21] = [
+pub(crate) const NAMES: [&str; 21] = [
     "joint-compliance",
     "joint-harmonic",
     "gear-ratio",
@@ -52,7 +52,7 @@ pub(super) fn read(root: &mut Section<'_, '_>, joints: &[Joint]) -> Result<Vec<E
 }
 
 /// One effect; `true` stands for no arguments.
-fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Result<Effect, InputError> {
+pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Result<Effect, InputError> {
     let empty = DeTable::new();
     let section = match item.boolean() {
         Ok(true) => item.section_of(&empty),

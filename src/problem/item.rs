@@ -1,23 +1,49 @@
 //! A value of the problem file together with its place.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::{fs, io};
 
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
 use super::section::Section;
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind, Location, lines};
 
 /// The text that is read, and its name.
-pub(super) struct Document {
+pub(crate) struct Document {
     pub file: PathBuf,
     pub text: Arc<str>,
 }
 
 impl Document {
+    /// Reads a text file; `missing` is the mistake where there is none.
+    pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
+        let bytes = fs::read(file).map_err(|source| {
+            Location::file(file).error(match source.kind() {
+                io::ErrorKind::NotFound => missing,
+                _ => InputErrorKind::Unreadable { source },
+            })
+        })?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            Location::file(file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
+        })?;
+        Ok(Self { file: file.to_owned(), text: Arc::from(text) })
+    }
+
+    /// The text as a table of TOML.
+    pub fn table(&self) -> Result<Spanned<DeTable<'_>>, InputError> {
+        DeTable::parse(&self.text).map_err(|error| {
+            let span = error.span().unwrap_or(self.text.len()..self.text.len());
+            let near_text = self.text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
+            let message = error.message().to_owned();
+            self.locate(span).error(InputErrorKind::Syntax { message, near_text })
+        })
+    }
+
     /// A part of the text.
     pub fn locate(&self, span: Range<usize>) -> Location {
         Location::in_text(&self.file, &self.text, span)
@@ -26,7 +52,7 @@ impl Document {
 
 /// A value and its place.
 #[derive(Clone)]
-pub(super) struct Item<'a, 'i> {
+pub(crate) struct Item<'a, 'i> {
     document: &'a Document,
     key: String,
     value: &'a DeValue<'i>,

@@ -4,11 +4,12 @@
 //! and never changed afterwards.
 
 mod arm;
-mod effects;
-mod item;
+pub(crate) mod effects;
+pub(crate) mod item;
 mod parameters;
+pub(crate) mod pattern;
 mod read;
-mod section;
+pub(crate) mod section;
 
 use std::path::PathBuf;
 

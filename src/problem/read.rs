@@ -2,15 +2,13 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::{fs, io};
 
 use nalgebra::Vector3;
-use toml::de::DeTable;
 
 use super::item::Document;
 use super::section::Section;
 use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters};
-use crate::error::{InputError, InputErrorKind, Location, lines};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
 
 impl Problem {
@@ -20,17 +18,7 @@ impl Problem {
     /// The first mistake found, a file that cannot be read among them.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
-        let bytes = fs::read(&file).map_err(|source| {
-            Location::file(&file).error(match source.kind() {
-                io::ErrorKind::NotFound => InputErrorKind::ProblemMissing,
-                _ => InputErrorKind::Unreadable { source },
-            })
-        })?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-            Location::file(&file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
-        })?;
-        Self::parse(&text, &file)
+        problem_of(&Document::read(&file, InputErrorKind::ProblemMissing)?)
     }
 
     /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
@@ -38,15 +26,12 @@ impl Problem {
     /// # Errors
     /// The first mistake found.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
-        let document = Document { file: file.to_owned(), text: Arc::from(text) };
-        let table = DeTable::parse(text).map_err(|error| {
-            let span = error.span().unwrap_or(text.len()..text.len());
-            let near_text = text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
-            let message = error.message().to_owned();
-            document.locate(span).error(InputErrorKind::Syntax { message, near_text })
-        })?;
-        problem(Section::new(&document, String::new(), 0..0, table.get_ref()))
+        problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
     }
+}
+
+fn problem_of(document: &Document) -> Result<Problem, InputError> {
+    problem(Section::new(document, String::new(), 0..0, document.table()?.get_ref()))
 }
 
 fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {

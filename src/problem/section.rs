@@ -10,7 +10,7 @@ use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{self, Kind, Unit};
 
 /// A table that is being read.
-pub(super) struct Section<'a, 'i> {
+pub(crate) struct Section<'a, 'i> {
     document: &'a Document,
     path: String,
     span: Range<usize>,
@@ -119,7 +119,7 @@ impl<'a, 'i> Section<'a, 'i> {
     }
 
     /// The same, where `base` has this one kind: no unit or the unit of another kind is an error.
-    fn quantity(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
+    pub fn quantity(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
         if let Some(bare) = self.peek(base).filter(|item| !item.holds_tables()) {
             let write = kind.spelled(base);
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: kind.noun, write }));

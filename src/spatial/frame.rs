@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::rotate;
+use super::rotation_axes;
 use crate::scalar::Scalar;
 
 /// A frame seen from another: its axes and its origin [m].
@@ -29,8 +29,7 @@ impl<S: Scalar> Frame<S> {
 
     /// The frame at `origin` [m] turned by the rotation vector `w` [rad].
     pub fn from_rotation_vector(origin: Vector3<S>, w: &Vector3<S>) -> Self {
-        let axes = Self::identity().axes.map(|axis| rotate(w, &axis));
-        Self { axes, origin }
+        Self { axes: rotation_axes(w), origin }
     }
 
     /// Turns about the own x axis, given (sin, cos).
@@ -56,8 +55,7 @@ impl<S: Scalar> Frame<S> {
 
     /// Turns by the rotation vector `w` [rad], own axes.
     pub fn rotate(&mut self, w: &Vector3<S>) {
-        let turned = Self::identity().axes.map(|axis| self.vector(&rotate(w, &axis)));
-        self.axes = turned;
+        self.axes = rotation_axes(w).map(|axis| self.vector(&axis));
     }
 
     /// Moves along the own x axis by `distance` [m].
@@ -83,6 +81,12 @@ impl<S: Scalar> Frame<S> {
     /// Reference coordinates of a vector given in this frame.
     pub fn vector(&self, vector: &Vector3<S>) -> Vector3<S> {
         self.axes[0] * vector.x + self.axes[1] * vector.y + self.axes[2] * vector.z
+    }
+
+    /// A frame given in this one, as seen from the reference frame.
+    #[must_use]
+    pub fn seen(&self, frame: &Self) -> Self {
+        Self { axes: frame.axes.map(|axis| self.vector(&axis)), origin: self.point(&frame.origin) }
     }
 
     /// This frame's coordinates of a vector given in the reference frame.

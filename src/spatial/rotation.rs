@@ -18,6 +18,23 @@ pub fn rotate<S: Scalar>(w: &Vector3<S>, vector: &Vector3<S>) -> Vector3<S> {
     vector + first * a + second * b
 }
 
+/// The columns of the rotation matrix exp(`[w]×`) of a rotation vector `w` [rad].
+///
+/// R = cos φ I + A `[w]×` + B w wᵀ with A and B as in [`rotate`], cos φ = 1 − B φ².
+pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
+    let squares = [w.x * w.x, w.y * w.y, w.z * w.z];
+    let (a, b) = coefficients(squares[0] + squares[1] + squares[2]);
+    let bw = w * b;
+    let [xy, yz, zx] = [bw.x * w.y, bw.y * w.z, bw.z * w.x];
+    let aw = w * a;
+    let diagonal = |first: usize, second: usize| -(squares[first] + squares[second]) * b + 1.0;
+    [
+        Vector3::new(diagonal(1, 2), xy + aw.z, zx - aw.y),
+        Vector3::new(xy - aw.z, diagonal(2, 0), yz + aw.x),
+        Vector3::new(zx + aw.y, yz - aw.x, diagonal(0, 1)),
+    ]
+}
+
 /// (sin φ / φ, (1 − cos φ) / φ²) from φ² [rad²].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < SERIES_BELOW {
@@ -65,6 +82,16 @@ mod tests {
         };
         for angle in [1e-9, 1e-3, 0.099_999, 0.1, 0.100_001, 1.0, 3.0] {
             assert!((at(angle) - reference(angle)).norm() < 1e-14, "{angle}");
+        }
+    }
+
+    #[test]
+    fn axes_are_the_rotated_unit_vectors() {
+        for w in [Vector3::zeros(), Vector3::new(1e-3, -2e-3, 5e-4), Vector3::new(1.0, -2.0, 0.5)] {
+            let rotated = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| rotate(&w, &axis));
+            for (axis, rotated) in rotation_axes(&w).iter().zip(&rotated) {
+                assert!((axis - rotated).norm() < 1e-15);
+            }
         }
     }
 }

@@ -105,12 +105,12 @@ impl<'a> Stage<'a> {
 
     /// Combinations that the data and the priors together leave open at `at`.
     pub fn gauge(&self, at: &DVector<f64>) -> Gauge {
-        let priors = self.priors();
         let n = self.unknowns.len();
-        if priors.nrows() == n {
+        if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
         let data = self.data_triangle(at);
+        let priors = self.priors();
         let stacked =
             DMatrix::from_fn(n + priors.nrows(), n, |i, j| if i < n { data[(i, j)] } else { priors[(i - n, j)] });
         let found = Identifiability::of(&stacked.qr().unpack_r());

@@ -46,11 +46,13 @@ impl Statistics {
             uncertainty = of(noise_factor);
         }
         let errors = uncertainty.standard_errors();
+        // What can be seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
+        let visible = stage.gauge(&end.x).visible;
         let identified = (0..errors.len())
             .map(|j| match priors[j] {
                 _ if held[j] => 0.0,
                 Some(sigma) => (1.0 - (errors[j] / sigma).powi(2)).clamp(0.0, 1.0),
-                None => end.gauge.visible[j],
+                None => end.gauge.visible[j].min(visible[j]),
             })
             .collect();
         Self {

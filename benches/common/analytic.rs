@@ -1,0 +1,157 @@
+//! The geometric Jacobian of a rigid arm written by hand: what automatic differentiation is measured against.
+
+use std::ops::Range;
+
+use flexcal::fit::{Block, LeastSquares};
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::parameter::{JointField, Slot};
+use nalgebra::{DVector, Vector3};
+
+/// The residuals of [`PoseResiduals`] of a rigid arm of revolute joints, base at the origin.
+pub struct Analytic<'a> {
+    residuals: &'a PoseResiduals<'a>,
+    model: &'a Model,
+    nominal: Vec<[f64; 5]>,
+    target: Vector3<f64>,
+}
+
+/// α, a, θ, d, β of a link with the sines and cosines that do not depend on the pose.
+struct Link {
+    alpha: (f64, f64),
+    a: f64,
+    theta: f64,
+    d: f64,
+    beta: (f64, f64),
+    columns: [Option<usize>; 5],
+}
+
+/// Where a link's parameters act in one pose.
+#[derive(Clone, Copy, Default)]
+struct Motion {
+    root: Vector3<f64>,
+    x: Vector3<f64>,
+    joint: Vector3<f64>,
+    z: Vector3<f64>,
+    end: Vector3<f64>,
+    y: Vector3<f64>,
+}
+
+impl<'a> Analytic<'a> {
+    /// For the residuals of an arm of six joints.
+    pub fn new(model: &'a Model, residuals: &'a PoseResiduals<'a>) -> Self {
+        let arm = model.arm(|_| 0.0);
+        let links = arm.joints.iter().map(|j| [j.alpha.value, j.a, j.theta, j.d, j.beta.value]);
+        Self { residuals, model, nominal: links.collect(), target: model.target_positions(&[])[0] }
+    }
+
+    fn links(&self, x: &DVector<f64>) -> (Vec<Link>, Vector3<f64>, [Option<usize>; 3]) {
+        let (mut values, mut columns) = (self.nominal.clone(), vec![[None; 5]; self.nominal.len()]);
+        let (mut target, mut target_columns) = (self.target, [None; 3]);
+        for (column, (&k, x)) in self.residuals.unknowns().iter().zip(x).enumerate() {
+            match self.model.parameters[k].slot {
+                Slot::Joint { joint, field } => {
+                    let place = JointField::GEOMETRY.iter().position(|&f| f == field).unwrap();
+                    values[joint][place] += x;
+                    columns[joint][place] = Some(column);
+                }
+                Slot::Target { axis, .. } => {
+                    target[axis] += x;
+                    target_columns[axis] = Some(column);
+                }
+                Slot::Base { .. } | Slot::Beam { .. } => unreachable!("not in this bench"),
+            }
+        }
+        let links = values.iter().zip(columns).map(|(&[alpha, a, theta, d, beta], columns)| Link {
+            alpha: alpha.sin_cos(),
+            a,
+            theta,
+            d,
+            beta: beta.sin_cos(),
+            columns,
+        });
+        (links.collect(), target, target_columns)
+    }
+}
+
+fn turn(u: &mut Vector3<f64>, v: &mut Vector3<f64>, (sin, cos): (f64, f64)) {
+    (*u, *v) = (*u * cos + *v * sin, *v * cos - *u * sin);
+}
+
+/// Walks outwards; returns the axes and origin of the last frame.
+fn walk(links: &[Link], q: &[f64], mut see: impl FnMut(usize, Motion)) -> ([Vector3<f64>; 3], Vector3<f64>) {
+    let (mut x, mut y, mut z) = (Vector3::x(), Vector3::y(), Vector3::z());
+    let mut origin = Vector3::zeros();
+    for (i, (link, q)) in links.iter().zip(q).enumerate() {
+        let mut motion = Motion { root: origin, x, ..Motion::default() };
+        turn(&mut y, &mut z, link.alpha);
+        origin += x * link.a;
+        (motion.joint, motion.z) = (origin, z);
+        turn(&mut x, &mut y, (link.theta + q).sin_cos());
+        origin += z * link.d;
+        (motion.end, motion.y) = (origin, y);
+        turn(&mut z, &mut x, link.beta);
+        see(i, motion);
+    }
+    ([x, y, z], origin)
+}
+
+impl LeastSquares for Analytic<'_> {
+    fn parameters(&self) -> usize {
+        self.residuals.parameters()
+    }
+
+    fn items(&self) -> usize {
+        self.residuals.items()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        3
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        let (links, target, _) = self.links(x);
+        for (pose, out) in self.residuals.poses()[items].iter().zip(out.chunks_exact_mut(3)) {
+            let (axes, origin) = walk(&links, pose.setup.configuration, |_, _| ());
+            let p = origin + axes[0] * target.x + axes[1] * target.y + axes[2] * target.z;
+            out.copy_from_slice(((pose.measured - p) / pose.sigma).as_slice());
+        }
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        let (links, target, target_columns) = self.links(x);
+        let last = block.parameters();
+        let mut motions = [Motion::default(); 6];
+        for (row, pose) in self.residuals.poses()[items].iter().enumerate() {
+            let scale = -1.0 / pose.sigma;
+            let mut put = |column: usize, v: Vector3<f64>| {
+                block.column_mut(column)[3 * row..3 * row + 3].copy_from_slice((v * scale).as_slice());
+            };
+            let (axes, origin) = walk(&links, pose.setup.configuration, |i, motion| motions[i] = motion);
+            let p = origin + axes[0] * target.x + axes[1] * target.y + axes[2] * target.z;
+            put(last, p - pose.measured);
+            for (column, axis) in target_columns.iter().zip(axes) {
+                if let Some(column) = *column {
+                    put(column, axis);
+                }
+            }
+            for (link, m) in links.iter().zip(&motions) {
+                let [alpha, a, theta, d, beta] = link.columns;
+                if let Some(column) = alpha {
+                    put(column, m.x.cross(&(p - m.root)));
+                }
+                if let Some(column) = a {
+                    put(column, m.x);
+                }
+                if let Some(column) = theta {
+                    put(column, m.z.cross(&(p - m.joint)));
+                }
+                if let Some(column) = d {
+                    put(column, m.z);
+                }
+                if let Some(column) = beta {
+                    put(column, m.y.cross(&(p - m.end)));
+                }
+            }
+        }
+    }
+}

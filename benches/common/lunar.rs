@@ -1,0 +1,58 @@
+//! The lunar sampler: two elastic links and three elastic joints, statics on the bent arm, 32 parameters with priors.
+
+use flexcal::fit::{Fit, LinearRows};
+use flexcal::measurement::{Measurements, Split};
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::problem::Problem;
+use flexcal::study::Placement;
+use nalgebra::{DMatrix, DVector};
+
+/// The arm and its 28 identification poses.
+pub struct Lunar {
+    model: Model,
+    measurements: Measurements,
+    split: Split,
+    placement: Placement,
+    sigma: f64,
+}
+
+impl Lunar {
+    /// Reads `problems/lunar-sampler`.
+    pub fn new() -> Self {
+        let problem = Problem::read(&super::file("problems/lunar-sampler/problem.toml")).unwrap();
+        let files = [super::file("problems/lunar-sampler/measurements.csv")];
+        let (measurements, _) = Measurements::read(&files, &problem).unwrap();
+        let placement = Placement::of(&measurements);
+        Self {
+            model: Model::new(&problem, &placement.bases, &placement.targets).unwrap(),
+            split: Split::new(&problem, &measurements).unwrap(),
+            measurements,
+            placement,
+            sigma: problem.data.position_sigma.unwrap(),
+        }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.model.parameters.len()
+    }
+
+    /// Number of identification poses.
+    pub fn poses(&self) -> usize {
+        self.split.identification.len()
+    }
+
+    /// Residuals of the identification poses as a function of all parameters.
+    pub fn residuals(&self) -> PoseResiduals<'_> {
+        let n = self.parameters();
+        let poses = self.placement.poses(&self.measurements, &self.split.identification, self.sigma);
+        PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
+    }
+
+    /// The data with the priors of all parameters.
+    pub fn fit<'a>(&self, residuals: &'a PoseResiduals<'a>) -> Fit<'a, PoseResiduals<'a>> {
+        let weights = self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap().recip());
+        let matrix = DMatrix::from_diagonal(&DVector::from_iterator(self.parameters(), weights));
+        Fit::new(residuals).with_rows(LinearRows { matrix, constant: DVector::zeros(self.parameters()) }).unwrap()
+    }
+}

@@ -1,0 +1,120 @@
+//! Residuals and derivatives of a block of poses; `items` are poses.
+#![allow(clippy::unwrap_used, clippy::wildcard_imports, missing_docs, reason = "a bench may panic")]
+
+mod common;
+
+use common::analytic::Analytic;
+use common::lunar::Lunar;
+use common::ur10::Ur10;
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use flexcal::fit::{Block, LeastSquares, check_jacobian};
+use nalgebra::{DMatrix, DVector};
+
+/// Poses of the rigid arm: a block as the fit makes them.
+const POSES: usize = 256;
+
+fn main() {
+    let ur10 = Ur10::new(8);
+    let residuals = ur10.residuals(&ur10.geometric);
+    let x = Ur10::some_point(&residuals);
+    let difference = common::difference(&Analytic::new(&ur10.model, &residuals), &residuals, &x);
+    assert!(difference < 1e-9, "the hand-written Jacobian differs by {difference}");
+    let all = ur10.residuals(&(0..ur10.model.parameters.len()).collect::<Vec<usize>>());
+    check(&all, &Ur10::some_point(&all));
+    let lunar = Lunar::new();
+    check(&lunar.residuals(), &DVector::from_element(lunar.parameters(), 1e-3));
+    divan::main();
+}
+
+/// Only right derivatives are worth timing.
+fn check(problem: &impl LeastSquares, x: &DVector<f64>) {
+    let check = check_jacobian(problem, x, &DVector::from_element(x.len(), 1e-2));
+    let (column, worst) = check.worst().unwrap();
+    assert!(worst.relative_error < 1e-7_f64.max(2.0 * worst.accuracy), "unknown {column}: {worst:?}");
+}
+
+/// Residuals and Jacobian of all poses of `problem`.
+fn linearise(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
+    let poses = problem.items();
+    let mut block = Block::zeros(problem.rows_per_item() * poses, problem.parameters());
+    bencher.counter(ItemsCount::new(poses)).bench_local(|| {
+        block.clear();
+        problem.linearise(divan::black_box(x), 0..poses, &mut block);
+    });
+}
+
+/// Residuals alone.
+fn evaluate(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
+    let poses = problem.items();
+    let mut out = vec![0.0; problem.rows_per_item() * poses];
+    bencher
+        .counter(ItemsCount::new(poses))
+        .bench_local(|| problem.residuals(divan::black_box(x), 0..poses, divan::black_box(&mut out)));
+}
+
+/// UR10, rigid, 33 geometric parameters.
+#[divan::bench_group(name = "rigid")]
+mod rigid {
+    use super::*;
+
+    #[divan::bench]
+    fn flexcal(bencher: Bencher) {
+        let ur10 = Ur10::new(POSES);
+        let residuals = ur10.residuals(&ur10.geometric);
+        linearise(bencher, &residuals, &Ur10::some_point(&residuals));
+    }
+
+    #[divan::bench]
+    fn analytic(bencher: Bencher) {
+        let ur10 = Ur10::new(POSES);
+        let residuals = ur10.residuals(&ur10.geometric);
+        linearise(bencher, &Analytic::new(&ur10.model, &residuals), &Ur10::some_point(&residuals));
+    }
+
+    #[divan::bench]
+    fn differences(bencher: Bencher) {
+        let ur10 = Ur10::new(POSES);
+        let residuals = ur10.residuals(&ur10.geometric);
+        let x = Ur10::some_point(&residuals);
+        let mut out = DMatrix::zeros(3 * POSES, x.len());
+        bencher
+            .counter(ItemsCount::new(POSES))
+            .bench_local(|| common::central_differences(&residuals, divan::black_box(&x), &mut out));
+    }
+
+    #[divan::bench]
+    fn residual_only(bencher: Bencher) {
+        let ur10 = Ur10::new(POSES);
+        let residuals = ur10.residuals(&ur10.geometric);
+        evaluate(bencher, &residuals, &Ur10::some_point(&residuals));
+    }
+}
+
+/// Lunar sampler, elastic, loads on the bent arm, 32 parameters.
+#[divan::bench_group(name = "elastic")]
+mod elastic {
+    use super::*;
+
+    #[divan::bench]
+    fn flexcal(bencher: Bencher) {
+        let lunar = Lunar::new();
+        linearise(bencher, &lunar.residuals(), &DVector::zeros(lunar.parameters()));
+    }
+
+    #[divan::bench]
+    fn differences(bencher: Bencher) {
+        let lunar = Lunar::new();
+        let x = DVector::zeros(lunar.parameters());
+        let mut out = DMatrix::zeros(3 * lunar.poses(), x.len());
+        bencher
+            .counter(ItemsCount::new(lunar.poses()))
+            .bench_local(|| common::central_differences(&lunar.residuals(), divan::black_box(&x), &mut out));
+    }
+
+    #[divan::bench]
+    fn residual_only(bencher: Bencher) {
+        let lunar = Lunar::new();
+        evaluate(bencher, &lunar.residuals(), &DVector::zeros(lunar.parameters()));
+    }
+}

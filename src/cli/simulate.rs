@@ -1,0 +1,71 @@
+//! `flexcal simulate`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, value_parser};
+use flexcal::problem::Problem;
+use flexcal::rig::{Simulation, Truth, simulate};
+
+use super::{Outcome, output};
+
+/// Arguments of `flexcal simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal simulate problems/lunar-sampler --truth TRUTH.toml --poses 78 --seed 1
+  flexcal identify problems/lunar-sampler --data out/lunar-sampler/measurements.csv")]
+pub struct Arguments {
+    /// A problem.toml, or the folder that holds one
+    problem: PathBuf,
+    /// How the true arm differs from the problem, and from where poses are drawn
+    #[arg(long, value_name = "TRUTH.toml")]
+    truth: PathBuf,
+    /// Number of poses
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
+    poses: u32,
+    /// Seed of every random number
+    #[arg(long, value_name = "S")]
+    seed: u64,
+    /// Folder for results [default: out/<name of the problem>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print what is true as JSON on standard output, and nothing else
+    #[arg(long)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long, conflicts_with = "json")]
+    quiet: bool,
+}
+
+/// Measures the true arm on the virtual test rig; writes `measurements.csv` and `truth.json`.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let problem = Problem::read(&arguments.problem)?;
+    let truth = Truth::read(&arguments.truth, &problem)?;
+    let simulation = simulate(&problem, &truth, arguments.poses as usize, arguments.seed)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name));
+    let json = simulation.truth_json();
+    let table = output::write(&folder, "measurements.csv", &simulation.csv())?;
+    output::write(&folder, "truth.json", &json)?;
+    if arguments.json {
+        output::print(&json)?;
+    } else if !arguments.quiet {
+        output::print(&summary(&simulation, &arguments.problem, &table))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn summary(simulation: &Simulation, problem: &Path, table: &Path) -> String {
+    let (poses, held_out) = (simulation.rows.len(), simulation.held_out());
+    let (identify, sigma) = (poses - held_out, simulation.truth.noise_sigma * 1e3);
+    let (problem, table) = (problem.display(), table.display());
+    format!(
+        "{poses} poses: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
+         Effects: {effects}\n\n\
+         Written to {table}, what is true to truth.json beside it\n\
+         Next: flexcal identify {problem} --data {table}\n",
+        effects = match simulation.effect_names().join(", ") {
+            none if none.is_empty() => "none".to_owned(),
+            names => names,
+        },
+    )
+}

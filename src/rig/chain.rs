@@ -1,0 +1,127 @@
+//! An arm as the rig sees it: rigid pieces joined by lumped springs, and the loads that they carry.
+
+use nalgebra::{Vector2, Vector3};
+
+use crate::spatial::Frame;
+
+/// A lumped spring between two rigid pieces: it turns and stretches, and may do so without load.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Hinge {
+    /// Angle per moment about each axis [rad/(N·m)].
+    pub compliance: Vector3<f64>,
+    /// Angle about z per cube of the moment [rad/(N·m)³].
+    pub cubic: f64,
+    /// Play about z that the moment takes up: b [rad].
+    pub play: f64,
+    /// Elongation along x per force [m/N].
+    pub stretch: f64,
+    /// Rotation vector without load [rad].
+    pub free_rotation: Vector3<f64>,
+    /// Displacement along x without load [m].
+    pub free_stretch: f64,
+}
+
+/// Moment at which play is taken up to three quarters [N·m].
+const PLAY_MOMENT: f64 = 1.0;
+
+impl Hinge {
+    pub fn is_rigid(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// What the hinge does under a force [N] and a moment [N·m] in its own axes.
+    pub fn give(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
+        let mut rotation = self.free_rotation + self.compliance.component_mul(moment);
+        rotation.z += self.cubic * moment.z.powi(3) + 0.5 * self.play * (moment.z / PLAY_MOMENT).tanh();
+        Motion { rotation, stretch: self.free_stretch + self.stretch * force.x }
+    }
+}
+
+/// How far a hinge has moved.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Motion {
+    /// Rotation vector [rad].
+    pub rotation: Vector3<f64>,
+    /// Displacement along x [m].
+    pub stretch: f64,
+}
+
+/// A rigid piece: the hinge before it, and where it ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub hinge: Hinge,
+    /// The next hinge, or the last frame of the arm, seen from this piece's own hinge.
+    pub end: Frame<f64>,
+}
+
+/// A force on a rigid piece.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Load {
+    /// Index of the piece.
+    pub piece: usize,
+    /// Where it acts, seen from the piece's hinge [m].
+    pub at: Vector3<f64>,
+    pub force: Force,
+}
+
+/// What pulls.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Force {
+    /// The same wherever the piece is, base frame [N].
+    Constant(Vector3<f64>),
+    /// A rope whose direction may depend on where its hook is.
+    Rope {
+        /// Tension [N].
+        tension: f64,
+        /// Direction with the hook at the origin, base frame.
+        direction: Vector3<f64>,
+        /// How the x and y of the direction change with those of the hook [1/m].
+        trolley: f64,
+    },
+}
+
+impl Force {
+    /// The force [N] at a point [m], base frame.
+    pub fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        match *self {
+            Self::Constant(force) => force,
+            Self::Rope { tension, direction, trolley } => {
+                let lean = Vector2::new(point.x, point.y) * trolley;
+                (direction + Vector3::new(lean.x, lean.y, 0.0)).normalize() * tension
+            }
+        }
+    }
+}
+
+/// Pieces from the base outwards; their loads in the same order.
+#[derive(Debug)]
+pub(super) struct Chain {
+    pub pieces: Vec<Piece>,
+    pub loads: Vec<Load>,
+}
+
+impl Chain {
+    /// A single piece of no length, clamped to the base by `hinge`.
+    pub fn new(hinge: Hinge) -> Self {
+        Self { pieces: vec![Piece { hinge, end: Frame::identity() }], loads: Vec::new() }
+    }
+
+    /// Where the chain ends so far, seen from its last hinge.
+    pub fn end(&mut self) -> &mut Frame<f64> {
+        let last = self.pieces.len() - 1;
+        &mut self.pieces[last].end
+    }
+
+    /// Goes on behind a hinge; a rigid one is none.
+    pub fn hinge(&mut self, hinge: Hinge) {
+        if !hinge.is_rigid() {
+            self.pieces.push(Piece { hinge, end: Frame::identity() });
+        }
+    }
+
+    /// Hangs a load at a point [m] seen from where the chain ends so far.
+    pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
+        let at = self.end().point(point);
+        self.loads.push(Load { piece: self.pieces.len() - 1, at, force });
+    }
+}

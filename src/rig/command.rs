@@ -1,0 +1,52 @@
+//! Where a joint really goes when it is told to go to q.
+
+use super::effect::{Cause, Shape, TrueEffect};
+use super::{Conditions, Rig};
+use crate::problem::Effect;
+
+impl Rig {
+    /// By how much the coordinate of the joint with this number misses its command, without any load [rad] or [m].
+    ///
+    /// Errors of a prismatic joint add to its d.
+    pub(super) fn miss(&self, number: usize, conditions: &Conditions) -> f64 {
+        let of = |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
+        let q = of(number);
+        let part = |effect: &TrueEffect| match (effect.cause(), effect.values()) {
+            (Cause::Outside { joint, shape }, [height, centre, width]) if *joint == number => {
+                let u = (q - centre) / width;
+                height
+                    * match shape {
+                        Shape::Bump => (-0.5 * u * u).exp(),
+                        Shape::Step => u.tanh(),
+                    }
+            }
+            (Cause::Catalogued(effect), values) => match (effect, values) {
+                (Effect::JointHarmonic { joint, orders }, values) if *joint == number => orders
+                    .iter()
+                    .zip(values.chunks_exact(2))
+                    .map(|(order, wave)| {
+                        let (sin, cos) = (f64::from(*order) * q).sin_cos();
+                        wave[0] * sin + wave[1] * cos
+                    })
+                    .sum(),
+                (Effect::GearRatio { joint }, [error]) if *joint == number => error * q,
+                (Effect::Backlash { joint }, [width]) if *joint == number => {
+                    0.5 * width * conditions.approach.get(number - 1).copied().unwrap_or(0.0)
+                }
+                (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),
+                (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => factor * of(*from),
+                _ => 0.0,
+            },
+            _ => 0.0,
+        };
+        self.effects.iter().map(part).sum()
+    }
+
+    /// T − T₀ [°C].
+    pub(super) fn warming(&self, conditions: &Conditions) -> f64 {
+        match (conditions.temperature, self.arm.data.reference_temperature) {
+            (Some(temperature), Some(reference)) => temperature - reference,
+            _ => 0.0,
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Measurements of the true arm in poses drawn at random.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::parameters::{self, TrueParameter};
+use super::truth::{PoseRanges, Truth};
+use super::{Conditions, NoRest, Rig};
+use crate::problem::pattern::matches;
+use crate::problem::{HeldOut, Joint, JointKind, Problem};
+
+/// Streams of random numbers of one seed, so that none shifts when another is used more.
+const DEVIATIONS: u64 = 0;
+const POSES: u64 = 1;
+const NOISE: u64 = 2;
+const SPLIT: u64 = 3;
+
+/// A simulated measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What was set.
+    pub conditions: Conditions,
+    /// What the tracker read, measuring frame [m].
+    pub position: Vector3<f64>,
+    /// Whether the row is held out.
+    pub held_out: bool,
+}
+
+/// Simulated measurements and what is true about them.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    /// Name of the problem.
+    pub problem: String,
+    /// The declared joints.
+    pub joints: Vec<Joint>,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// What was true.
+    pub truth: Truth,
+    /// Every parameter with its true value.
+    pub parameters: Vec<TrueParameter>,
+    /// The measurements in order of time.
+    pub rows: Vec<Row>,
+    /// Name of the column that marks held-out rows.
+    pub split_column: String,
+}
+
+/// Why there are no measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SimulationError {
+    /// One of the poses has no equilibrium.
+    #[error("pose {pose} of the simulation: {source}; check stiffnesses, masses and the truth")]
+    NoRest {
+        /// Number of the pose, from 1.
+        pose: usize,
+        /// Why.
+        source: NoRest,
+    },
+}
+
+/// Measures the true arm in `poses` poses; the same for the same `seed`, however many threads there are.
+///
+/// # Errors
+/// The arm is too soft for its loads.
+pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Result<Simulation, SimulationError> {
+    let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
+    let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
+    let mut rows = draw(problem, &truth.poses, poses, stream(seed, POSES));
+    hold_out(&mut rows, truth.poses.held_out.count(poses), &mut stream(seed, SPLIT));
+    let mut noise = stream(seed, NOISE);
+    for row in &mut rows {
+        row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
+    }
+    let seen: Vec<_> = rows.par_iter().map(|row| rig.position(&row.conditions)).collect();
+    for (index, (row, seen)) in rows.iter_mut().zip(seen).enumerate() {
+        row.position += seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
+    }
+    let split_column = match &problem.data.held_out {
+        Some(HeldOut::Column(name)) => name.clone(),
+        _ => "split".to_owned(),
+    };
+    Ok(Simulation {
+        problem: problem.name.clone(),
+        joints: problem.joints.clone(),
+        seed,
+        truth: truth.clone(),
+        parameters,
+        rows,
+        split_column,
+    })
+}
+
+fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    random
+}
+
+/// A standard normal number (Box and Muller).
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    let (u, v): (f64, f64) = (random.random(), random.random());
+    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
+}
+
+fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
+    from + (to - from) * random.random::<f64>()
+}
+
+/// The arm with its true parameters: given ones, else drawn ones, else nominal.
+fn true_arm(problem: &Problem, truth: &Truth, mut random: ChaCha8Rng) -> (Problem, Vec<TrueParameter>) {
+    let mut arm = problem.clone();
+    let mut all = Vec::new();
+    parameters::visit(&mut arm, |name, kind, value| {
+        let nominal = *value;
+        // Drawn for every parameter, so that a rule for one does not change another.
+        let drawn = normal(&mut random);
+        if let Some(given) = truth.parameters.iter().rev().find(|given| given.name == name) {
+            *value = kind.deviate(nominal, given.value);
+        } else if let Some(sigma) =
+            truth.random.iter().rev().find(|rule| matches(&rule.pattern, &name)).and_then(|rule| rule.sigma(kind))
+        {
+            *value = match kind {
+                parameters::ParameterKind::Relative => nominal * (sigma * drawn).exp(),
+                _ => nominal + sigma * drawn,
+            };
+        }
+        all.push(TrueParameter { name, kind, nominal, value: *value });
+    });
+    (arm, all)
+}
+
+/// Draws poses; every number is rounded to what the file of measurements will hold.
+fn draw(problem: &Problem, ranges: &PoseRanges, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::with_capacity(poses);
+    let mut time = 0.0;
+    for _ in 0..poses {
+        let mut conditions = Conditions::default();
+        for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
+            let q = if joint.kind == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
+            conditions.configuration.push(match joint.kind {
+                JointKind::Revolute => rounded(q.to_degrees(), 6).to_radians(),
+                _ => rounded(q, 9),
+            });
+        }
+        let choice = random.random::<f64>() * ranges.payloads.len() as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down to an index")]
+        let choice = choice as usize;
+        conditions.payload = ranges.payloads.get(choice).copied();
+        conditions.hoist = ranges.hoist.map(|range| rounded(between(&mut random, range), 3));
+        conditions.temperature = ranges.temperature.map(|range| rounded(between(&mut random, range), 2));
+        time = rounded(time + between(&mut random, ranges.time_step), 1);
+        conditions.time = time;
+        conditions.first_time = rows.first().map_or(time, |row| row.conditions.time);
+        if ranges.approach {
+            let side = |kind| if kind == JointKind::Fixed { 0.0 } else { 1.0 };
+            let sides = problem.joints.iter().map(|joint| side(joint.kind));
+            conditions.approach = sides.map(|side| if random.random::<bool>() { side } else { -side }).collect();
+        }
+        rows.push(Row { conditions, position: Vector3::zeros(), held_out: false });
+    }
+    rows
+}
+
+/// Holds out `count` rows chosen at random.
+fn hold_out(rows: &mut [Row], count: usize, random: &mut ChaCha8Rng) {
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.shuffle(random);
+    for index in order.into_iter().take(count) {
+        rows[index].held_out = true;
+    }
+}
+
+/// `value` to so many decimals: the number that is read back from its text.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10_f64.powi(decimals);
+    (value * scale).round() / scale
+}

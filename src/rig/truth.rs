@@ -1,0 +1,120 @@
+//! What is true on the test bench, as plain data in SI units.
+
+use std::path::Path;
+
+use super::effect::TrueEffect;
+use super::parameters::ParameterKind;
+use super::read;
+use crate::error::InputError;
+use crate::problem::Problem;
+
+/// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// `[parameters]`: true values that are given.
+    pub parameters: Vec<Deviation>,
+    /// `[random]`: true values that are drawn, except where they are given; a later rule wins.
+    pub random: Vec<RandomRule>,
+    /// `[[effect]]`: what is at work besides.
+    pub effects: Vec<TrueEffect>,
+    /// 1 σ of a measured coordinate [m].
+    pub noise_sigma: f64,
+    /// `[poses]`.
+    pub poses: PoseRanges,
+    /// Segments per beam.
+    pub segments: usize,
+}
+
+/// The true value of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviation {
+    /// Name as in the problem file: `joint2.alpha`.
+    pub name: String,
+    /// Added to the nominal value [rad] or [m]; multiple of the nominal for a stiffness or rigidity.
+    pub value: f64,
+}
+
+/// A spread for the parameters that a pattern matches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RandomRule {
+    /// Name with `*` for any run of characters.
+    pub pattern: String,
+    /// 1 σ of angles [rad].
+    pub angle: Option<f64>,
+    /// 1 σ of lengths [m].
+    pub length: Option<f64>,
+    /// 1 σ of ln(value / nominal) of stiffnesses and rigidities.
+    pub relative: Option<f64>,
+}
+
+/// From where poses are drawn: ranges evenly, each quantity by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseRanges {
+    /// Range of each joint, shape = (joints) [rad] or [m]; (0, 0) at fixed joints.
+    pub joints: Vec<(f64, f64)>,
+    /// Payloads to choose from [kg]; empty: no column.
+    pub payloads: Vec<f64>,
+    /// Range of the hoist's force [N].
+    pub hoist: Option<(f64, f64)>,
+    /// Range of the temperature [°C].
+    pub temperature: Option<(f64, f64)>,
+    /// Range of the time from one pose to the next [s].
+    pub time_step: (f64, f64),
+    /// Whether joints come from either side at random; otherwise nobody knows from where.
+    pub approach: bool,
+    /// Which rows are held out.
+    pub held_out: HeldOutRows,
+}
+
+/// How many rows are held out, chosen at random.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HeldOutRows {
+    /// This part of them; at least one, and never all.
+    Share(f64),
+    /// All but this many.
+    AllBut(usize),
+}
+
+impl Truth {
+    /// Reads a `TRUTH.toml` about a problem.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
+        read::file(path, problem)
+    }
+
+    /// Reads it from its text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
+        read::text(text, file, problem)
+    }
+}
+
+impl RandomRule {
+    /// 1 σ of a kind of parameter.
+    pub(super) fn sigma(&self, kind: ParameterKind) -> Option<f64> {
+        match kind {
+            ParameterKind::Angle => self.angle,
+            ParameterKind::Length => self.length,
+            ParameterKind::Relative => self.relative,
+        }
+    }
+}
+
+impl HeldOutRows {
+    /// How many of `rows` rows are held out.
+    pub(super) fn count(self, rows: usize) -> usize {
+        match self {
+            Self::AllBut(kept) => rows.saturating_sub(kept),
+            Self::Share(share) if share > 0.0 && rows > 1 => {
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
+                let count = (share * rows as f64).round() as usize;
+                count.clamp(1, rows - 1)
+            }
+            Self::Share(_) => 0,
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Arms and poses that the tests share.
+
+use std::path::Path;
+
+use flexcal::problem::{Effect, Problem};
+use flexcal::rig::{Cause, Conditions, Rig, TrueEffect};
+use nalgebra::Vector3;
+
+pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+pub fn lunar_sampler() -> Problem {
+    Problem::read(&Path::new(ROOT).join("tests/golden/problem.toml")).unwrap()
+}
+
+pub fn problem(text: &str) -> Problem {
+    Problem::parse(text, Path::new("problem.toml")).unwrap()
+}
+
+/// An effect of the catalogue.
+pub fn effect(arm: &Problem, effect: Effect, values: &[f64]) -> TrueEffect {
+    TrueEffect::new(Cause::Catalogued(effect), values, &arm.joints).unwrap()
+}
+
+pub fn position(arm: &Problem, effects: Vec<TrueEffect>, conditions: &Conditions) -> Vector3<f64> {
+    Rig::new(arm.clone(), effects).position(conditions).unwrap()
+}
+
+/// A row of `tests/golden`: what was set, and the columns of values [mm].
+pub struct Golden {
+    pub conditions: Conditions,
+    pub values: Vec<f64>,
+}
+
+impl Golden {
+    /// Vector number `k` of the row [m].
+    pub fn vector(&self, k: usize) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.values[3 * k..3 * k + 3]) * 1e-3
+    }
+}
+
+pub fn golden(name: &str) -> Vec<Golden> {
+    let mut reader = csv::Reader::from_path(Path::new(ROOT).join("tests/golden").join(name)).unwrap();
+    let row = |record: Result<csv::StringRecord, _>| {
+        let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
+        let conditions = Conditions {
+            configuration: v[..4].iter().map(|q| q.to_radians()).collect(),
+            payload: Some(v[4]),
+            hoist: Some(v[5]),
+            ..Conditions::default()
+        };
+        Golden { conditions, values: v[6..].to_vec() }
+    };
+    reader.records().map(row).collect()
+}
+
+/// Table 2 of [Chen2021]: identified α°, a m, θ°, d m, β° of each joint.
+const TABLE_2: [[f64; 5]; 4] = [
+    [0.019, 0.0, -0.008, 0.097, 0.304],
+    [89.996, -0.002, 0.304, -0.084, 0.007],
+    [-0.001, 1.974, 0.189, -0.095, 0.0],
+    [-0.019, 1.766, -0.790, -0.092, 0.005],
+];
+
+pub fn table_2() -> Problem {
+    let mut arm = lunar_sampler();
+    for (joint, [alpha, a, theta, d, beta]) in arm.joints.iter_mut().zip(TABLE_2) {
+        (joint.alpha, joint.theta, joint.beta) = (alpha.to_radians(), theta.to_radians(), beta.to_radians());
+        (joint.a, joint.d) = (a, d);
+    }
+    arm
+}
+
+/// The arm with every joint and beam stiffer by a factor; 0 makes it rigid.
+pub fn stiffer(mut arm: Problem, joints: f64, link_a: f64, link_b: f64) -> Problem {
+    let by = |factor: f64, value: Option<f64>| value.map(|value| value * factor).filter(|value| *value > 0.0);
+    for joint in &mut arm.joints {
+        joint.stiffness = by(joints, joint.stiffness);
+        if let Some(beam) = &mut joint.beam {
+            let factor = if beam.name == "A" { link_a } else { link_b };
+            for value in [&mut beam.ea, &mut beam.ei_y, &mut beam.ei_z, &mut beam.gj] {
+                *value = by(factor, *value);
+            }
+        }
+    }
+    arm
+}

@@ -1,0 +1,183 @@
+//! Every effect is inert at zero, moves positions when it is not, and does what its law says.
+
+use flexcal::problem::{Effect, Problem};
+use flexcal::rig::{Cause, Conditions, Shape, TrueEffect};
+use nalgebra::Vector3;
+
+use super::bench::{effect, golden, lunar_sampler, position};
+
+/// The lunar sampler as FORMAT declares it, with a rigid link, and a pose in which everything acts.
+fn bench() -> (Problem, Conditions) {
+    let mut arm = lunar_sampler();
+    arm.joints[1].a = 0.3;
+    let mut conditions = golden("equilibrium.csv").swap_remove(0).conditions;
+    conditions.temperature = Some(28.0);
+    conditions.approach = vec![1.0, -1.0, 1.0, -1.0];
+    (conditions.time, conditions.first_time) = (900.0, 60.0);
+    (arm, conditions)
+}
+
+/// Every effect of the catalogue with a strength.
+fn catalogue() -> Vec<(Effect, Vec<f64>)> {
+    let link = || "B".to_owned();
+    vec![
+        (Effect::JointCompliance { joint: 2 }, vec![1e-6]),
+        (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::GearRatio { joint: 3 }, vec![4e-4]),
+        (Effect::Backlash { joint: 3 }, vec![5e-4]),
+        (Effect::JointNonlinearStiffness { joint: 2 }, vec![1e-10]),
+        (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
+        (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
+        (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
+        (Effect::LinkBending { joint: 2 }, vec![1e-5]),
+        (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
+        (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
+        (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),
+        (Effect::PayloadMass, vec![0.1]),
+        (Effect::HoistForce, vec![0.05]),
+        (Effect::HoistDirection, vec![0.02, 0.01, 0.03]),
+        (Effect::BaseCompliance, vec![1e-6, 1e-6]),
+        (Effect::GravityDirection, vec![0.01, 0.02]),
+        (Effect::TrackerScale, vec![5e-5]),
+        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
+        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+    ]
+}
+
+#[test]
+fn every_effect_is_inert_at_zero_and_moves_positions_when_it_is_not() {
+    let (arm, conditions) = bench();
+    let without = position(&arm, Vec::new(), &conditions);
+    for (cause, strength) in catalogue() {
+        let zero = effect(&arm, cause.clone(), &vec![0.0; strength.len()]);
+        assert!((position(&arm, vec![zero], &conditions) - without).norm() < 1e-15, "{cause:?}");
+        let moved = (position(&arm, vec![effect(&arm, cause.clone(), &strength)], &conditions) - without).norm();
+        println!("{:6.3} mm  {cause:?}", moved * 1e3);
+        assert!(moved > 1e-5, "{cause:?} moves the target by {moved} m");
+        // Each value matters by itself.
+        for (k, value) in strength.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            if matches!(cause, Effect::UnmodelledMass { .. }) && k == 1 {
+                continue;
+            }
+            let mut alone = vec![0.0; strength.len()];
+            alone[k] = *value;
+            if matches!(cause, Effect::UnmodelledMass { .. }) {
+                alone[1] = strength[1];
+            }
+            let moved = (position(&arm, vec![effect(&arm, cause.clone(), &alone)], &conditions) - without).norm();
+            assert!(moved > 1e-7, "value {k} of {cause:?} moves the target by {moved} m");
+        }
+    }
+}
+
+#[test]
+fn the_wrong_number_of_values_is_refused() {
+    let (arm, _) = bench();
+    for (cause, values) in catalogue() {
+        let keys = TrueEffect::keys(&Cause::Catalogued(cause.clone()), &arm.joints);
+        assert_eq!(keys.len(), values.len());
+        let more = [values.as_slice(), &[1.0]].concat();
+        assert!(TrueEffect::new(Cause::Catalogued(cause), &more, &arm.joints).is_err());
+    }
+}
+
+/// Checks that an effect does the same as a change of the arm or of what was set.
+fn check(cause: Effect, values: &[f64], change: impl Fn(&mut Problem, &mut Conditions)) {
+    let (arm, conditions) = bench();
+    let with = position(&arm, vec![effect(&arm, cause.clone(), values)], &conditions);
+    let (mut changed, mut set) = (arm, conditions);
+    change(&mut changed, &mut set);
+    let expected = position(&changed, Vec::new(), &set);
+    assert!((with - expected).norm() < 1e-11, "{cause:?}: {} m", (with - expected).norm());
+}
+
+#[test]
+fn errors_of_a_joint_are_errors_of_its_angle() {
+    let turn = |joint: usize, error: fn(f64) -> f64| {
+        move |_: &mut Problem, set: &mut Conditions| set.configuration[joint - 1] += error(set.configuration[joint - 1])
+    };
+    check(Effect::GearRatio { joint: 3 }, &[4e-4], turn(3, |q| 4e-4 * q));
+    check(
+        Effect::JointHarmonic { joint: 2, orders: vec![1, 3] },
+        &[1e-4, 2e-4, 3e-4, 4e-4],
+        turn(2, |q| 1e-4 * q.sin() + 2e-4 * q.cos() + 3e-4 * (3.0 * q).sin() + 4e-4 * (3.0 * q).cos()),
+    );
+    check(Effect::Backlash { joint: 2 }, &[6e-4], turn(2, |_| -3e-4));
+    check(Effect::JointThermalDrift { joint: 1 }, &[1e-5], turn(1, |_| 8e-5));
+    check(Effect::JointCoupling { joint: 4, from: 3 }, &[3e-4], |_, set| {
+        set.configuration[3] += 3e-4 * set.configuration[2];
+    });
+    let (arm, conditions) = bench();
+    for (shape, error) in [(Shape::Bump, (-0.5_f64 * 0.25).exp()), (Shape::Step, 0.5_f64.tanh())] {
+        let centre = conditions.configuration[1] - 0.1;
+        let outside = TrueEffect::new(Cause::Outside { joint: 2, shape }, &[1e-3, centre, 0.2], &arm.joints).unwrap();
+        let mut set = conditions.clone();
+        set.configuration[1] += 1e-3 * error;
+        let difference = position(&arm, vec![outside], &conditions) - position(&arm, Vec::new(), &set);
+        assert!(difference.norm() < 1e-11);
+    }
+}
+
+#[test]
+fn elastic_effects_are_softer_joints_and_links() {
+    check(Effect::JointCompliance { joint: 3 }, &[1e-5], |arm, _| {
+        arm.joints[2].stiffness = arm.joints[2].stiffness.map(|k| 1.0 / (1.0 / k + 1e-5));
+    });
+    check(Effect::LinkBending { joint: 4 }, &[2e-5], |arm, _| {
+        let beam = arm.joints[3].beam.as_mut().unwrap();
+        for rigidity in [&mut beam.ei_y, &mut beam.ei_z] {
+            *rigidity = rigidity.map(|ei| 1.0 / (1.0 / ei + 2e-5));
+        }
+    });
+    check(Effect::LinkBending { joint: 2 }, &[2e-5], |arm, _| {
+        let mut beam = arm.joints[2].beam.clone().unwrap();
+        (beam.mass, beam.ea, beam.gj, beam.hoist) = (0.0, None, None, None);
+        (beam.ei_y, beam.ei_z) = (Some(5e4), Some(5e4));
+        beam.masses.clear();
+        arm.joints[1].beam = Some(beam);
+    });
+}
+
+#[test]
+fn effects_on_loads_are_other_loads() {
+    check(Effect::UnmodelledMass { link: "B".to_owned() }, &[0.4, 0.8], |arm, _| {
+        let mut body = arm.joints[2].bodies[0].clone();
+        (body.mass, body.position) = (0.4, Vector3::new(0.8, 0.0, 0.0));
+        arm.joints[3].beam.as_mut().unwrap().masses.push(body);
+    });
+    check(Effect::PayloadMass, &[0.1], |_, set| set.payload = set.payload.map(|mass| mass + 0.1));
+    check(Effect::HoistForce, &[0.05], |_, set| set.hoist = set.hoist.map(|force| force * 1.05));
+    check(Effect::HoistDirection, &[0.02, 0.01, 0.0], |arm, _| {
+        let hoist = arm.joints[3].beam.as_mut().unwrap().hoist.as_mut().unwrap();
+        hoist.direction = Vector3::new(0.02, 0.01, 1.0).normalize();
+    });
+    check(Effect::GravityDirection, &[0.01, 0.02], |arm, _| {
+        arm.gravity = nalgebra::Rotation3::new(Vector3::new(0.01, 0.02, 0.0)) * arm.gravity;
+    });
+}
+
+#[test]
+fn the_rope_of_a_trolley_leans_with_its_hook() {
+    let (arm, conditions) = bench();
+    let trolley = position(&arm, vec![effect(&arm, Effect::HoistDirection, &[0.0, 0.0, 0.03])], &conditions);
+    // Lean the rope by hand, from where the straight arm holds the hook: 30 mm of deflection change it by 0.001.
+    let stiff = super::bench::stiffer(arm.clone(), 0.0, 0.0, 0.0);
+    let mut hook = stiff.clone();
+    hook.joints[3].theta = -conditions.configuration[3];
+    (hook.joints[3].d, hook.joints[3].a) = (0.0, 0.95);
+    hook.tool.target = Vector3::new(0.0, 0.06, 0.0);
+    let hook = position(&hook, Vec::new(), &conditions);
+    let lean = effect(&arm, Effect::HoistDirection, &[0.03 * hook.x, 0.03 * hook.y, 0.0]);
+    let difference = (position(&arm, vec![lean], &conditions) - trolley).norm();
+    let whole = (position(&arm, Vec::new(), &conditions) - trolley).norm();
+    assert!(difference < 0.03 * whole, "{difference} of {whole}");
+}
+
+#[test]
+fn without_approaches_backlash_follows_the_moment() {
+    let (arm, mut conditions) = bench();
+    conditions.approach.clear();
+    let without = position(&arm, Vec::new(), &conditions);
+    let with = position(&arm, vec![effect(&arm, Effect::Backlash { joint: 2 }, &[1e-3])], &conditions);
+    assert!(with.z < without.z - 1e-4, "the shoulder drops into its play");
+}

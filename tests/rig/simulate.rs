@@ -1,0 +1,214 @@
+//! Simulated measurements: the same for the same seed, valid input of the rest, and their mistakes named.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+use flexcal::rig::{Conditions, Rig, Simulation, Truth, simulate};
+use serde_json::Value;
+
+use super::bench::{ROOT, problem};
+
+fn cases() -> (Problem, Truth) {
+    let folder = Path::new(ROOT).join("tests/cases");
+    let problem = Problem::read(&folder).unwrap();
+    let truth = Truth::read(&folder.join("truth.toml"), &problem).unwrap();
+    (problem, truth)
+}
+
+fn read(simulation: &Simulation, problem: &Problem) -> Measurements {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("measurements.csv");
+    fs::write(&file, simulation.csv()).unwrap();
+    let (measurements, warnings) = Measurements::read(&[file], problem).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    measurements
+}
+
+#[test]
+fn a_seed_gives_the_same_rows_on_any_number_of_threads() {
+    let (problem, truth) = cases();
+    let on = |threads, seed| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| simulate(&problem, &truth, 40, seed).unwrap().csv())
+    };
+    assert_eq!(on(1, 7), on(4, 7));
+    assert_ne!(on(1, 7), on(1, 8));
+}
+
+#[test]
+fn more_poses_leave_the_first_ones_as_they_are() {
+    let (problem, truth) = cases();
+    let rows = |poses| simulate(&problem, &truth, poses, 3).unwrap().rows;
+    let (few, many) = (rows(10), rows(30));
+    for (few, many) in few.iter().zip(&many) {
+        assert_eq!((&few.conditions, few.position), (&many.conditions, many.position));
+    }
+}
+
+#[test]
+fn what_is_written_is_what_was_measured() {
+    let (problem, mut truth) = cases();
+    truth.noise_sigma = 0.0;
+    let simulation = simulate(&problem, &truth, 30, 5).unwrap();
+    let measurements = read(&simulation, &problem);
+    assert_eq!(measurements.len(), 30);
+    assert_eq!(measurements.marked_held_out.as_ref().unwrap().iter().filter(|held_out| **held_out).count(), 2);
+    for (k, row) in simulation.rows.iter().enumerate() {
+        let set = &row.conditions;
+        assert_eq!(measurements.configuration(k), set.configuration);
+        assert_eq!(measurements.payload.as_ref().unwrap()[k], set.payload.unwrap());
+        assert_eq!(measurements.hoist.as_ref().unwrap()[k], set.hoist.unwrap());
+        assert_eq!(measurements.temperature.as_ref().unwrap()[k], set.temperature.unwrap());
+        assert_eq!(measurements.time[k], set.time);
+        assert_eq!(&measurements.approach.as_ref().unwrap()[4 * k..4 * k + 4], set.approach);
+        assert!((measurements.positions[k] - row.position).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn noise_has_its_spread_and_deviations_are_given_or_drawn() {
+    let (problem, truth) = cases();
+    let noisy = simulate(&problem, &truth, 1000, 1).unwrap();
+    let exact = simulate(&problem, &Truth { noise_sigma: 0.0, ..truth.clone() }, 1000, 1).unwrap();
+    let squares: f64 = noisy.rows.iter().zip(&exact.rows).map(|(a, b)| (a.position - b.position).norm_squared()).sum();
+    let sigma = (squares / 3000.0).sqrt() * 1e3;
+    assert!((sigma - 0.05).abs() < 0.003, "{sigma} mm");
+    let of = |simulation: &Simulation, name: &str| {
+        let found = simulation.parameters.iter().find(|parameter| parameter.name == name).unwrap();
+        (found.nominal, found.value)
+    };
+    assert_eq!(of(&noisy, "joint3.a"), (1.95, 1.95 + 0.024));
+    assert_eq!(of(&noisy, "tool.x"), (0.22, 0.22));
+    let (nominal, value) = of(&noisy, "joint2.stiffness");
+    assert!((value / nominal - 1.0).abs() > 1e-3 && value > 0.0);
+}
+
+#[test]
+fn prismatic_and_fixed_joints_have_their_columns() {
+    let problem = problem(
+        "name = 'gantry'\n[[joint]]\nkind = 'prismatic'\n[[joint]]\nkind = 'fixed'\nalpha_deg = 90\n\
+         [[joint]]\na_m = 0.5\n[tool]\ntarget_m = [0.3, 0, 0]\n",
+    );
+    let text = "[poses]\nq1_mm = [0, 400]\nq3_deg = [-30, 30]\nheld_out = 0\n[[effect]]\n\
+                backlash = { joint = 1 }\nwidth_mm = 0.2\n";
+    let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
+    let simulation = simulate(&problem, &truth, 5, 1).unwrap();
+    let header = simulation.csv().lines().next().unwrap().to_owned();
+    assert_eq!(header, "pose,split,q1_m,q3_deg,x_mm,y_mm,z_mm,time_s,approach1,approach3");
+    assert_eq!(read(&simulation, &problem).len(), 5);
+    let row = &simulation.rows[0];
+    let (q, side) = (row.conditions.configuration[0], row.conditions.approach[0]);
+    let straight =
+        Conditions { configuration: vec![0.0, 0.0, row.conditions.configuration[2]], ..Conditions::default() };
+    let rest = Rig::new(problem, Vec::new()).position(&straight).unwrap();
+    assert!((row.position.z - rest.z - q - 1e-4 * side).abs() < 1e-12);
+}
+
+fn flexcal(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::new(assert_cmd::cargo::cargo_bin!("flexcal")).current_dir(folder).args(arguments).assert()
+}
+
+#[test]
+fn the_command_writes_what_identify_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases = format!("{ROOT}/tests/cases");
+    let truth = format!("{cases}/truth.toml");
+    let arguments = ["simulate", &cases, "--truth", &truth, "--poses", "78", "--seed", "1"];
+    let printed = flexcal(folder.path(), &arguments).success().get_output().stdout.clone();
+    let printed = String::from_utf8(printed).unwrap();
+    assert!(printed.contains("78 poses: 28 to identify, 50 held out"), "{printed}");
+    let data = "out/lunar-sampler/measurements.csv";
+    let first = fs::read(folder.path().join(data)).unwrap();
+    let again = flexcal(folder.path(), &[&arguments[..], &["--json"]].concat()).success();
+    assert_eq!(first, fs::read(folder.path().join(data)).unwrap());
+    let told: Value = serde_json::from_slice(&again.get_output().stdout).unwrap();
+    assert_eq!((&told["poses"], &told["held_out"]), (&Value::from(78), &Value::from(50)));
+    assert_eq!(told["effects"], Value::Array(Vec::new()));
+    assert!(folder.path().join("out/lunar-sampler/truth.json").exists());
+    let quiet = flexcal(folder.path(), &[&arguments[..], &["--quiet", "--out", "b"]].concat()).success();
+    assert!(quiet.get_output().stdout.is_empty() && folder.path().join("b/measurements.csv").exists());
+
+    let fit = flexcal(folder.path(), &["identify", &cases, "--data", data, "--json"]).success();
+    let fit: Value = serde_json::from_slice(&fit.get_output().stdout).unwrap();
+    let rms = fit["held_out"]["rms_mm"]["norm"].as_f64().unwrap();
+    println!("held-out rms of the fitted simulation: {rms:.4} mm (noise alone 0.0866)");
+    assert!(rms < 0.14, "{rms}");
+}
+
+#[test]
+fn mistakes_leave_nothing_behind_and_name_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = [1, 0]\n").unwrap();
+    let cases = format!("{ROOT}/tests/cases");
+    let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
+    let failed = flexcal(folder.path(), &arguments).code(2);
+    let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
+    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: min 1 is above max 0"), "{message}");
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn every_mistake_says_where_it_is() {
+    let (problem, _) = cases();
+    let poses = "[poses]\nq1_deg = [0, 1]\nq2_deg = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\n";
+    let fails = |text: &str, words: &[&str]| {
+        let error = Truth::parse(text, Path::new("TRUTH.toml"), &problem).expect_err(text).to_string();
+        for word in ["TRUTH.toml"].iter().chain(words) {
+            assert!(error.contains(word), "no `{word}` in: {error}");
+        }
+    };
+    fails("", &["poses: missing"]);
+    fails("[poses]\nq1_deg = [0, 1]", &["poses.q2: missing", "q2_deg or q2_rad"]);
+    fails("[poses]\nq1_deg = [0, 1, 2]", &[":2: poses.q1_deg: a range is two numbers", "found 3"]);
+    fails("[poses]\nq1_m = [0, 1]", &["poses.q1_m: an angle is not given in m"]);
+    fails("[poses]\nq1_deg = 3", &["poses.q1_deg: expected a list"]);
+    for (line, words) in [
+        ("held_out = 1.5", &["poses.held_out: 1.5 is not between 0 and 1"][..]),
+        ("held_out = 0.5\nidentification = 3", &["poses.identification: given already as held_out"]),
+        ("payload_kg = [-1]", &["poses.payload_kg[1]: -1 is below zero"]),
+        ("payload_kg = []", &["poses.payload_kg: empty"]),
+        ("time_step_s = [5, 2]", &["poses.time_step_s: "]),
+        ("time_step_s = -5", &["poses.time_step_s: -5 is below zero"]),
+        ("temperature = 5", &["temperature_C"]),
+        ("speed = 5", &["poses.speed: unknown key"]),
+        ("[parameters]\n\"joint9.a\" = { mm = 1 }", &["parameters.\"joint9.a\": no such parameter", "joint4.a"]),
+        ("[parameters]\ntool.x = { mm = 1 }", &["stands in quotes"]),
+        ("[parameters]\n\"tool.x\" = { deg = 1 }", &["parameters.\"tool.x\".deg: unknown key", "mm"]),
+        ("[parameters]\n\"tool.x\" = {}", &["missing", "m = … or mm = …"]),
+        ("[parameters]\n\"tool.x\" = { m = 1, mm = 1 }", &["given already as m"]),
+        ("[parameters]\n\"A.EI\" = { relative = 0 }", &["0 is not above zero"]),
+        ("[random]\n\"joint9*\" = { sigma_mm = 1 }", &["matches no parameter"]),
+        ("[random]\n\"tool.*\" = { sigma_deg = 1 }", &["random.\"tool.*\".sigma: missing", "sigma_mm"]),
+        ("[random]\n\"tool.*\" = { sigma_mm = -1 }", &["-1 is below zero"]),
+        ("[noise]\nposition_sigma_mm = -1", &["noise.position_sigma_mm: -1 is below zero"]),
+        ("[noise]", &["noise.position_sigma_mm: missing"]),
+        ("[rig]\nsegments = 0", &["rig.segments: 0 is not a whole number"]),
+        ("[[effect]]\nerror_relative = 1", &["effect[1]: an effect is one key", "found 0"]),
+        ("[[effect]]\ngear-ration = { joint = 1 }", &["effect[1].gear-ration: unknown effect"]),
+        ("[[effect]]\ngear-ratio = { joint = 1 }", &["no strength; write error_relative"]),
+        ("[[effect]]\ngear-ratio = { joint = 1 }\nerror = 1", &["effect[1].error: a ratio needs a unit"]),
+        ("[[effect]]\ngear-ratio = { joint = 1 }\nwidth_deg = 1", &["unknown key"]),
+        ("[[effect]]\ngear-ratio = { joint = 7 }\nerror_relative = 1", &["no joint 7"]),
+        ("[[effect]]\ngear-ratio = { joint = 1 }\npayload-mass = {}", &["found 2"]),
+        ("[[effect]]\ndeflected-equilibrium = {}\nlambda_relative = 0.5", &["always in equilibrium; write 1"]),
+        ("[[effect]]\noutside = { joint = 2 }\nheight_deg = 1", &["a width above 0"]),
+        ("[[effect]]\noutside = { joint = 0 }\nheight_deg = 1", &["no joint 0"]),
+        ("[[effect]]\noutside = { joint = 1, shape = \"x\" }\n", &["none of bump, step"]),
+        ("[[effect]]\njoint-thermal-drift = { joint = 2 }\nrate_deg_per_C = 1", &["needs temperatures"]),
+    ] {
+        fails(&format!("{poses}{line}\n"), words);
+    }
+}
+
+#[test]
+fn too_soft_an_arm_is_an_error_with_its_pose() {
+    let problem =
+        problem("name = 'x'\n[[joint]]\nalpha_deg = 90\nstiffness_N_m_per_rad = 1\n[tool]\ntarget_m = [1, 0, 0]\n");
+    let text = "[poses]\nq1_deg = [80, 80]\npayload_kg = [1e5]\n";
+    let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
+    let error = simulate(&problem, &truth, 3, 1).unwrap_err().to_string();
+    assert!(error.contains("pose 1 of the simulation"), "{error}");
+}
