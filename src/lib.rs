@@ -5,6 +5,7 @@ pub mod error;
 pub mod fit;
 pub mod measurement;
 pub mod model;
+pub mod paper;
 pub mod parameter;
 pub mod problem;
 pub mod report;

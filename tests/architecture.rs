@@ -29,7 +29,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("parameter", &[&["scalar", "spatial", "error", "problem", "arm"]]),
     ("effect", &[&["scalar", "spatial", "error", "problem", "arm", "parameter"]]),
     ("model", &[&["scalar", "spatial", "error", "problem", "arm", "parameter", "effect", "fit"]]),
-    ("paper", &[&["scalar", "spatial", "error", "problem", "arm", "parameter", "effect", "fit", "model"]]),
+    // The paper checks the model, so it shares no physics with it.
+    ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
     ("study", &[GROUND, BELOW_STUDY]),
     ("report", &[GROUND, BELOW_STUDY, &["study"]]),
     ("cli", &[GROUND, BELOW_STUDY, &["study", "report", "rig"]]),

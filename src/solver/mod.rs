@@ -4,9 +4,12 @@
 
 mod bounded;
 mod box_step;
+mod divergence;
 mod factor;
+mod gauss_newton;
 mod levenberg_marquardt;
 mod pivoted;
+mod pseudo_inverse;
 mod run;
 mod settings;
 mod spectrum;
@@ -14,8 +17,13 @@ mod termination;
 mod trust_region;
 
 pub use bounded::{AtBound, Bounds, BoundsError, BoxConstrained, bounded_levenberg_marquardt};
+pub use divergence::Divergence;
 pub use factor::Factor;
+pub use gauss_newton::{GaussNewtonSettings, minimise_gauss_newton};
 pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
+pub use pseudo_inverse::{
+    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed, minimum_norm_step,
+};
 pub use run::{Solution, minimise, minimise_bounded, minimise_bounded_observed, minimise_observed};
 pub use settings::Settings;
 pub use termination::Termination;

@@ -24,6 +24,8 @@ pub enum Termination {
     StepPrecision,
     /// Rounding hides any smaller gradient: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ ε.
     GradientPrecision,
+    /// argmin's Gauss–Newton method saw no change: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`.
+    Unchanged,
     /// As many steps were tried as allowed: iterations ≥ `max_iterations`.
     IterationLimit,
     /// The cost at the start is not finite.
@@ -34,6 +36,10 @@ pub enum Termination {
     DomainEdge,
     /// The start, the bounds and the problem differ in their number of unknowns.
     SizeMismatch,
+    /// An undamped iteration went astray: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience` iterations in a row, or ∞.
+    Diverged,
+    /// JᵀJ has no inverse where argmin's Gauss–Newton method asks for it.
+    Singular,
     /// An observer failed or interrupted the run.
     Interrupted,
 }
@@ -48,12 +54,15 @@ impl Termination {
             | Self::ZeroResidual
             | Self::CostPrecision
             | Self::StepPrecision
-            | Self::GradientPrecision => true,
+            | Self::GradientPrecision
+            | Self::Unchanged => true,
             Self::IterationLimit
             | Self::OutsideDomainAtStart
             | Self::DerivativesNotFinite
             | Self::DomainEdge
             | Self::SizeMismatch
+            | Self::Diverged
+            | Self::Singular
             | Self::Interrupted => false,
         }
     }
@@ -68,11 +77,14 @@ impl Termination {
             Self::CostPrecision => "cost-precision",
             Self::StepPrecision => "step-precision",
             Self::GradientPrecision => "gradient-precision",
+            Self::Unchanged => "unchanged",
             Self::IterationLimit => "iteration-limit",
             Self::OutsideDomainAtStart => "outside-domain-at-start",
             Self::DerivativesNotFinite => "derivatives-not-finite",
             Self::DomainEdge => "domain-edge",
             Self::SizeMismatch => "size-mismatch",
+            Self::Diverged => "diverged",
+            Self::Singular => "singular",
             Self::Interrupted => "interrupted",
         }
     }
@@ -88,11 +100,14 @@ impl fmt::Display for Termination {
             Self::CostPrecision => "converged to rounding: the cost cannot fall further",
             Self::StepPrecision => "converged to rounding: the step cannot be smaller",
             Self::GradientPrecision => "converged to rounding: the gradient cannot be smaller",
+            Self::Unchanged => "converged: the projected residual no longer changes",
             Self::IterationLimit => "stopped: the limit of iterations was reached",
             Self::OutsideDomainAtStart => "failed: the start lies outside the model's domain",
             Self::DerivativesNotFinite => "failed: a derivative is not finite",
             Self::DomainEdge => "failed: every step leaves the model's domain",
             Self::SizeMismatch => "failed: start, bounds and problem differ in size",
+            Self::Diverged => "failed: the cost keeps growing",
+            Self::Singular => "failed: the derivatives are singular",
             Self::Interrupted => "stopped: interrupted from outside",
         })
     }

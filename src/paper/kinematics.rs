@@ -1,0 +1,126 @@
+//! Frames of the rigid arm, eq. 1-2.
+
+use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
+
+use crate::problem::{Joint, JointKind, Problem};
+use crate::spatial::Frame;
+
+/// The five parameters of a joint and the link before it, `E_i` of the paper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mdh {
+    /// α [rad].
+    pub alpha: f64,
+    /// a [m].
+    pub a: f64,
+    /// θ [rad].
+    pub theta: f64,
+    /// d [m].
+    pub d: f64,
+    /// β [rad].
+    pub beta: f64,
+}
+
+impl Mdh {
+    /// As the problem declares them.
+    pub fn nominal(joint: &Joint) -> Self {
+        Self { alpha: joint.alpha, a: joint.a, theta: joint.theta, d: joint.d, beta: joint.beta }
+    }
+
+    /// The five values in the order of `e_i` = [Δα Δa Δθ Δd Δβ].
+    pub fn fields_mut(&mut self) -> [&mut f64; 5] {
+        [&mut self.alpha, &mut self.a, &mut self.theta, &mut self.d, &mut self.beta]
+    }
+
+    /// With the configuration coordinate q [rad] or [m] added to θ or d.
+    #[must_use]
+    pub fn at(mut self, kind: JointKind, q: f64) -> Self {
+        match kind {
+            JointKind::Revolute => self.theta += q,
+            JointKind::Prismatic => self.d += q,
+            JointKind::Fixed => {}
+        }
+        self
+    }
+
+    /// `T_i1` = Rx(α) Tx(a), up to the tip of the link                                    [Chen2021, eq. 20]
+    pub fn to_tip(&self) -> Matrix4<f64> {
+        turn(Vector3::x() * self.alpha) * shift(Vector3::x() * self.a)
+    }
+
+    /// `T_i2` = Rz(θ) Tz(d) Ry(β), from the tip of the link                              [Chen2021, eq. 20]
+    pub fn from_tip(&self) -> Matrix4<f64> {
+        turn(Vector3::z() * self.theta) * shift(Vector3::z() * self.d) * turn(Vector3::y() * self.beta)
+    }
+
+    /// `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β)                                              [Chen2021, eq. 1]
+    pub fn transform(&self) -> Matrix4<f64> {
+        self.to_tip() * self.from_tip()
+    }
+}
+
+fn turn(rotation_vector: Vector3<f64>) -> Matrix4<f64> {
+    Rotation3::new(rotation_vector).to_homogeneous()
+}
+
+fn shift(translation: Vector3<f64>) -> Matrix4<f64> {
+    Matrix4::new_translation(&translation)
+}
+
+/// The axes of a transform, as a rotation matrix, and its origin [m].
+pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+    (transform.fixed_view::<3, 3>(0, 0).into_owned(), transform.fixed_view::<3, 1>(0, 3).into_owned())
+}
+
+/// One configuration of the rigid arm.
+///
+/// The paper ends in frame n, `U_{n+1}` = I; here `U_{n+1}` = Trans(target), since on axis n itself neither Δθ nor Δβ of the
+/// last joint moves the end point. The paper's inertial frame is the arm's base frame; measured positions lie in the
+/// measuring frame, which sees the base at the problem's `base`.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    /// Parameters with the configuration added.
+    pub links: Vec<Mdh>,
+    /// The base in the measuring frame.
+    pub base: Matrix4<f64>,
+    /// `before[k]` = T₁ … T_k, one more than joints.
+    pub before: Vec<Matrix4<f64>>,
+    /// `after[k]` = T_{k+1} … T_n Trans(target), the paper's `U_{k+1}`, one more than joints.
+    pub after: Vec<Matrix4<f64>>,
+}
+
+impl Chain {
+    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) [rad] or [m]; missing coordinates are 0.
+    pub fn new(problem: &Problem, geometry: &[Mdh], configuration: &[f64]) -> Self {
+        let q = configuration.iter().copied().chain(std::iter::repeat(0.0));
+        let declared = geometry.iter().zip(&problem.joints);
+        let links: Vec<Mdh> = declared.zip(q).map(|((link, joint), q)| link.at(joint.kind, q)).collect();
+        let transforms: Vec<Matrix4<f64>> = links.iter().map(Mdh::transform).collect();
+        let mut before = vec![Matrix4::identity()];
+        let mut product = Matrix4::identity();
+        for transform in &transforms {
+            product *= transform;
+            before.push(product);
+        }
+        let mut product = shift(problem.tool.target);
+        let mut after = vec![product];
+        for transform in transforms.iter().rev() {
+            product = transform * product;
+            after.push(product);
+        }
+        after.reverse();
+        let frame = Frame::from_rotation_vector(problem.base.translation, &problem.base.rotation);
+        let mut base = Matrix3::from_columns(&frame.axes).to_homogeneous();
+        base.fixed_view_mut::<3, 1>(0, 3).copy_from(&frame.origin);
+        Self { links, base, before, after }
+    }
+
+    /// T = T₁ … T_n, here with base and target, measuring frame                           [Chen2021, eq. 2]
+    pub fn end(&self) -> Matrix4<f64> {
+        self.base * self.after[0]
+    }
+
+    /// `PE_nom`: nominal position of the end point, measuring frame [m].
+    pub fn position(&self) -> Vector3<f64> {
+        split(&self.end()).1
+    }
+}

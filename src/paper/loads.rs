@@ -1,0 +1,149 @@
+//! Every load of a pose, resolved in the frames of the rigid arm.
+//!
+//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2); here they follow from the
+//! frames, with signs, for any arm: component x of a link's frame is the paper's index r, components y and z its index n
+//! in the two planes; moment components z and y are its `M_V` and (with the other sign) `M_Pn`, component x its `M_Pr`.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::kinematics::{Chain, split};
+use crate::problem::{Beam, Problem};
+
+/// What is set for one pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup<'a> {
+    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
+    pub configuration: &'a [f64],
+    /// Payload [kg]; `None`: as declared.
+    pub payload: Option<f64>,
+    /// Hoist force [N]; `None`: as declared.
+    pub hoist: Option<f64>,
+}
+
+/// Force [N] and moment [N·m] at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wrench {
+    /// Force [N].
+    pub force: Vector3<f64>,
+    /// Moment about the point [N·m].
+    pub moment: Vector3<f64>,
+}
+
+/// A load between root and tip of a link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointLoad {
+    /// s, distance from the root along the link [m]; the paper's `r_cx` and `l_F1`.
+    pub station: f64,
+    /// Force and moment there, link frame.
+    pub wrench: Wrench,
+    /// Whether it is the hoist.
+    pub hoist: bool,
+}
+
+/// Loads of an elastic link, in the frame at its root, x along it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkLoads {
+    /// l [m], negative for a link along −x.
+    pub length: f64,
+    /// q, own weight over l [N/m].
+    pub spread: Vector3<f64>,
+    /// Carried masses and the hoist.
+    pub points: Vec<PointLoad>,
+    /// Weights beyond the tip, at the tip: `G_4`, `M_4` or `G_34`, `M_34`                 [Chen2021, eq. 3]
+    pub tip: Wrench,
+    /// Hoists on links further out, at the tip.
+    pub tip_hoist: Wrench,
+}
+
+/// Moments about a joint's axis [N·m].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointLoads {
+    /// Of the weights beyond it: `M_4V`, `M_34V`, `M_234V`.
+    pub weights: f64,
+    /// Of the hoists beyond it: −`M_1F`, −`M_2F`.
+    pub hoists: f64,
+}
+
+/// Loads of a pose, an entry for each joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loads {
+    /// On each link that is a beam.
+    pub links: Vec<Option<LinkLoads>>,
+    /// About each joint's axis.
+    pub joints: Vec<JointLoads>,
+}
+
+/// A force [N] somewhere on the arm [m], base frame.
+struct Load {
+    at: Vector3<f64>,
+    force: Vector3<f64>,
+    hoist: bool,
+}
+
+impl Loads {
+    /// Walks from the end point to the base: what acts on a section is all that lies beyond it.
+    pub fn new(problem: &Problem, chain: &Chain, setup: &Setup) -> Self {
+        let gravity = problem.gravity;
+        let n = problem.joints.len();
+        let mut forces = Vec::new();
+        let push = |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
+        let (axes, origin) = split(&chain.before[n]);
+        let payload = setup.payload.unwrap_or(problem.tool.payload_mass);
+        push(&mut forces, origin + axes * problem.tool.payload_at, gravity * payload, false);
+        let mut out = Self { links: vec![None; n], joints: vec![JointLoads::default(); n] };
+        for (k, joint) in problem.joints.iter().enumerate().rev() {
+            let (axes, origin) = split(&chain.before[k + 1]);
+            for body in &joint.bodies {
+                push(&mut forces, origin + axes * body.position, gravity * body.mass, false);
+            }
+            let (axes, tip) = split(&(chain.before[k] * chain.links[k].to_tip()));
+            let (weights, hoists) = (about(&forces, tip, false), about(&forces, tip, true));
+            let axis = axes.column(2);
+            out.joints[k] = JointLoads { weights: axis.dot(&weights.moment), hoists: axis.dot(&hoists.moment) };
+            if let Some(beam) = &joint.beam {
+                let length = chain.links[k].a;
+                let mut link = LinkLoads {
+                    length,
+                    spread: axes.tr_mul(&gravity) * (beam.mass / length),
+                    points: Vec::new(),
+                    tip: resolved(&axes, &weights),
+                    tip_hoist: resolved(&axes, &hoists),
+                };
+                let root = tip - axes.column(0) * length;
+                push(&mut forces, (root + tip) * 0.5, gravity * beam.mass, false);
+                for (at, force, hoist) in carried(beam, gravity, setup) {
+                    push(&mut forces, root + axes * at, force, hoist);
+                    link.points.push(point_load(at, length, axes.tr_mul(&force), hoist));
+                }
+                out.links[k] = Some(link);
+            }
+        }
+        out
+    }
+}
+
+/// Places in the link's frame [m] and forces in the base frame [N] of what a beam carries.
+fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &Setup) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
+    let masses = beam.masses.iter().map(|mass| (mass.position, gravity * mass.mass, false));
+    let hoist = beam.hoist.iter();
+    masses.chain(hoist.map(|hoist| (hoist.at, hoist.direction * setup.hoist.unwrap_or(hoist.force), true))).collect()
+}
+
+/// A force at `at`, carried to the link's axis: what hangs beyond an end acts at that end, with its lever.
+fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -> PointLoad {
+    let station = at.x.clamp(length.min(0.0), length.max(0.0));
+    let offset = at - Vector3::x() * station;
+    PointLoad { station, wrench: Wrench { force, moment: offset.cross(&force) }, hoist }
+}
+
+/// Sum of the weights or of the hoists, with moments about a point, base frame.
+fn about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
+    forces.iter().filter(|load| load.hoist == hoist).fold(Wrench::default(), |sum, load| Wrench {
+        force: sum.force + load.force,
+        moment: sum.moment + (load.at - point).cross(&load.force),
+    })
+}
+
+fn resolved(axes: &Matrix3<f64>, wrench: &Wrench) -> Wrench {
+    Wrench { force: axes.tr_mul(&wrench.force), moment: axes.tr_mul(&wrench.moment) }
+}

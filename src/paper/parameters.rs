@@ -1,0 +1,101 @@
+//! The parameters of the paper: geometry E and elasticity S.
+
+use super::kinematics::Mdh;
+use super::link::LinkFlexibility;
+use crate::problem::Problem;
+
+/// Geometric parameters E and flexibilities S, an entry for each joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameters {
+    /// E.
+    pub geometry: Vec<Mdh>,
+    /// l/(`GI_p`) of each joint [rad/(N·m)]; 0 where it is rigid.
+    pub joints: Vec<f64>,
+    /// Of the link before each joint; all 0 where it is rigid.
+    pub links: Vec<LinkFlexibility>,
+}
+
+/// One flexibility; joints are counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Flexibility {
+    /// Torsion of a joint, 1/k [rad/(N·m)].
+    Joint(usize),
+    /// 1/EA of the link before a joint [1/N].
+    Axial(usize),
+    /// 1/EI for both planes [1/(N·m²)].
+    Bending(usize),
+    /// `1/EI_y` [1/(N·m²)].
+    BendingY(usize),
+    /// `1/EI_z` [1/(N·m²)].
+    BendingZ(usize),
+    /// 1/GJ [1/(N·m²)].
+    Twist(usize),
+}
+
+impl Parameters {
+    /// As the problem declares them.
+    pub fn nominal(problem: &Problem) -> Self {
+        let reciprocal = |rigidity: Option<f64>| rigidity.map_or(0.0, f64::recip);
+        Self {
+            geometry: problem.joints.iter().map(Mdh::nominal).collect(),
+            joints: problem.joints.iter().map(|joint| reciprocal(joint.stiffness)).collect(),
+            links: problem
+                .joints
+                .iter()
+                .map(|joint| {
+                    joint.beam.as_ref().map_or_else(LinkFlexibility::default, |beam| LinkFlexibility {
+                        axial: reciprocal(beam.ea),
+                        about_y: reciprocal(beam.ei_y),
+                        about_z: reciprocal(beam.ei_z),
+                        twist: reciprocal(beam.gj),
+                    })
+                })
+                .collect(),
+        }
+    }
+
+    /// No geometry, and one flexibility of 1.
+    pub(super) fn unit(joints: usize, which: Flexibility) -> Self {
+        let mut out =
+            Self { geometry: Vec::new(), joints: vec![0.0; joints], links: vec![LinkFlexibility::default(); joints] };
+        out.set(which, 1.0);
+        out
+    }
+
+    /// The flexibilities that are not 0. A link with one EI for both planes has one bending flexibility, as in the paper.
+    pub fn flexibilities(&self) -> Vec<Flexibility> {
+        let joints = self.joints.iter().enumerate().map(|(k, _)| Flexibility::Joint(k));
+        let links = self.links.iter().enumerate().flat_map(|(k, link)| {
+            let bending = if link.about_y.total_cmp(&link.about_z).is_eq() {
+                vec![Flexibility::Bending(k)]
+            } else {
+                vec![Flexibility::BendingY(k), Flexibility::BendingZ(k)]
+            };
+            [vec![Flexibility::Axial(k)], bending, vec![Flexibility::Twist(k)]].concat()
+        });
+        joints.chain(links).filter(|&which| self.get(which) != 0.0).collect()
+    }
+
+    /// Value of a flexibility.
+    pub fn get(&self, which: Flexibility) -> f64 {
+        match which {
+            Flexibility::Joint(k) => self.joints[k],
+            Flexibility::Axial(k) => self.links[k].axial,
+            Flexibility::Bending(k) | Flexibility::BendingZ(k) => self.links[k].about_z,
+            Flexibility::BendingY(k) => self.links[k].about_y,
+            Flexibility::Twist(k) => self.links[k].twist,
+        }
+    }
+
+    /// Sets a flexibility.
+    pub fn set(&mut self, which: Flexibility, value: f64) {
+        match which {
+            Flexibility::Joint(k) => self.joints[k] = value,
+            Flexibility::Axial(k) => self.links[k].axial = value,
+            Flexibility::Bending(k) => (self.links[k].about_y, self.links[k].about_z) = (value, value),
+            Flexibility::BendingY(k) => self.links[k].about_y = value,
+            Flexibility::BendingZ(k) => self.links[k].about_z = value,
+            Flexibility::Twist(k) => self.links[k].twist = value,
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Measured poses as the least-squares problem that eq. 45 iterates on.
+
+use std::ops::Range;
+
+use nalgebra::DVector;
+
+use super::form::Reading;
+use super::identify::Measured;
+use super::{EndPoint, Parameters};
+use crate::fit::{Block, LeastSquares};
+use crate::problem::Problem;
+
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
+///
+/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near the minimum of ‖r‖, not
+/// in it.
+pub struct GeometryResiduals<'a> {
+    problem: &'a Problem,
+    poses: &'a [Measured<'a>],
+    parameters: &'a Parameters,
+    unknowns: Vec<usize>,
+    reading: Reading,
+}
+
+impl<'a> GeometryResiduals<'a> {
+    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are places in
+    /// e = [e₁ … e_n], and every pose has as many joints as the arm.
+    pub fn new(
+        problem: &'a Problem,
+        poses: &'a [Measured<'a>],
+        parameters: &'a Parameters,
+        unknowns: Vec<usize>,
+        reading: Reading,
+    ) -> Self {
+        Self { problem, poses, parameters, unknowns, reading }
+    }
+
+    /// The parameters at errors `x` of the unknowns.
+    pub fn at(&self, x: &DVector<f64>) -> Parameters {
+        let mut parameters = self.parameters.clone();
+        for (&place, x) in self.unknowns.iter().zip(x) {
+            *parameters.geometry[place / 5].fields_mut()[place % 5] += x;
+        }
+        parameters
+    }
+}
+
+impl LeastSquares for GeometryResiduals<'_> {
+    fn parameters(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn items(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        3
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        let parameters = self.at(x);
+        for (pose, out) in self.poses[items].iter().zip(out.chunks_exact_mut(3)) {
+            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
+            out.copy_from_slice((pose.position - end.position(&parameters)).as_slice());
+        }
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        let parameters = self.at(x);
+        for (item, pose) in self.poses[items].iter().enumerate() {
+            let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
+            let rows = 3 * item..3 * item + 3;
+            let jacobian = end.jacobian();
+            for (column, &place) in self.unknowns.iter().enumerate() {
+                let derivative = -jacobian.column(place);
+                block.column_mut(column)[rows.clone()].copy_from_slice(derivative.as_slice());
+            }
+            let residual = pose.position - end.position(&parameters);
+            block.column_mut(self.unknowns.len())[rows].copy_from_slice(residual.as_slice());
+        }
+    }
+}

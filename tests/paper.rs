@@ -1,0 +1,18 @@
+//! The paper's closed forms: each group of equations, each misprint, and the iteration, on the lunar sampler.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test that fails may panic; sizes are shown")]
+
+mod common;
+
+#[path = "paper/arm.rs"]
+mod arm;
+#[path = "paper/elastic.rs"]
+mod elastic;
+#[path = "paper/geometry.rs"]
+mod geometry;
+#[path = "paper/identification.rs"]
+mod identification;
+#[path = "paper/iteration.rs"]
+mod iteration;
+#[path = "paper/misprints.rs"]
+mod misprints;

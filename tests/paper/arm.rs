@@ -1,0 +1,130 @@
+//! The lunar sampler, its golden positions, and what the dual-number model says of it.
+
+use flexcal::arm;
+use flexcal::fit::jacobian;
+use flexcal::model::{Model, Pose, PoseResiduals};
+use flexcal::paper::{EndPoint, Mdh, Parameters, Reading, Setup};
+use flexcal::parameter::Parameter;
+use flexcal::problem::{Equilibrium, Freedom, Problem, Quantities};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
+
+/// A row of `tests/golden`: values in m, three a group.
+pub struct Row {
+    pub q: Vec<f64>,
+    pub payload: f64,
+    pub hoist: f64,
+    pub values: Vec<Vector3<f64>>,
+}
+
+impl Row {
+    pub fn setup(&self) -> Setup<'_> {
+        Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
+    }
+
+    pub fn arm_setup(&self) -> arm::Setup<'_> {
+        arm::Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
+    }
+}
+
+pub fn rows(name: &str) -> Vec<Row> {
+    let mut reader = csv::Reader::from_path(golden(name)).unwrap();
+    let row = |record: csv::StringRecord| {
+        let v: Vec<f64> = record.iter().map(|cell| cell.parse().unwrap()).collect();
+        Row {
+            q: v[..4].iter().map(|q| q.to_radians()).collect(),
+            payload: v[4],
+            hoist: v[5],
+            values: v[6..].chunks(3).map(|v| Vector3::new(v[0], v[1], v[2]) * 1e-3).collect(),
+        }
+    };
+    reader.records().map(|record| row(record.unwrap())).collect()
+}
+
+/// The lunar sampler with loads on the rigid arm, every parameter of the arm free and without prior.
+pub fn problem() -> Problem {
+    prepared(golden_problem())
+}
+
+/// An arm in general position, so that every term matters, prepared likewise.
+pub fn odd_problem() -> Problem {
+    prepared(parse(ODD))
+}
+
+fn prepared(mut problem: Problem) -> Problem {
+    problem.statics.equilibrium = Equilibrium::Undeflected;
+    problem.parameters.retain(|rule| !["tool.*", "base.*"].contains(&rule.pattern.as_str()));
+    for rule in &mut problem.parameters {
+        let none = Quantities::default();
+        rule.freedom = Freedom::Free { sigma: none, min: none, max: none };
+    }
+    problem
+}
+
+/// A prepared problem without elasticity.
+pub fn rigid(problem: Problem) -> Problem {
+    let mut problem = without_elasticity(problem);
+    problem.parameters.retain(|rule| rule.pattern.starts_with("joint") && rule.pattern != "joint*.stiffness");
+    problem
+}
+
+/// A configuration of the odd arm for each of the sampler's.
+pub fn odd_rows(name: &str) -> Vec<Row> {
+    let mut rows = rows(name);
+    for row in &mut rows {
+        let [a, b, c, d] = row.q[..] else { continue };
+        row.q = vec![a, 0.0, b, 0.2 * c, d];
+    }
+    rows
+}
+
+pub fn table_2() -> Vec<Mdh> {
+    let row = |[alpha, a, theta, d, beta]: [f64; 5]| Mdh {
+        alpha: alpha.to_radians(),
+        a,
+        theta: theta.to_radians(),
+        d,
+        beta: beta.to_radians(),
+    };
+    TABLE_2.into_iter().map(row).collect()
+}
+
+/// e = table 2 − nominal, shape = (20).
+pub fn table_2_errors(problem: &Problem) -> DVector<f64> {
+    let nominal = Parameters::nominal(problem).geometry;
+    let pairs = nominal.into_iter().zip(table_2());
+    let errors = pairs.flat_map(|(mut from, mut to)| {
+        let (from, to) = (from.fields_mut().map(|v| *v), to.fields_mut().map(|v| *v));
+        std::array::from_fn::<f64, 5, _>(|k| to[k] - from[k])
+    });
+    DVector::from_iterator(20, errors)
+}
+
+/// Nominal parameters, and the same with the geometry of table 2.
+pub fn both(problem: &Problem) -> [Parameters; 2] {
+    let nominal = Parameters::nominal(problem);
+    [nominal.clone(), Parameters { geometry: table_2(), ..nominal }]
+}
+
+pub fn end(problem: &Problem, parameters: &Parameters, row: &Row, reading: impl Into<Reading>) -> EndPoint {
+    EndPoint::new(problem, parameters, &row.setup(), &reading.into())
+}
+
+pub fn model(problem: &Problem) -> Model {
+    Model::new(problem, &[String::new()], &[String::new()]).unwrap()
+}
+
+/// ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
+pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
+    let pose = Pose { setup: row.arm_setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0 };
+    let residuals = PoseResiduals::new(model, vec![pose], (0..x.len()).collect(), x.clone());
+    -jacobian(&residuals, x)
+}
+
+/// Where each parameter of the model stands in e = [e₁ … e_n]; `None` for a flexibility.
+pub fn place_in_e(parameter: &Parameter) -> Option<usize> {
+    let (joint, field) = parameter.name.strip_prefix("joint")?.split_once('.')?;
+    let field = ["alpha", "a", "theta", "d", "beta"].iter().position(|name| *name == field)?;
+    Some(5 * (joint.parse::<usize>().unwrap() - 1) + field)
+}
