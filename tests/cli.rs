@@ -264,3 +264,24 @@ fn a_result_that_cannot_be_written_is_an_error() {
     let assert = bench.identify(&["--out", "taken"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("cannot write"));
 }
+
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let (_, after) = readme.split_once("<!-- lunar -->\n```text\n").unwrap();
+    let (shown, _) = after.split_once("\n```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let printed = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+        .current_dir(folder.path())
+        .arg("identify")
+        .arg(root.join("problems/lunar-sampler"))
+        .output()
+        .unwrap();
+    let printed = text(&printed.stdout);
+    // The third line ends in the time it took.
+    let timeless = |text: &str| -> Vec<String> {
+        text.trim_end().lines().enumerate().filter(|(k, _)| *k != 2).map(|(_, line)| line.to_owned()).collect()
+    };
+    assert_eq!(timeless(shown), timeless(&printed));
+}
