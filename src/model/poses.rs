@@ -113,7 +113,6 @@ impl LeastSquares for PoseResiduals<'_> {
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let full = self.full(x);
         let mut linearised = Linearised::new(self.model, &full, &self.unknowns);
-        block.clear();
         for (k, pose) in self.poses[items].iter().enumerate() {
             linearised.write(pose, block, 3 * k);
         }
