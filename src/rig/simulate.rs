@@ -44,6 +44,8 @@ pub struct Simulation {
     pub truth: Truth,
     /// Every parameter with its true value.
     pub parameters: Vec<TrueParameter>,
+    /// The true arm.
+    pub rig: Rig,
     /// The measurements in order of time.
     pub rows: Vec<Row>,
     /// Name of the column that marks held-out rows.
@@ -90,6 +92,7 @@ pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Re
         seed,
         truth: truth.clone(),
         parameters,
+        rig,
         rows,
         split_column,
     })

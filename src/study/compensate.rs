@@ -71,7 +71,8 @@ pub fn compensate(
         let miss = residuals.position_errors(&solution.x)[0];
         let mut configuration = seed.to_vec();
         for (&joint, step) in moving.iter().zip(solution.x.iter()) {
-            configuration[joint] += step;
+            let (min, max) = problem.joints[joint].limits;
+            configuration[joint] = (configuration[joint] + step).clamp(min, max);
         }
         let seed_miss = residuals.position_errors(&DVector::zeros(n))[0].norm();
         commands.push(Command { row, configuration, miss, seed_miss });
