@@ -79,7 +79,10 @@ fn limits_are_kept_and_targets_out_of_reach_are_named() {
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
     assert!(!commands[0].is_reached() && commands[0].miss.norm() > 4.0);
     assert!(commands.iter().all(|command| (-0.2..=0.3).contains(&command.configuration[1])));
-    assert!(commands.iter().filter(|command| command.is_reached()).count() > 60);
+    // Where the shoulder starts well inside its range, a correction is enough.
+    let inside = commands.iter().skip(1).filter(|command| (-0.15..=0.25).contains(&rows.configuration(command.row)[1]));
+    let inside: Vec<bool> = inside.map(flexcal::study::Command::is_reached).collect();
+    assert!(inside.len() > 10 && inside.iter().all(|reached| *reached));
 }
 
 #[test]
