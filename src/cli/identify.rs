@@ -45,6 +45,10 @@ enum SolverArgument {
     Auto,
     /// Levenberg-Marquardt without bounds
     LevenbergMarquardt,
+    /// Gauss-Newton: undamped steps
+    GaussNewton,
+    /// Undamped steps by a truncated pseudo-inverse, as in the paper
+    PseudoInverse,
     /// Levenberg-Marquardt within the bounds of [parameters]
     Bounded,
 }
@@ -65,6 +69,8 @@ impl From<SolverArgument> for SolverChoice {
         match argument {
             SolverArgument::Auto => Self::Auto,
             SolverArgument::LevenbergMarquardt => Self::LevenbergMarquardt,
+            SolverArgument::GaussNewton => Self::GaussNewton,
+            SolverArgument::PseudoInverse => Self::PseudoInverse,
             SolverArgument::Bounded => Self::Bounded,
         }
     }

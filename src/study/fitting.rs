@@ -72,6 +72,13 @@ impl<'a> Fitting<'a> {
         }
     }
 
+    /// A stage that fits bases and targets, by the solver that `auto` takes whichever was asked for.
+    fn placing(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+        let mut stage = self.stage(rows, unknowns);
+        stage.solver = SolverChoice::Auto.decide(&self.model.parameters);
+        stage
+    }
+
     /// Everything that the strategy varies, as one stage on the identification rows.
     pub fn whole(&self) -> Stage<'a> {
         let varied = |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
@@ -82,7 +89,7 @@ impl<'a> Fitting<'a> {
     pub fn late_stage(&self) -> Option<Stage<'a>> {
         let unknowns: Vec<usize> =
             self.late.parameters.iter().enumerate().filter(|(_, late)| **late).map(|(k, _)| k).collect();
-        (!unknowns.is_empty()).then(|| self.stage(&self.late.rows, unknowns))
+        (!unknowns.is_empty()).then(|| self.placing(&self.late.rows, unknowns))
     }
 
     /// First row whose pose has no equilibrium on the nominal arm.
@@ -105,7 +112,7 @@ impl<'a> Fitting<'a> {
         register(self.model, &poses, &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
         if !placements.is_empty() {
-            x = self.stage(&self.split.identification, placements).run(&x)?.x;
+            x = self.placing(&self.split.identification, placements).run(&x)?.x;
         }
         match self.late_stage() {
             Some(stage) => Ok(stage.run(&x)?.x),

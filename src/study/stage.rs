@@ -10,7 +10,7 @@ use super::SolverChoice;
 use crate::fit::{Fit, Identifiability, LinearRows, Objective as _, RowsError};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
-use crate::solver::{self, Bounds, BoundsError, Settings, Solution, State};
+use crate::solver::{self, Bounds, BoundsError, GaussNewtonSettings, PseudoInverseSettings, Settings, Solution, State};
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
 /// metres measured in units of their noise, and far below what any estimate's error would show.
@@ -152,8 +152,23 @@ impl<'a> Stage<'a> {
                     None => solver::minimise_bounded(fit, begin, &bounds, &settings),
                 }
             }
-            (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
-            (_, None) => solver::minimise(fit, begin, &settings),
+            (SolverChoice::GaussNewton, _) => {
+                let max_iterations = self.max_steps.min(GaussNewtonSettings::default().max_iterations);
+                let settings = GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
+                solver::minimise_gauss_newton(fit, begin, &settings)
+            }
+            (SolverChoice::PseudoInverse, reporter) => {
+                let max_iterations = self.max_steps.min(PseudoInverseSettings::default().max_iterations);
+                let settings = PseudoInverseSettings { max_iterations, ..PseudoInverseSettings::default() };
+                match reporter {
+                    Some(reporter) => solver::minimise_pseudo_inverse_observed(fit, begin, &settings, reporter),
+                    None => solver::minimise_pseudo_inverse(fit, begin, &settings),
+                }
+            }
+            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, Some(reporter)) => {
+                solver::minimise_observed(fit, begin, &settings, reporter)
+            }
+            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, None) => solver::minimise(fit, begin, &settings),
         };
         Ok(StageEnd { x: residuals.full(&solution.x), solution, gauge })
     }

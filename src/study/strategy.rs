@@ -26,6 +26,10 @@ pub enum SolverChoice {
     Auto,
     /// Levenberg–Marquardt without bounds.
     LevenbergMarquardt,
+    /// argmin's Gauss–Newton method: undamped.
+    GaussNewton,
+    /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
+    PseudoInverse,
     /// Levenberg–Marquardt within the bounds of `[parameters]`.
     Bounded,
 }
@@ -62,13 +66,15 @@ impl Strategy {
 
 impl SolverChoice {
     /// Every solver.
-    pub const EACH: [Self; 2] = [Self::LevenbergMarquardt, Self::Bounded];
+    pub const EACH: [Self; 4] = [Self::LevenbergMarquardt, Self::GaussNewton, Self::PseudoInverse, Self::Bounded];
 
     /// Name on the command line and in results.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::LevenbergMarquardt => "levenberg-marquardt",
+            Self::GaussNewton => "gauss-newton",
+            Self::PseudoInverse => "pseudo-inverse",
             Self::Bounded => "bounded",
         }
     }
