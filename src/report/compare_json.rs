@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::json::{Both, to_text};
 use crate::problem::Problem;
-use crate::study::{Comparison, Identification};
+use crate::study::{Baseline, Comparison, Identification, SolverChoice};
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {
@@ -28,7 +28,7 @@ struct Row<'a> {
     termination: &'a str,
     trusted: bool,
     reduced_chi2: Option<f64>,
-    condition_number: f64,
+    condition_number: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -51,7 +51,24 @@ impl<'a> From<&'a Identification> for Row<'a> {
             termination: result.termination.as_str(),
             trusted: result.is_trusted(),
             reduced_chi2: result.reduced_chi2,
-            condition_number: result.identifiability.condition_number(),
+            condition_number: Some(result.identifiability.condition_number()),
+        }
+    }
+}
+
+impl<'a> From<&'a Baseline> for Row<'a> {
+    fn from(result: &'a Baseline) -> Self {
+        Self {
+            strategy: result.strategy(),
+            solver: SolverChoice::PseudoInverse.as_str(),
+            errors: (&result.errors).into(),
+            iterations: result.iterations,
+            evaluations: result.evaluations,
+            seconds: result.seconds,
+            termination: result.termination.as_str(),
+            trusted: result.termination.converged(),
+            reduced_chi2: None,
+            condition_number: None,
         }
     }
 }
@@ -61,7 +78,7 @@ pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
     to_text(&Document {
         problem: &problem.name,
         registered: (&comparison.joint.registered).into(),
-        rows: comparison.strategies.iter().map(Row::from).collect(),
+        rows: comparison.strategies.iter().map(Row::from).chain(comparison.paper.iter().map(Row::from)).collect(),
         ablations: comparison
             .ablations
             .iter()

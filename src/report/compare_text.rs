@@ -2,7 +2,8 @@
 
 use super::quantity::{number, table};
 use crate::problem::Problem;
-use crate::study::{AxisValues, Comparison, ErrorSummary, Identification};
+use crate::solver::Termination;
+use crate::study::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
 
 /// Table 3 of [Chen2021], 50 poses, mm: before, with elasticity, geometry alone; x, y, z and sum of each.
 const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [
@@ -13,7 +14,8 @@ const TABLE_3: [&str; 8] = ["held out, mm", "axis", "before", "with elasticity",
 
 /// A comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
-    let Comparison { joint, rigid, strategies, ablations } = comparison;
+    let Comparison { joint, rigid, strategies, paper, ablations } = comparison;
+    let strategies = strategies.iter().map(|result| line(result.strategy.as_str(), result));
     [
         format!(
             "{}\n{} poses to identify, {} held out\n",
@@ -21,8 +23,8 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         ),
         geometry(problem, joint),
         errors(joint, rigid),
-        rows("strategy", strategies.iter().map(|result| (result.strategy.as_str(), result))),
-        rows("elasticity", ablations.iter().map(|(ablation, result)| (ablation.as_str(), result))),
+        rows("strategy", strategies.chain(paper.iter().map(paper_line)).collect()),
+        rows("elasticity", ablations.iter().map(|(ablation, result)| line(ablation.as_str(), result)).collect()),
     ]
     .join("\n")
 }
@@ -91,23 +93,42 @@ fn errors(joint: &Identification, rigid: &Identification) -> String {
     format!("{text}  published: [Chen2021, table 3], before, with elasticity, ignoring it; measured on another arm\n")
 }
 
-fn rows<'a>(title: &str, results: impl Iterator<Item = (&'a str, &'a Identification)>) -> String {
-    let body = results
-        .map(|(name, result)| {
-            vec![
-                name.to_owned(),
-                result.solver.as_str().to_owned(),
-                number(result.fitted.held_out.mean.norm * 1e3, 4),
-                number(result.fitted.held_out.rms.norm * 1e3, 4),
-                number(result.fitted.identification.rms.norm * 1e3, 4),
-                result.iterations.to_string(),
-                result.evaluations.to_string(),
-                number(result.seconds * 1e3, 1),
-                format!("{:.1e}", result.identifiability.condition_number()),
-                result.termination.as_str().to_owned(),
-            ]
-        })
-        .collect();
+/// One line of a comparison.
+fn line(name: &str, result: &Identification) -> Vec<String> {
+    let condition = format!("{:.1e}", result.identifiability.condition_number());
+    let counts = (result.iterations, result.evaluations, result.seconds);
+    cells(name, result.solver.as_str(), &result.fitted, counts, condition, result.termination)
+}
+
+fn paper_line(result: &Baseline) -> Vec<String> {
+    let counts = (result.iterations, result.evaluations, result.seconds);
+    let solver = SolverChoice::PseudoInverse.as_str();
+    cells(result.strategy(), solver, &result.errors, counts, "–".to_owned(), result.termination)
+}
+
+fn cells(
+    name: &str,
+    solver: &str,
+    errors: &Errors,
+    (steps, evaluations, seconds): (u64, u64, f64),
+    condition: String,
+    termination: Termination,
+) -> Vec<String> {
+    vec![
+        name.to_owned(),
+        solver.to_owned(),
+        number(errors.held_out.mean.norm * 1e3, 4),
+        number(errors.held_out.rms.norm * 1e3, 4),
+        number(errors.identification.rms.norm * 1e3, 4),
+        steps.to_string(),
+        evaluations.to_string(),
+        number(seconds * 1e3, 1),
+        condition,
+        termination.as_str().to_owned(),
+    ]
+}
+
+fn rows(title: &str, body: Vec<Vec<String>>) -> String {
     let header = [
         title,
         "solver",

@@ -1,9 +1,11 @@
 //! Every strategy with every solver, and every part of the elasticity left out in turn, on one problem.
 
+use super::baseline::{Baseline, baseline};
 use super::identification::identify_model;
 use super::{Identification, IdentifyError, Options, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::measurement::{Measurements, Split};
 use crate::model::{Ablation, Model};
+use crate::paper::Form;
 use crate::parameter::Parameter;
 use crate::problem::Problem;
 
@@ -16,6 +18,8 @@ pub struct Comparison {
     pub rigid: Identification,
     /// One identification per strategy and solver; `None` where the strategy has nothing to vary.
     pub strategies: Vec<Identification>,
+    /// The paper's own procedure, without its misprints and as printed, where it applies.
+    pub paper: Vec<Baseline>,
     /// One identification per ablation, everything fitted at once.
     pub ablations: Vec<(Ablation, Identification)>,
 }
@@ -59,6 +63,10 @@ pub fn compare(
         joint: run(&model, Strategy::Joint, SolverChoice::Auto)?,
         rigid: run(&model.ablated(Ablation::Rigid), Strategy::Joint, SolverChoice::Auto)?,
         strategies,
+        paper: [Form::Corrected, Form::Printed]
+            .into_iter()
+            .filter_map(|form| baseline(problem, measurements, split, form))
+            .collect(),
         ablations,
     })
 }

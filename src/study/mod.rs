@@ -1,5 +1,6 @@
 //! What to fit, in which order, and what came of it.
 
+mod baseline;
 mod compare;
 mod compensate;
 mod errors;
@@ -11,6 +12,7 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use baseline::Baseline;
 pub use compare::{Comparison, compare};
 pub use compensate::{Command, compensate};
 pub use errors::{AxisValues, ErrorSummary};
