@@ -15,6 +15,8 @@ mod edges;
 mod functions;
 #[path = "solver/nist.rs"]
 mod nist;
+#[path = "solver/robust.rs"]
+mod robust;
 #[path = "solver/speed.rs"]
 mod speed;
 #[path = "solver/threads.rs"]

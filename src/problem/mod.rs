@@ -8,6 +8,7 @@ mod effects;
 mod item;
 mod parameters;
 mod read;
+mod robust;
 mod section;
 
 use std::path::PathBuf;
@@ -39,6 +40,26 @@ pub struct Problem {
     pub parameters: Vec<ParameterRule>,
     /// Where the measurements are and how they are used.
     pub data: Data,
+    /// How gross errors are kept from ruling the fit; `None`: they are not.
+    pub robust: Option<Robust>,
+}
+
+/// `[robust]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robust {
+    /// What residuals count.
+    pub loss: RobustLoss,
+    /// `threshold_sigma`: the length of a residual from which it counts less than its square [σ]; `None`: the usual one.
+    pub threshold: Option<f64>,
+}
+
+/// What the residual of a pose counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobustLoss {
+    /// Its square up to the threshold, its length beyond.
+    Huber,
+    /// Its length, rounded off below the threshold.
+    L1,
 }
 
 /// `[statics]`.

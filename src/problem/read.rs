@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use super::item::Document;
 use super::section::Section;
-use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters};
+use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters, robust};
 use crate::error::{InputError, InputErrorKind, Location, lines};
 use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
 
@@ -60,8 +60,9 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let effects = effects::read(&mut root, &joints)?;
     let parameters = parameters::read(&mut root)?;
     let data = data(&mut root)?;
+    let robust = robust::read(&mut root)?;
     root.finish()?;
-    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, data })
+    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, data, robust })
 }
 
 fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::problem::Problem;
 use crate::solver::AtBound;
-use crate::study::{AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise};
+use crate::study::{AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise, Outlier};
 
 /// An error summary in millimetres.
 #[derive(Debug, Serialize)]
@@ -54,6 +54,7 @@ struct Document<'a> {
     parameters: Vec<ParameterEntry<'a>>,
     unidentified: Vec<Unidentified<'a>>,
     correlations: Vec<Correlation<'a>>,
+    outliers: Vec<OutlierEntry>,
 }
 
 #[derive(Debug, Serialize)]
@@ -88,6 +89,29 @@ struct Unidentified<'a> {
 struct Correlation<'a> {
     parameters: [&'a str; 2],
     correlation: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct OutlierEntry {
+    file: String,
+    line: Option<usize>,
+    /// Counted from 1 over all files.
+    pose_row: usize,
+    error_mm: f64,
+    sigmas: f64,
+}
+
+impl From<&Outlier> for OutlierEntry {
+    fn from(outlier: &Outlier) -> Self {
+        let Outlier { row, location, distance, error } = outlier;
+        Self {
+            file: location.file.display().to_string(),
+            line: location.line,
+            pose_row: row + 1,
+            error_mm: error.norm() * 1e3,
+            sigmas: *distance,
+        }
+    }
 }
 
 impl From<&AxisValues> for Axes {
@@ -165,6 +189,7 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
             .iter()
             .map(|(a, b, correlation)| Correlation { parameters: [a, b], correlation: *correlation })
             .collect(),
+        outliers: result.outliers.iter().map(OutlierEntry::from).collect(),
     };
     // Text keys and numbers always serialise; numbers that are not finite become null.
     let mut text = serde_json::to_string_pretty(&document).unwrap_or_default();

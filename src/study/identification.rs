@@ -5,15 +5,16 @@ use std::time::Instant;
 use nalgebra::DVector;
 
 use super::fitting::{FitEnd, Fitting};
+use super::outliers::Outlier;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
 use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
-use crate::fit::Identifiability;
+use crate::fit::{Identifiability, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::parameter::{Parameter, Unit};
-use crate::problem::Problem;
+use crate::problem::{Problem, Robust, RobustLoss};
 use crate::solver::{AtBound, Termination};
 
 /// An undeclared σ has settled when it changes by less than this part.
@@ -118,6 +119,7 @@ pub struct Identification {
     /// Of the identified arm.
     pub fitted: Errors,
     /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
+    /// Where the loss is robust, outliers are left out of it.
     pub reduced_chi2: Option<f64>,
     /// By how much the declared variance was raised for the standard errors, ≥ 1.
     pub noise_factor: f64,
@@ -133,6 +135,8 @@ pub struct Identification {
     pub estimates: Vec<Estimate>,
     /// Pairs of parameters correlated by more than 0.9, strongest first.
     pub correlations: Vec<(String, String, f64)>,
+    /// Identification rows whose residual is too long to be noise, in the order of the rows.
+    pub outliers: Vec<Outlier>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,
 }
@@ -176,6 +180,7 @@ pub fn identify(
         late: placement.late(&model, split),
         strategy,
         solver,
+        loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
         sigma: declared.unwrap_or(1e-3),
     };
@@ -203,6 +208,8 @@ pub fn identify(
         }
         fitting.sigma *= factor;
     };
+    let errors = fitting.position_errors(&split.identification, &end.x);
+    let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     report(&mut estimates, &fitting.whole(), &end, &statistics);
     if let Some(stage) = fitting.late_stage() {
@@ -227,9 +234,20 @@ pub fn identify(
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        outliers,
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// The loss that `[robust]` stands for, on the three coordinates of a position.
+fn loss(robust: Robust) -> Loss {
+    match robust.loss {
+        RobustLoss::Huber => Loss::Huber { threshold: robust.threshold.unwrap_or(Loss::HUBER_POSITION) },
+        RobustLoss::L1 => {
+            Loss::L1 { slope: Loss::L1_POSITION, smoothing: robust.threshold.unwrap_or(Loss::L1_SMOOTHING) }
+        }
+    }
 }
 
 impl Estimate {

@@ -3,6 +3,7 @@
 mod errors;
 mod fitting;
 mod identification;
+mod outliers;
 mod placement;
 mod registration;
 mod stage;
@@ -11,6 +12,7 @@ mod strategy;
 
 pub use errors::{AxisValues, ErrorSummary};
 pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
+pub use outliers::Outlier;
 pub use placement::Placement;
 pub use stage::{Progress, ProgressSink, StageError};
 pub use strategy::{SolverChoice, Strategy};

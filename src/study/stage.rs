@@ -7,7 +7,7 @@ use argmin::core::{Error, KV, State as _};
 use nalgebra::{DMatrix, DVector};
 
 use super::SolverChoice;
-use crate::fit::{Fit, Identifiability, LinearRows, Objective as _, RowsError};
+use crate::fit::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
 use crate::solver::{self, Bounds, BoundsError, Settings, Solution, State};
@@ -46,6 +46,8 @@ pub(super) struct Stage<'a> {
     /// Which parameters vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
+    /// How the residual of a pose counts.
+    pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
 }
 
@@ -101,6 +103,12 @@ impl<'a> Stage<'a> {
         Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
     }
 
+    /// The same, each pose weighted as the loss does.
+    pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = self.residuals(at);
+        Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
+    }
+
     /// Combinations that the data and the priors together leave open at `at`.
     pub fn gauge(&self, at: &DVector<f64>) -> Gauge {
         let priors = self.priors();
@@ -127,6 +135,7 @@ impl<'a> Stage<'a> {
         let hold = -(&gauge.rows * &begin);
         let none = DVector::zeros(priors.nrows());
         let fit = Fit::new(&residuals)
+            .with_loss(self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
         let settings = Settings::default();
@@ -151,11 +160,11 @@ impl<'a> Stage<'a> {
         Ok(StageEnd { x: residuals.full(&solution.x), solution, gauge })
     }
 
-    /// ½‖r‖² of the data and the priors at the full parameter vector `at`.
+    /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.
     pub fn cost(&self, at: &DVector<f64>) -> f64 {
         let residuals = self.residuals(at);
         let x = residuals.reduced(at);
-        Fit::new(&residuals).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
+        Fit::new(&residuals).with_loss(self.loss).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
     }
 
     /// One row x / σ for each unknown with a prior.

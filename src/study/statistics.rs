@@ -1,11 +1,11 @@
 //! What the residual of a fit says about its unknowns.
 
-use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::fitting::FitEnd;
+use super::outliers::Lengths;
 use super::stage::Stage;
-use crate::fit::{LeastSquares as _, Uncertainty, residual_vector};
+use crate::fit::{Loss, Uncertainty};
 
 /// A χ² this improbable under the declared σ means that σ is understated.
 const IMPROBABLE: f64 = 1e-3;
@@ -21,30 +21,39 @@ pub(super) struct Statistics {
     pub identified: Vec<f64>,
     /// Pairs of unknowns correlated by more than 0.9, strongest first.
     pub correlations: Vec<(usize, usize, f64)>,
-    /// χ² over its degrees of freedom; `None` without any.
+    /// χ² over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
     pub reduced_chi2: Option<f64>,
     /// By how much the assumed variance was raised, ≥ 1.
     pub noise_factor: f64,
+    /// Lengths of the residuals.
+    pub lengths: Lengths,
 }
 
 impl Statistics {
     /// Of a stage that ended at `end`.
     ///
     /// The model's errors count as noise: where χ² / ν is beyond chance under a declared σ, the variance is raised by it.
+    /// With a robust loss the covariance is that of the weighted Jacobian, times [`Loss::variance_factor`].
     pub fn of(stage: &Stage, end: &FitEnd, noise_is_declared: bool) -> Self {
-        let residuals = stage.residuals(&end.x);
-        let x: DVector<f64> = residuals.reduced(&end.x);
-        let chi2 = residual_vector(&residuals, &x).norm_squared();
-        let triangle = stage.data_triangle(&end.x);
+        let triangle = stage.weighted_triangle(&end.x);
         let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let of = |factor| Uncertainty::of(&triangle, &priors, &end.gauge.rows, &held, factor);
         let mut uncertainty = of(1.0);
-        let freedom = (residuals.items() * residuals.rows_per_item()) as f64 - uncertainty.effective_parameters;
-        let noise_factor = if noise_is_declared { raised(chi2, freedom) } else { 1.0 };
-        if noise_factor > 1.0 {
+        let coordinates = 3.0 * stage.poses.len() as f64;
+        let freedom = coordinates - uncertainty.effective_parameters;
+        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, noise_is_declared);
+        let robust = stage.loss != Loss::Squares;
+        let counts = |length: f64| !robust || lengths.outlying(length).is_none();
+        let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
+        let left_out = if robust { 3.0 * lengths.outliers() as f64 } else { 0.0 };
+        let noise_factor = if noise_is_declared { raised(chi2, freedom - left_out) } else { 1.0 };
+        if robust {
+            uncertainty = of(stage.loss.variance_factor(&lengths.values, 3, freedom));
+        } else if noise_factor > 1.0 {
             uncertainty = of(noise_factor);
         }
+        let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
         let identified = (0..errors.len())
             .map(|j| match priors[j] {
@@ -59,6 +68,7 @@ impl Statistics {
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             noise_factor,
+            lengths,
         }
     }
 }
