@@ -3,20 +3,27 @@
 //! Every solver sees the problem through [`Objective`](crate::fit::Objective) only: a cost and an n × n triangular linearisation.
 
 mod bounded;
+mod bounds;
 mod box_step;
 mod factor;
+mod inequalities;
+mod interior;
 mod levenberg_marquardt;
 mod pivoted;
+mod polyhedron_step;
 mod run;
 mod settings;
 mod spectrum;
 mod termination;
 mod trust_region;
 
-pub use bounded::{AtBound, Bounds, BoundsError, BoxConstrained, bounded_levenberg_marquardt};
+pub use bounded::{Constrained, bounded_levenberg_marquardt, constrained_levenberg_marquardt, nearest};
+pub use bounds::{AtBound, Bounds, BoundsError};
 pub use factor::Factor;
+pub use inequalities::{Inequalities, InequalitiesError};
 pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use run::{Solution, minimise, minimise_bounded, minimise_bounded_observed, minimise_observed};
+pub use run::{minimise_constrained, minimise_constrained_observed};
 pub use settings::Settings;
 pub use termination::Termination;
 pub use trust_region::{State, Step, Subproblem, TrustRegion};
