@@ -9,7 +9,9 @@ use toml::de::DeTable;
 
 use super::item::Document;
 use super::section::Section;
-use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters, robust};
+use super::{
+    BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, constraints, effects, parameters, robust,
+};
 use crate::error::{InputError, InputErrorKind, Location, lines};
 use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
 
@@ -59,10 +61,11 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let base = base(root.section("base")?)?;
     let effects = effects::read(&mut root, &joints)?;
     let parameters = parameters::read(&mut root)?;
+    let constraints = constraints::read(&mut root)?;
     let data = data(&mut root)?;
     let robust = robust::read(&mut root)?;
     root.finish()?;
-    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, data, robust })
+    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, constraints, data, robust })
 }
 
 fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {

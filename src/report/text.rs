@@ -18,6 +18,7 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
         noise(problem, result),
         outliers(problem, result),
         parameter_table(result),
+        active_constraints(result),
         conditioning(result),
         blind_text(result),
         correlation_text(result),
@@ -95,6 +96,20 @@ fn noise(problem: &Problem, result: &Identification) -> String {
             format!("Reduced χ² is {chi2:.2}: the model explains the data to the declared σ.\n")
         }
     }
+}
+
+/// The constraints that hold parameters back; nothing to say without any.
+fn active_constraints(result: &Identification) -> String {
+    let active = &result.active_constraints;
+    if active.is_empty() {
+        return String::new();
+    }
+    let mut text = "Held by a constraint (standard errors are those along it):\n".to_owned();
+    for constraint in active {
+        let line = constraint.location.line.map_or_else(String::new, |line| format!("line {line}: "));
+        let _ = writeln!(text, "  {line}{}", constraint.words);
+    }
+    text
 }
 
 /// Poses whose residual is too long to be noise; nothing to say without any.

@@ -53,7 +53,8 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     let solution = problem.solve(0.0);
     let mut point = x + &solution.q;
     bounds.hold(&mut point, &problem.bounds_of(&solution));
-    rows.contain(&point).then_some(point)
+    let kept = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
+    (0..rows.len()).all(kept).then_some(point)
 }
 
 /// The step within a sphere ‖D p‖ ≤ Δ, a box and inequalities.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::AtBound;
 
-/// A row is on its limit when it is this near, relative to the size of its terms.
+/// A row is on its limit when it is this near, relative to the size of its terms and of x.
 const NEAR: f64 = 1e-12;
 /// A row holds when it is outside by no more than this, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;
@@ -95,6 +95,7 @@ impl Inequalities {
     /// The limit that row `i` is on to within rounding, if any.
     pub fn at(&self, x: &DVector<f64>, i: usize) -> Option<AtBound> {
         let (value, size) = self.value(x, i);
+        let size = size + self.matrix.row(i).amax() * x.amax();
         let on = |limit: f64| limit.is_finite() && (value - limit).abs() <= NEAR * (size + limit.abs());
         if on(self.lower[i]) {
             Some(AtBound::Lower)
@@ -105,13 +106,16 @@ impl Inequalities {
         }
     }
 
+    /// Whether row `i` holds to within rounding.
+    pub(super) fn holds(&self, x: &DVector<f64>, i: usize) -> bool {
+        let (value, size) = self.value(x, i);
+        let (lower, upper) = (self.lower[i], self.upper[i]);
+        lower - value <= ROUNDING * (size + lower.abs()) && value - upper <= ROUNDING * (size + upper.abs())
+    }
+
     /// Whether every row holds to within rounding.
     pub fn contain(&self, x: &DVector<f64>) -> bool {
-        (0..self.len()).all(|i| {
-            let (value, size) = self.value(x, i);
-            let (lower, upper) = (self.lower[i], self.upper[i]);
-            lower - value <= ROUNDING * (size + lower.abs()) && value - upper <= ROUNDING * (size + upper.abs())
-        })
+        (0..self.len()).all(|i| self.holds(x, i))
     }
 
     /// `aᵢᵀx` and Σ |aᵢⱼ xⱼ|.

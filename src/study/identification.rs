@@ -6,10 +6,10 @@ use nalgebra::DVector;
 
 use super::fitting::{FitEnd, Fitting};
 use super::outliers::Outlier;
-use super::stage::{Stage, StageError};
+use super::stage::{Held, Stage, StageError};
 use super::statistics::Statistics;
 use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::fit::{Identifiability, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
@@ -44,9 +44,10 @@ pub enum IdentifyError {
     /// A fit could not be set up.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// Bounds were declared for a solver that cannot keep them.
+    /// Bounds or constraints were declared for a solver that cannot keep them.
     #[error(
-        "{solver} does not keep the bounds of [parameters]: take the solver bounded or auto, or leave out min and max"
+        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded or auto, or leave out \
+         min, max and [[constraint]]"
     )]
     BoundsIgnored {
         /// The solver that was asked for.
@@ -99,6 +100,30 @@ pub struct Estimate {
     pub fitted: bool,
 }
 
+/// A constraint that holds parameters back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveConstraint {
+    /// The limit in words: `ln A.EI − ln B.EI ≥ 0`.
+    pub words: String,
+    /// Which limit.
+    pub side: AtBound,
+    /// Where it stands in the problem file.
+    pub location: Location,
+}
+
+impl ActiveConstraint {
+    fn all(statistics: &Statistics, model: &Model) -> Vec<Self> {
+        let of = |held: &Held| {
+            let constraint = &model.constraints[held.constraint];
+            let [lower, upper] = &constraint.limits;
+            let limit = if held.side == AtBound::Lower { lower } else { upper };
+            let words = format!("{} {}", constraint.sum, limit.as_deref().unwrap_or_default());
+            Self { words, side: held.side, location: constraint.location.clone() }
+        };
+        statistics.constraints.iter().map(of).collect()
+    }
+}
+
 /// An identified arm.
 #[derive(Debug, Clone)]
 pub struct Identification {
@@ -135,6 +160,8 @@ pub struct Identification {
     pub estimates: Vec<Estimate>,
     /// Pairs of parameters correlated by more than 0.9, strongest first.
     pub correlations: Vec<(String, String, f64)>,
+    /// Constraints that hold the fitted parameters back, in the order of the file.
+    pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
     /// Full parameter vector of the model.
@@ -166,8 +193,8 @@ pub fn identify(
     let clock = Instant::now();
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
-    let (strategy, solver) = (options.strategy, options.solver.decide(&model.parameters));
-    if solver != SolverChoice::Bounded && model.parameters.iter().any(Parameter::is_bounded) {
+    let (strategy, solver) = (options.strategy, options.solver.decide(&model));
+    if solver != SolverChoice::Bounded && model.is_bounded() {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
     let declared = problem.data.position_sigma;
@@ -200,7 +227,7 @@ pub fn identify(
     let mut fits = 0;
     let (mut end, statistics) = loop {
         let end = fitting.run(&start)?;
-        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared);
+        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared)?;
         fits += 1;
         let factor = statistics.reduced_chi2.filter(|&chi2| chi2 > 0.0).map_or(1.0, f64::sqrt);
         if noise_is_declared || (factor - 1.0).abs() < NOISE_SETTLED || fits == MAX_NOISE_FITS {
@@ -214,7 +241,7 @@ pub fn identify(
     report(&mut estimates, &fitting.whole(), &end, &statistics);
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
-        report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared));
+        report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
         end.x = late.x;
     }
     let name = |j: usize| unknowns[j].name.clone();
@@ -234,6 +261,7 @@ pub fn identify(
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        active_constraints: ActiveConstraint::all(&statistics, &model),
         outliers,
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),
@@ -269,7 +297,7 @@ impl Estimate {
 fn report(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
-        let learned = end.at_bound[j].is_none() && statistics.identified[j] > NOTHING_LEARNED;
+        let learned = !statistics.held[j] && statistics.identified[j] > NOTHING_LEARNED;
         let estimate = &mut estimates[k];
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));

@@ -11,7 +11,7 @@ mod statistics;
 mod strategy;
 
 pub use errors::{AxisValues, ErrorSummary};
-pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
+pub use identification::{ActiveConstraint, Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
 pub use outliers::Outlier;
 pub use placement::Placement;
 pub use stage::{Progress, ProgressSink, StageError};
