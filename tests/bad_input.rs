@@ -199,6 +199,40 @@ fn rules_of_parameters() {
 }
 
 #[test]
+fn robust_loss() {
+    check_problems(&[
+        ("[robust]", &[":3: robust.loss: missing", "huber"]),
+        ("[robust]\nloss = 'cauchy'", &[":4: robust.loss: ", "\"cauchy\" is none of huber, l1"]),
+        ("[robust]\nloss = 'l1'\nthreshold_sigma = 0", &[":5: robust.threshold_sigma: 0 is not above zero"]),
+        ("[robust]\nloss = 'l1'\nthreshold = 1", &[":5: robust.threshold: unknown key", "threshold_sigma"]),
+        ("robust = 'l1'", &[":3: ", "robust"]),
+    ]);
+}
+
+#[test]
+fn constraints() {
+    let constraints: [(&str, &[&str]); 11] = [
+        ("", &[":3: constraint[1].terms: missing"]),
+        ("terms = {}", &[":4: constraint[1].terms: no terms"]),
+        ("terms = 1", &[":4: constraint[1].terms: expected a table"]),
+        ("terms = { A.EI = 1 }", &[":4: constraint[1].terms.A: ", "in quotes: \"A.EI\""]),
+        ("terms = { a = 0 }\nat_least = 0", &[":4: constraint[1].terms.a: a coefficient of 0"]),
+        ("terms = { a = 'x' }", &[":4: constraint[1].terms.a: expected a number"]),
+        ("terms = { a = 1 }", &[":3: constraint[1]: no limit; write at_least or at_most"]),
+        ("terms = { a = 1 }\nat_least = nan", &[":5: constraint[1].at_least: nan is not a finite number"]),
+        (
+            "terms = { a = 1 }\nat_least = 2\nat_most = 1",
+            &[":5: constraint[1].at_least: at_least 2 is above at_most 1"],
+        ),
+        ("terms = { a = 1 }\nat_least = 2\nat_least_mm = 1", &[":6: constraint[1].at_least_mm: given already"]),
+        ("terms = { a = 1 }\nat_least = 2\nabove = 1", &[":6: constraint[1].above: unknown key", "at_most"]),
+    ];
+    for (constraint, words) in constraints {
+        check_problems(&[(&format!("[[constraint]]\n{constraint}"), words)]);
+    }
+}
+
+#[test]
 fn effects() {
     let effects: [(&str, &[&str]); 17] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),

@@ -13,8 +13,12 @@ mod edges;
 #[path = "more_garbow_hillstrom/functions.rs"]
 #[expect(dead_code, reason = "only some of the functions are needed here")]
 mod functions;
+#[path = "solver/inequalities.rs"]
+mod inequalities;
 #[path = "solver/nist.rs"]
 mod nist;
+#[path = "solver/robust.rs"]
+mod robust;
 #[path = "solver/speed.rs"]
 mod speed;
 #[path = "solver/threads.rs"]

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// Which parameters are fitted together
     #[arg(long, value_enum, default_value_t = StrategyArgument::Joint)]
     strategy: StrategyArgument,
-    /// By which solver; auto keeps the bounds of [parameters] where there are any
+    /// By which solver; auto keeps bounds and constraints where there are any
     #[arg(long, value_enum, default_value_t = SolverArgument::Auto)]
     solver: SolverArgument,
 }
@@ -41,7 +41,7 @@ enum StrategyArgument {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum SolverArgument {
-    /// Bounded where a free parameter has bounds, else levenberg-marquardt
+    /// Bounded where there are bounds or constraints, else levenberg-marquardt
     Auto,
     /// Levenberg-Marquardt without bounds
     LevenbergMarquardt,
@@ -49,7 +49,7 @@ enum SolverArgument {
     GaussNewton,
     /// Undamped steps by a truncated pseudo-inverse, as in the paper
     PseudoInverse,
-    /// Levenberg-Marquardt within the bounds of [parameters]
+    /// Levenberg-Marquardt within the bounds of [parameters] and every [[constraint]]
     Bounded,
 }
 

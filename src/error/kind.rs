@@ -120,12 +120,30 @@ pub enum InputErrorKind {
     #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
     QuantityUseless { suffixes: &'static str },
 
+    // Constraints.
+    #[error("no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}")]
+    NoTerms,
+    #[error("a coefficient of 0 says nothing; leave the parameter out")]
+    NoCoefficient,
+    #[error("no limit; write at_least or at_most (with a unit for lengths and angles)")]
+    NoLimit,
+    #[error("at_least {least} is above at_most {most} (in SI units)")]
+    LimitsCross { least: f64, most: f64 },
+    #[error("not a parameter of this arm; {}", list("they are", known, "it has none"))]
+    UnknownParameter { known: Vec<String> },
+    #[error(
+        "does not add up with {other}: angles, lengths and logarithms of stiffnesses go in constraints of their own"
+    )]
+    MixedKinds { other: String },
+    #[error("{parameter} takes {write}")]
+    LimitOfAnotherKind { parameter: String, write: &'static str },
+    #[error("none of its parameters is free; free one in [parameters], or leave the constraint out")]
+    NothingConstrained,
+
     #[error("the nominal arm has no equilibrium under its loads here; check stiffnesses and masses")]
     NoEquilibrium,
 
     // The truth of a simulation.
-    #[error("no such parameter; {}", list("there are", known, "the arm has none"))]
-    UnknownParameter { known: Vec<String> },
     #[error("a range is two numbers, the lower one first; found {found}")]
     NotARange { found: usize },
     #[error("no strength; write {write}")]

@@ -6,6 +6,7 @@
 mod derivative;
 mod identifiability;
 mod kernel;
+mod loss;
 mod objective;
 mod singular;
 mod triangle;
@@ -17,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{BlindCombination, Identifiability};
+pub use loss::Loss;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub(crate) use singular::orthogonalise;
 pub use triangle::Triangle;
@@ -99,7 +101,7 @@ pub trait Objective {
     /// Number of unknowns n.
     fn parameters(&self) -> usize;
 
-    /// ½‖r(x)‖², or infinity outside the domain.
+    /// ½‖r(x)‖² (½Σρ with a robust loss), or infinity outside the domain.
     fn cost(&self, x: &DVector<f64>) -> f64;
 
     /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
@@ -120,10 +122,10 @@ impl<O: Objective + ?Sized> Objective for &O {
     }
 }
 
-/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest.
+/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest; rows are weighted where there is a robust loss.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
-    /// ½‖r‖².
+    /// ½‖r‖², or ½Σρ.
     pub cost: f64,
     /// R, upper triangular, n × n.
     pub triangle: DMatrix<f64>,

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::kernel::sum_of_squares;
-use super::{Block, LeastSquares, Linearisation, Objective, Triangle};
+use super::{Block, LeastSquares, Linearisation, Loss, Objective, Triangle};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
@@ -52,12 +52,20 @@ pub enum RowsError {
 pub struct Fit<'a, P> {
     problem: &'a P,
     rows: Vec<LinearRows>,
+    loss: Loss,
 }
 
 impl<'a, P: LeastSquares> Fit<'a, P> {
     /// The data problem alone.
     pub fn new(problem: &'a P) -> Self {
-        Self { problem, rows: Vec::new() }
+        Self { problem, rows: Vec::new(), loss: Loss::Squares }
+    }
+
+    /// Counts the residual of every item by `loss`; linear rows keep their squares.
+    #[must_use]
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        self.loss = loss;
+        self
     }
 
     /// Adds linear rows.
@@ -100,16 +108,20 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         let items = self.chunk(index);
         let out = &mut buffer[..items.len() * self.problem.rows_per_item()];
         self.problem.residuals(x, items, out);
-        sum_of_squares(out)
+        self.loss.sum(out, self.problem.rows_per_item())
     }
 
     fn chunk_triangle(&self, x: &DVector<f64>, index: usize, block: &mut Block) -> Triangle {
         let items = self.chunk(index);
         block.reshape(items.len() * self.problem.rows_per_item());
         self.problem.linearise(x, items, block);
+        let robust = self.loss.weigh(block, self.problem.rows_per_item());
         let mut triangle = Triangle::new(self.problem.parameters());
         triangle.absorb(block);
-        triangle
+        match robust {
+            Some(sum) => triangle.with_sum_of_squares(sum),
+            None => triangle,
+        }
     }
 
     /// Maps every chunk, in parallel when there are several, and hands the results on in order.

@@ -36,6 +36,13 @@ impl Triangle {
         self.squares
     }
 
+    /// The same factor with another cost: that of a robust loss, which weighted rows do not add up to.
+    #[must_use]
+    pub(super) fn with_sum_of_squares(mut self, squares: f64) -> Self {
+        self.squares = squares;
+        self
+    }
+
     /// Takes in the rows of `block`, whose values are lost.
     ///
     /// A block for another number of unknowns is a mistake of the caller and is checked in debug builds only.

@@ -39,6 +39,7 @@ impl Model {
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             parameters,
+            constraints: Vec::new(),
         }
     }
 

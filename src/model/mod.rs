@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::arm::{Angle, Arm};
 use crate::error::{InputError, InputErrorKind};
-use crate::parameter::{BeamField, JointField, Parameter, Slot, resolve};
+use crate::parameter::{BeamField, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -26,23 +26,32 @@ pub struct Model {
     targets: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
+    /// Linear inequalities between them.
+    pub constraints: Vec<LinearConstraint>,
 }
 
 impl Model {
     /// The declared arm with one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` does not fit the parameters there are, or an effect is declared.
+    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, or an effect is declared.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
         if let Some(declared) = problem.effects.first() {
             return Err(declared.location.clone().error(InputErrorKind::EffectNotModelled));
         }
+        let parameters = resolve(problem, bases, targets)?;
         Ok(Self {
+            constraints: constrain(problem, bases, targets, &parameters)?,
             nominal: Arm::nominal(problem),
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
-            parameters: resolve(problem, bases, targets)?,
+            parameters,
         })
+    }
+
+    /// Whether bounds or constraints limit the parameters.
+    pub fn is_bounded(&self) -> bool {
+        !self.constraints.is_empty() || self.parameters.iter().any(Parameter::is_bounded)
     }
 
     /// The arm with parameter k at deviation `x(k)`, as declared where no parameter is free.

@@ -3,9 +3,11 @@
 //! An unknown x is a deviation from nominal: additive for angles [rad] and lengths [m], ln(value / nominal) for
 //! stiffnesses and rigidities, so that x = 0 is nominal everywhere and a stiffness never turns negative.
 
+mod constraint;
 mod name;
 mod resolve;
 
+pub use constraint::{LinearConstraint, constrain};
 pub use name::{BeamField, JointField, Slot};
 pub use resolve::resolve;
 

@@ -6,12 +6,12 @@ use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
 
 /// A scalar of the model that a rule may free.
-struct Candidate {
-    name: String,
+pub(super) struct Candidate {
+    pub(super) name: String,
     /// The name without the session or target in brackets, which patterns may use as well.
     plain: String,
-    slot: Slot,
-    nominal: f64,
+    pub(super) slot: Slot,
+    pub(super) nominal: f64,
 }
 
 /// Free parameters of `problem` with one base per name in `bases` and one target per name in `targets`.
@@ -60,7 +60,7 @@ pub fn resolve(problem: &Problem, bases: &[String], targets: &[String]) -> Resul
 }
 
 /// Every scalar of the model, in a fixed order: joints, their beams, bases, targets.
-fn candidates(problem: &Problem, bases: &[String], targets: &[String]) -> Vec<Candidate> {
+pub(super) fn candidates(problem: &Problem, bases: &[String], targets: &[String]) -> Vec<Candidate> {
     let mut out = Vec::new();
     for (joint, declared) in problem.joints.iter().enumerate() {
         let nominal = [declared.alpha, declared.a, declared.theta, declared.d, declared.beta];

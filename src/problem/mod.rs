@@ -4,11 +4,13 @@
 //! and never changed afterwards.
 
 mod arm;
+mod constraints;
 pub(crate) mod effects;
 pub(crate) mod item;
 mod parameters;
 pub(crate) mod pattern;
 mod read;
+mod robust;
 pub(crate) mod section;
 
 use std::path::PathBuf;
@@ -38,8 +40,76 @@ pub struct Problem {
     pub effects: Vec<EffectDeclaration>,
     /// What is free, in the order of the file: a later rule wins.
     pub parameters: Vec<ParameterRule>,
+    /// Linear inequalities between parameters.
+    pub constraints: Vec<Constraint>,
     /// Where the measurements are and how they are used.
     pub data: Data,
+    /// How gross errors are kept from ruling the fit; `None`: they are not.
+    pub robust: Option<Robust>,
+}
+
+/// `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
+#[derive(Debug, Clone)]
+pub struct Constraint {
+    /// Parameters and their coefficients.
+    pub terms: Vec<ConstraintTerm>,
+    /// Lower limit.
+    pub at_least: Option<Limit>,
+    /// Upper limit.
+    pub at_most: Option<Limit>,
+    /// For errors.
+    pub location: Location,
+}
+
+/// One term of a constraint.
+#[derive(Debug, Clone)]
+pub struct ConstraintTerm {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its coefficient, not zero.
+    pub coefficient: f64,
+    /// For errors.
+    pub location: Location,
+}
+
+/// A limit of a constraint.
+#[derive(Debug, Clone)]
+pub struct Limit {
+    /// Value [rad], [m] or of the logarithm.
+    pub value: f64,
+    /// What it limits.
+    pub kind: LimitKind,
+    /// For errors.
+    pub location: Location,
+}
+
+/// What a constraint adds up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitKind {
+    /// Angles [rad].
+    Angle,
+    /// Lengths [m].
+    Length,
+    /// Logarithms of stiffnesses and rigidities in SI units.
+    Logarithm,
+}
+
+/// `[robust]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robust {
+    /// What residuals count.
+    pub loss: RobustLoss,
+    /// `threshold_sigma`: the length of a residual from which it counts less than its square [σ]; `None`: the usual one.
+    pub threshold: Option<f64>,
+}
+
+/// What the residual of a pose counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobustLoss {
+    /// Its square up to the threshold, its length beyond.
+    Huber,
+    /// Its length, rounded off below the threshold.
+    L1,
 }
 
 /// `[statics]`.

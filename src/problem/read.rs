@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 
 use super::item::Document;
 use super::section::Section;
-use super::{BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, effects, parameters};
+use super::{
+    BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, constraints, effects, parameters, robust,
+};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
 
@@ -44,9 +46,11 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let base = base(root.section("base")?)?;
     let effects = effects::read(&mut root, &joints)?;
     let parameters = parameters::read(&mut root)?;
+    let constraints = constraints::read(&mut root)?;
     let data = data(&mut root)?;
+    let robust = robust::read(&mut root)?;
     root.finish()?;
-    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, data })
+    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, constraints, data, robust })
 }
 
 fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::problem::Problem;
 use crate::solver::AtBound;
-use crate::study::{AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise};
+use crate::study::{ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise, Outlier};
 
 /// An error summary in millimetres.
 #[derive(Debug, Serialize)]
@@ -54,6 +54,8 @@ struct Document<'a> {
     parameters: Vec<ParameterEntry<'a>>,
     unidentified: Vec<Unidentified<'a>>,
     correlations: Vec<Correlation<'a>>,
+    active_constraints: Vec<ActiveEntry<'a>>,
+    outliers: Vec<OutlierEntry>,
 }
 
 #[derive(Debug, Serialize)]
@@ -88,6 +90,46 @@ struct Unidentified<'a> {
 struct Correlation<'a> {
     parameters: [&'a str; 2],
     correlation: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ActiveEntry<'a> {
+    constraint: &'a str,
+    side: &'a str,
+    line: Option<usize>,
+}
+
+impl<'a> From<&'a ActiveConstraint> for ActiveEntry<'a> {
+    fn from(active: &'a ActiveConstraint) -> Self {
+        let side = match active.side {
+            AtBound::Lower => "at_least",
+            AtBound::Upper => "at_most",
+        };
+        Self { constraint: &active.words, side, line: active.location.line }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct OutlierEntry {
+    file: String,
+    line: Option<usize>,
+    /// Counted from 1 over all files.
+    pose_row: usize,
+    error_mm: f64,
+    sigmas: f64,
+}
+
+impl From<&Outlier> for OutlierEntry {
+    fn from(outlier: &Outlier) -> Self {
+        let Outlier { row, location, distance, error } = outlier;
+        Self {
+            file: location.file.display().to_string(),
+            line: location.line,
+            pose_row: row + 1,
+            error_mm: error.norm() * 1e3,
+            sigmas: *distance,
+        }
+    }
 }
 
 impl From<&AxisValues> for Axes {
@@ -165,6 +207,8 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
             .iter()
             .map(|(a, b, correlation)| Correlation { parameters: [a, b], correlation: *correlation })
             .collect(),
+        active_constraints: result.active_constraints.iter().map(ActiveEntry::from).collect(),
+        outliers: result.outliers.iter().map(OutlierEntry::from).collect(),
     };
     to_text(&document)
 }

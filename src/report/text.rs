@@ -1,9 +1,14 @@
 //! What `identify` prints.
 
 use super::parameters::{blind_text, correlation_text, parameter_table};
+use std::fmt::Write as _;
+
 use super::quantity::{number, table};
 use crate::problem::Problem;
 use crate::study::{ErrorSummary, Identification, Noise};
+
+/// Outliers that fit on a screen.
+const SHOWN_OUTLIERS: usize = 20;
 
 /// A result as a table with its story, ending in a line break.
 pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
@@ -11,11 +16,16 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
         headline(problem, result),
         errors(result),
         noise(problem, result),
+        outliers(problem, result),
         parameter_table(result),
+        active_constraints(result),
         conditioning(result),
         blind_text(result),
         correlation_text(result),
     ]
+    .into_iter()
+    .filter(|part| !part.is_empty())
+    .collect::<Vec<_>>()
     .join("\n")
 }
 
@@ -86,6 +96,43 @@ fn noise(problem: &Problem, result: &Identification) -> String {
             format!("Reduced χ² is {chi2:.2}: the model explains the data to the declared σ.\n")
         }
     }
+}
+
+/// The constraints that hold parameters back; nothing to say without any.
+fn active_constraints(result: &Identification) -> String {
+    let active = &result.active_constraints;
+    if active.is_empty() {
+        return String::new();
+    }
+    let mut text = "Held by a constraint (standard errors are those along it):\n".to_owned();
+    for constraint in active {
+        let line = constraint.location.line.map_or_else(String::new, |line| format!("line {line}: "));
+        let _ = writeln!(text, "  {line}{}", constraint.words);
+    }
+    text
+}
+
+/// Poses whose residual is too long to be noise; nothing to say without any.
+fn outliers(problem: &Problem, result: &Identification) -> String {
+    let outliers = &result.outliers;
+    if outliers.is_empty() {
+        return String::new();
+    }
+    let treatment = if problem.robust.is_some() {
+        "the robust loss keeps them from ruling the fit"
+    } else {
+        "they count in full; a section [robust] would limit them"
+    };
+    let (n, poses) = (outliers.len(), result.fitted.identification.n);
+    let mut text = format!("{n} of {poses} poses are too far off to be noise ({treatment}):\n");
+    for outlier in outliers.iter().take(SHOWN_OUTLIERS) {
+        let error = outlier.error.norm() * 1e3;
+        let _ = writeln!(text, "  {}: {error:.3} mm, {:.1} σ of the scatter", outlier.location, outlier.distance);
+    }
+    if n > SHOWN_OUTLIERS {
+        let _ = writeln!(text, "  and {} more in estimate.json", n - SHOWN_OUTLIERS);
+    }
+    text
 }
 
 fn conditioning(result: &Identification) -> String {

@@ -1,141 +1,81 @@
-//! Bounded Levenberg–Marquardt: every step is a box-constrained linear least-squares problem.
+//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a polyhedron.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
-use super::box_step::{BoxProblem, BoxSolution};
+use super::box_step::BoxProblem;
 use super::factor::RADIUS_SLACK;
 use super::levenberg_marquardt::Model;
-use super::{Settings, Step, Subproblem, TrustRegion};
+use super::polyhedron_step::{Polyhedron, PolyhedronProblem};
+use super::{AtBound, Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
 use crate::fit::Linearisation;
 
 /// Damped problems tried for one step when the radius limits a step along bounds.
 const DAMPINGS: usize = 25;
 
-/// A bound that holds an unknown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum AtBound {
-    /// x equals its lower bound.
-    Lower,
-    /// x equals its upper bound.
-    Upper,
-}
-
-/// Bounds lo ≤ x ≤ hi; infinite where there is none.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bounds {
-    lower: DVector<f64>,
-    upper: DVector<f64>,
-}
-
-/// Bounds that no x can satisfy.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BoundsError {
-    /// The two vectors differ in length.
-    #[error("setting bounds: {lower} lower bounds, but {upper} upper bounds")]
-    Sizes {
-        /// Number of lower bounds.
-        lower: usize,
-        /// Number of upper bounds.
-        upper: usize,
-    },
-    /// Not lo ≤ hi (or not a number, or an infinity on the wrong side).
-    #[error("setting bounds: unknown {index} has no value between {lower} and {upper}")]
-    Empty {
-        /// Which unknown.
-        index: usize,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
-}
-
-impl Bounds {
-    /// Bounds lo ≤ x ≤ hi; lo = hi holds an unknown fixed.
-    ///
-    /// # Errors
-    /// When the lengths differ or some unknown is left without a value.
-    pub fn new(lower: DVector<f64>, upper: DVector<f64>) -> Result<Self, BoundsError> {
-        if lower.len() != upper.len() {
-            return Err(BoundsError::Sizes { lower: lower.len(), upper: upper.len() });
-        }
-        for (index, (&lower, &upper)) in lower.iter().zip(&upper).enumerate() {
-            if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
-                return Err(BoundsError::Empty { index, lower, upper });
-            }
-        }
-        Ok(Self { lower, upper })
-    }
-
-    /// No bounds on any of `n` unknowns.
-    pub fn none(n: usize) -> Self {
-        Self { lower: DVector::from_element(n, f64::NEG_INFINITY), upper: DVector::from_element(n, f64::INFINITY) }
-    }
-
-    /// lo.
-    pub fn lower(&self) -> &DVector<f64> {
-        &self.lower
-    }
-
-    /// hi.
-    pub fn upper(&self) -> &DVector<f64> {
-        &self.upper
-    }
-
-    /// The bound that `x[j]` equals, if any.
-    pub fn at(&self, x: &DVector<f64>, j: usize) -> Option<AtBound> {
-        if x[j] <= self.lower[j] {
-            Some(AtBound::Lower)
-        } else if x[j] >= self.upper[j] {
-            Some(AtBound::Upper)
-        } else {
-            None
-        }
-    }
-
-    /// The nearest point within the bounds.
-    pub fn clamp(&self, x: &mut DVector<f64>) {
-        for (j, x) in x.iter_mut().enumerate() {
-            *x = x.clamp(self.lower[j], self.upper[j]);
-        }
-    }
-
-    fn contain(&self, x: &DVector<f64>) -> bool {
-        (0..x.len()).all(|j| self.lower[j] <= x[j] && x[j] <= self.upper[j])
-    }
-}
-
 /// Levenberg–Marquardt within bounds lo ≤ x ≤ hi.
 ///
-/// min ½‖J p + r‖² + ½λ‖D p‖² subject to lo − x ≤ p ≤ hi − x
-///
-/// The unconstrained step is tried first; only if it leaves the box is the boxed problem solved, without damping if
-/// that respects the radius. The problem is never evaluated outside the bounds; a start outside is moved to the nearest
-/// point within. Converged when the gradient vanishes along all directions that the bounds leave open.
-pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<BoxConstrained> {
-    TrustRegion::new(BoxConstrained { bounds, model: None, guess: Vec::new() }, settings)
+/// As [`constrained_levenberg_marquardt`] without inequalities.
+pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
+    let rows = Inequalities::none(bounds.lower().len());
+    constrained_levenberg_marquardt(bounds, rows, settings)
 }
 
-/// The step within a sphere ‖D p‖ ≤ Δ and a box.
-#[derive(Debug, Clone)]
-pub struct BoxConstrained {
+/// Levenberg–Marquardt within bounds lo ≤ x ≤ hi and inequalities lo ≤ A x ≤ hi.
+///
+/// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
+///
+/// The unconstrained step is tried first, then the one in the box, and only then the one in the whole polyhedron, each
+/// without damping if that respects the radius. The problem is never evaluated outside (inequalities: beyond rounding);
+/// a start outside is moved to the [`nearest`] point within. Converged when the gradient vanishes along all directions that
+/// bounds and inequalities leave open.
+pub fn constrained_levenberg_marquardt(
     bounds: Bounds,
+    rows: Inequalities,
+    settings: Settings,
+) -> TrustRegion<Constrained> {
+    TrustRegion::new(Constrained { bounds, rows, model: None, guess: Vec::new() }, settings)
+}
+
+/// The point nearest to `x` that keeps bounds and inequalities, if there is one.
+pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option<DVector<f64>> {
+    let n = x.len();
+    if bounds.lower().len() != n || rows.matrix().ncols() != n {
+        return None;
+    }
+    let mut point = x.clone();
+    bounds.clamp(&mut point);
+    if rows.contain(&point) {
+        return Some(point);
+    }
+    let factor = Factor::new(DMatrix::identity(n, n), DVector::zeros(n), f64::EPSILON);
+    let polyhedron = Polyhedron::around(x, bounds, rows, &DVector::from_element(n, 1.0));
+    let mut problem = PolyhedronProblem::new(&factor, &polyhedron);
+    let solution = problem.solve(0.0);
+    let mut point = x + &solution.q;
+    bounds.hold(&mut point, &problem.bounds_of(&solution));
+    let kept = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
+    (0..rows.len()).all(kept).then_some(point)
+}
+
+/// The step within a sphere ‖D p‖ ≤ Δ, a box and inequalities.
+#[derive(Debug, Clone)]
+pub struct Constrained {
+    bounds: Bounds,
+    rows: Inequalities,
     model: Option<Model>,
     /// Bounds that held in the last boxed problem.
     guess: Vec<Option<AtBound>>,
 }
 
-impl Subproblem for BoxConstrained {
+impl Subproblem for Constrained {
     fn name(&self) -> &'static str {
         "bounded Levenberg–Marquardt"
     }
 
     fn admit(&self, start: &mut DVector<f64>) -> bool {
-        let fits = self.bounds.lower.len() == start.len();
-        if fits {
-            self.bounds.clamp(start);
-        }
-        fits
+        let Some(admitted) = nearest(start, &self.bounds, &self.rows) else { return false };
+        *start = admitted;
+        true
     }
 
     fn prepare(&mut self, x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
@@ -144,63 +84,76 @@ impl Subproblem for BoxConstrained {
     }
 
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64 {
-        let down = gradient > 0.0 && x[j] <= self.bounds.lower[j];
-        let up = gradient < 0.0 && x[j] >= self.bounds.upper[j];
+        let down = gradient > 0.0 && x[j] <= self.bounds.lower()[j];
+        let up = gradient < 0.0 && x[j] >= self.bounds.upper()[j];
         if down || up { 0.0 } else { gradient }
+    }
+
+    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
+        if (0..self.rows.len()).any(|i| self.rows.at(x, i).is_some()) {
+            *gradient = Polyhedron::around(x, &self.bounds, &self.rows, scale).free_part(gradient);
+        } else {
+            (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
+        }
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let Some(model) = &mut self.model else { return Step::none(x) };
-        let free = model.unbounded_step(x, radius);
-        if self.bounds.contain(&free.point) {
-            return free;
+        let mut step = model.unbounded_step(x, radius);
+        if !self.bounds.contain(&step.point) {
+            let scale = &model.scale;
+            let lower = (self.bounds.lower() - x).component_mul(scale);
+            let upper = (self.bounds.upper() - x).component_mul(scale);
+            let mut problem = BoxProblem::new(&model.factor, lower, upper, self.guess.clone());
+            let size = problem.gradient_norm();
+            let (solution, damping) = limited(|lambda| problem.solve(lambda), |found| found.q.norm(), size, radius);
+            step = finish(x, &self.bounds, model, &solution.q, &solution.active, damping);
+            self.guess = solution.active;
         }
-        let scale = model.scale.clone();
-        let lower = (&self.bounds.lower - x).component_mul(&scale);
-        let upper = (&self.bounds.upper - x).component_mul(&scale);
-        let mut problem = BoxProblem::new(&model.factor, lower, upper, self.guess.clone());
-        let (solution, damping) = limited(&mut problem, radius);
-        self.guess.clone_from(&solution.active);
-        self.finish(x, &solution, damping)
+        if self.rows.contain(&step.point) {
+            return step;
+        }
+        let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
+        let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron);
+        let size = problem.gradient_norm();
+        let (solution, damping) = limited(|lambda| problem.solve(lambda), |found| found.q.norm(), size, radius);
+        finish(x, &self.bounds, model, &solution.q, &problem.bounds_of(&solution), damping)
     }
 }
 
-impl BoxConstrained {
-    /// x + D⁻¹ q, exactly on the bounds that hold.
-    fn finish(&self, x: &DVector<f64>, solution: &BoxSolution, damping: f64) -> Step {
-        let Some(model) = &self.model else { return Step::none(x) };
-        let mut point = x + solution.q.component_div(&model.scale);
-        for (j, active) in solution.active.iter().enumerate() {
-            match active {
-                Some(AtBound::Lower) => point[j] = self.bounds.lower[j],
-                Some(AtBound::Upper) => point[j] = self.bounds.upper[j],
-                None => {}
-            }
-        }
-        self.bounds.clamp(&mut point);
-        let slope = -model.factor.gradient().dot(&solution.q);
-        let predicted = slope - 0.5 * model.factor.image(&solution.q).norm_squared();
-        Step { point, length: solution.q.norm(), slope, predicted, damping }
-    }
+/// x + D⁻¹ q, exactly on the bounds that hold.
+fn finish(
+    x: &DVector<f64>,
+    bounds: &Bounds,
+    model: &Model,
+    q: &DVector<f64>,
+    active: &[Option<AtBound>],
+    damping: f64,
+) -> Step {
+    let mut point = x + q.component_div(&model.scale);
+    bounds.hold(&mut point, active);
+    let slope = -model.factor.gradient().dot(q);
+    let predicted = slope - 0.5 * model.factor.image(q).norm_squared();
+    Step { point, length: q.norm(), slope, predicted, damping }
 }
 
-/// The boxed step with ‖q‖ ≤ Δ to within 10 %, and its damping λ.
+/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ, `size` is ‖Bᵀc‖.
 ///
 /// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ; within the bracket
 /// Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
-fn limited(problem: &mut BoxProblem<'_>, radius: f64) -> (BoxSolution, f64) {
-    let mut solution = problem.solve(0.0);
-    let mut length = solution.q.norm();
+fn limited<Q>(mut solve: impl FnMut(f64) -> Q, norm: impl Fn(&Q) -> f64, size: f64, radius: f64) -> (Q, f64) {
+    let mut solution = solve(0.0);
+    let mut length = norm(&solution);
     if length <= (1.0 + RADIUS_SLACK) * radius {
         return (solution, 0.0);
     }
-    let (mut low, mut high) = (0.0, problem.gradient_norm() / radius);
+    let (mut low, mut high) = (0.0, size / radius);
     let mut last = (0.0, length);
     let mut lambda = 1e-3 * high;
     let mut best = None;
     for _ in 0..DAMPINGS {
-        solution = problem.solve(lambda);
-        length = solution.q.norm();
+        solution = solve(lambda);
+        length = norm(&solution);
         let short = length <= (1.0 + RADIUS_SLACK) * radius;
         if short {
             high = lambda;
@@ -217,8 +170,5 @@ fn limited(problem: &mut BoxProblem<'_>, radius: f64) -> (BoxSolution, f64) {
         let inside = model > low && model < high;
         lambda = if inside { model } else { (low.max(1e-3 * high) * high).sqrt() };
     }
-    best.unwrap_or_else(|| {
-        let solution = problem.solve(high);
-        (solution, high)
-    })
+    best.unwrap_or_else(|| (solve(high), high))
 }

@@ -1,13 +1,10 @@
 //! Linear least squares in a box: active-set guess, interior-point solver, polish.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SupportedConeT, ZeroConeT};
 use nalgebra::{DMatrix, DVector};
 
+use super::interior::{HalfSpace, interior_point};
 use super::{AtBound, Factor};
 
-/// Interior-point tolerance on gap and feasibility.
-const TOLERANCE: f64 = 1e-11;
 /// Distance to a bound, relative to the box problem's size, below which the interior point is at the bound.
 const NEAR: f64 = 1e-6;
 /// Corrections of the active set allowed to a polish.
@@ -150,61 +147,13 @@ impl<'a> BoxProblem<'a> {
         BoxSolution { q, active }
     }
 
-    /// The minimiser by Clarabel's interior-point method, in unknowns whose columns have length one.
-    ///
-    /// Unknowns are z = S q and y = B q + c, so that `BᵀB` is never formed; bounds at infinity are left out.
+    /// The minimiser by the interior-point method; bounds at infinity are left out.
     fn interior_point(&self, lambda: f64) -> Option<DVector<f64>> {
-        let matrix = self.factor.matrix();
-        let (rows, n) = matrix.shape();
-        let sizes: Vec<f64> = matrix
-            .column_iter()
-            .map(|c| (c.norm_squared() + lambda).sqrt())
-            .map(|s| if s > 0.0 { s } else { 1.0 })
-            .collect();
-        let scale = self.factor.constant().norm().max(f64::MIN_POSITIVE);
-        let finite = |bound: &DVector<f64>| -> Vec<usize> { (0..n).filter(|&j| bound[j].is_finite()).collect() };
-        let (lower, upper) = (finite(&self.lower), finite(&self.upper));
-
-        // Rows: y − B S⁻¹ z = c, then −z ≤ −lower, then z ≤ upper.
-        let (mut is, mut js, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let mut put = |i: usize, j: usize, value: f64| {
-            is.push(i);
-            js.push(j);
-            values.push(value);
+        let side = |bound: &DVector<f64>, sign: f64| -> Vec<HalfSpace> {
+            let finite = bound.iter().enumerate().filter(|(_, bound)| bound.is_finite());
+            finite.map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], least: sign * bound }).collect()
         };
-        let mut right = Vec::with_capacity(rows + lower.len() + upper.len());
-        for i in 0..rows {
-            put(i, n + i, 1.0);
-            (0..n).for_each(|j| put(i, j, -matrix[(i, j)] / sizes[j]));
-            right.push(self.factor.constant()[i] / scale);
-        }
-        for &j in &lower {
-            put(right.len(), j, -1.0);
-            right.push(-self.lower[j] * sizes[j] / scale);
-        }
-        for &j in &upper {
-            put(right.len(), j, 1.0);
-            right.push(self.upper[j] * sizes[j] / scale);
-        }
-        let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
-        let diagonal: Vec<f64> = sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
-        let indices: Vec<usize> = (0..n + rows).collect();
-        let quadratic = CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
-        let cones: [SupportedConeT<f64>; 2] = [ZeroConeT(rows), NonnegativeConeT(lower.len() + upper.len())];
-        let settings = DefaultSettings {
-            verbose: false,
-            presolve_enable: false,
-            tol_gap_abs: TOLERANCE,
-            tol_gap_rel: TOLERANCE,
-            tol_feas: TOLERANCE,
-            ..DefaultSettings::default()
-        };
-        let linear = vec![0.0; n + rows];
-        let mut solver = DefaultSolver::new(&quadratic, &linear, &constraints, &right, &cones, settings).ok()?;
-        solver.solve();
-        let z = solver.solution.x.get(..n)?;
-        let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
-        q.iter().all(|v| v.is_finite()).then_some(q)
+        interior_point(self.factor, lambda, &[side(&self.lower, 1.0), side(&self.upper, -1.0)].concat())
     }
 }
 

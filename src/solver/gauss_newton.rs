@@ -53,6 +53,7 @@ pub fn minimise_gauss_newton<O: Objective>(
         iterations: 0,
         cost_evaluations: 0,
         linearisations: 0,
+        at_limit: Vec::new(),
     };
     if adapter.objective.parameters() != solution.x.len() {
         return solution;

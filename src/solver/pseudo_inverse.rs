@@ -179,6 +179,7 @@ fn run<O: Objective>(
         iterations: 0,
         cost_evaluations: 0,
         linearisations: 0,
+        at_limit: Vec::new(),
     };
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };

@@ -4,8 +4,8 @@ use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
-use super::{AtBound, Bounds, Settings, State, Subproblem, Termination, TrustRegion};
-use super::{bounded_levenberg_marquardt, levenberg_marquardt};
+use super::{AtBound, Bounds, Inequalities, Settings, State, Subproblem, Termination, TrustRegion};
+use super::{constrained_levenberg_marquardt, levenberg_marquardt, nearest};
 use crate::fit::Objective;
 
 /// Where a solver stopped, and what it took.
@@ -25,6 +25,8 @@ pub struct Solution {
     pub linearisations: u64,
     /// The bound each unknown rests on, one entry per unknown.
     pub at_bound: Vec<Option<AtBound>>,
+    /// The limit each inequality rests on, one entry per inequality.
+    pub at_limit: Vec<Option<AtBound>>,
 }
 
 impl Solution {
@@ -93,7 +95,7 @@ pub fn minimise_bounded<O: Objective>(
     bounds: &Bounds,
     settings: &Settings,
 ) -> Solution {
-    with_bounds(objective, start, bounds, settings, None::<Silent>)
+    constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings, None::<Silent>)
 }
 
 /// As [`minimise_bounded`], telling `observer` of every iteration.
@@ -104,24 +106,53 @@ pub fn minimise_bounded_observed<O: Objective>(
     settings: &Settings,
     observer: impl Observe<State> + 'static,
 ) -> Solution {
-    with_bounds(objective, start, bounds, settings, Some(observer))
+    constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings, Some(observer))
+}
+
+/// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` from `start`.
+pub fn minimise_constrained<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    bounds: &Bounds,
+    rows: &Inequalities,
+    settings: &Settings,
+) -> Solution {
+    constrained(objective, start, bounds, rows, settings, None::<Silent>)
+}
+
+/// As [`minimise_constrained`], telling `observer` of every iteration.
+pub fn minimise_constrained_observed<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    bounds: &Bounds,
+    rows: &Inequalities,
+    settings: &Settings,
+    observer: impl Observe<State> + 'static,
+) -> Solution {
+    constrained(objective, start, bounds, rows, settings, Some(observer))
 }
 
 struct Silent;
 
 impl Observe<State> for Silent {}
 
-fn with_bounds<O: Objective>(
+fn constrained<O: Objective>(
     objective: O,
     start: DVector<f64>,
     bounds: &Bounds,
+    rows: &Inequalities,
     settings: &Settings,
     observer: Option<impl Observe<State> + 'static>,
 ) -> Solution {
-    let solver = bounded_levenberg_marquardt(bounds.clone(), *settings);
+    let fits = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
+    let infeasible = fits && nearest(&start, bounds, rows).is_none();
+    let solver = constrained_levenberg_marquardt(bounds.clone(), rows.clone(), *settings);
     let mut solution = run(objective, start, solver, settings, observer);
-    if solution.x.len() == bounds.lower().len() {
+    if infeasible {
+        solution.termination = Termination::Infeasible;
+    } else if fits {
         solution.at_bound = (0..solution.x.len()).map(|j| bounds.at(&solution.x, j)).collect();
+        solution.at_limit = (0..rows.len()).map(|i| rows.at(&solution.x, i)).collect();
     }
     solution
 }
@@ -149,6 +180,7 @@ fn run<O: Objective, S: Subproblem>(
         cost_evaluations: 0,
         linearisations: 0,
         at_bound: vec![None; unknowns],
+        at_limit: Vec::new(),
     };
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };

@@ -34,6 +34,8 @@ pub enum Termination {
     DerivativesNotFinite,
     /// Every step left the domain, down to the smallest: ½‖r(x + p)‖² = ∞ and ‖D p‖ ≤ `step_tolerance` ‖D x‖.
     DomainEdge,
+    /// No point satisfies all bounds and inequalities.
+    Infeasible,
     /// The start, the bounds and the problem differ in their number of unknowns.
     SizeMismatch,
     /// An undamped iteration went astray: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience` iterations in a row, or ∞.
@@ -60,6 +62,7 @@ impl Termination {
             | Self::OutsideDomainAtStart
             | Self::DerivativesNotFinite
             | Self::DomainEdge
+            | Self::Infeasible
             | Self::SizeMismatch
             | Self::Diverged
             | Self::Singular
@@ -82,6 +85,7 @@ impl Termination {
             Self::OutsideDomainAtStart => "outside-domain-at-start",
             Self::DerivativesNotFinite => "derivatives-not-finite",
             Self::DomainEdge => "domain-edge",
+            Self::Infeasible => "infeasible",
             Self::SizeMismatch => "size-mismatch",
             Self::Diverged => "diverged",
             Self::Singular => "singular",
@@ -105,6 +109,7 @@ impl fmt::Display for Termination {
             Self::OutsideDomainAtStart => "failed: the start lies outside the model's domain",
             Self::DerivativesNotFinite => "failed: a derivative is not finite",
             Self::DomainEdge => "failed: every step leaves the model's domain",
+            Self::Infeasible => "failed: no point satisfies all bounds and constraints",
             Self::SizeMismatch => "failed: start, bounds and problem differ in size",
             Self::Diverged => "failed: the cost keeps growing",
             Self::Singular => "failed: the derivatives are singular",

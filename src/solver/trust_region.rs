@@ -51,6 +51,12 @@ pub trait Subproblem {
     /// Component j of the gradient g, or zero where a constraint holds x back.
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64;
 
+    /// Takes out of a gradient whose columns are divided by `scale` what constraints at x hold back.
+    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
+        let _ = scale;
+        (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
+    }
+
     /// The best step with ‖D p‖ ≤ `radius` to within 10 %.
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step;
 }
@@ -106,15 +112,15 @@ impl<S: Subproblem> TrustRegion<S> {
         if !norms.iter().all(|norm| norm.is_finite()) {
             return Some(Termination::DerivativesNotFinite);
         }
+        let lengths = norms.map(|norm| if norm == 0.0 { 1.0 } else { norm });
         self.scale = match self.radius {
-            None => norms.map(|norm| if norm == 0.0 { 1.0 } else { norm }),
+            None => lengths.clone(),
             Some(_) => self.scale.sup(&norms),
         };
         let residual = (2.0 * cost).sqrt();
-        let cosine = (0..x.len()).filter(|&j| norms[j] > 0.0).fold(0.0_f64, |largest, j| {
-            let gradient = triangle.column(j).dot(projected);
-            largest.max(self.subproblem.free_gradient(x, j, gradient).abs() / norms[j] / residual)
-        });
+        let mut gradient = DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
+        self.subproblem.hold_back(x, &lengths, &mut gradient);
+        let cosine = gradient.amax() / residual;
         if cosine <= self.settings.gradient_tolerance {
             return Some(Termination::Gradient);
         }

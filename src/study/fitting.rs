@@ -6,6 +6,7 @@ use super::placement::Late;
 use super::registration::register;
 use super::stage::{Gauge, Stage, StageEnd, StageError};
 use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::fit::Loss;
 use crate::measurement::{Measurements, Split};
 use crate::model::{Model, PoseResiduals};
 use crate::parameter::Parameter;
@@ -28,6 +29,8 @@ pub(super) struct Fitting<'a> {
     pub late: Late,
     pub strategy: Strategy,
     pub solver: SolverChoice,
+    /// How the residual of a pose counts in the strategy's fits.
+    pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
     /// 1 σ of a coordinate in rows without one of their own [m].
     pub sigma: f64,
@@ -68,6 +71,7 @@ impl<'a> Fitting<'a> {
             unknowns,
             solver: self.solver,
             max_steps: Settings::default().max_iterations,
+            loss: Loss::Squares,
             progress: self.progress,
         }
     }
@@ -75,14 +79,19 @@ impl<'a> Fitting<'a> {
     /// A stage that fits bases and targets, by the solver that `auto` takes whichever was asked for.
     fn placing(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut stage = self.stage(rows, unknowns);
-        stage.solver = SolverChoice::Auto.decide(&self.model.parameters);
+        stage.solver = SolverChoice::Auto.decide(self.model);
         stage
+    }
+
+    /// A stage of the strategy: on the identification rows, with the problem's loss.
+    fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
+        Stage { loss: self.loss, ..self.stage(&self.split.identification, unknowns) }
     }
 
     /// Everything that the strategy varies, as one stage on the identification rows.
     pub fn whole(&self) -> Stage<'a> {
         let varied = |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
-        self.stage(&self.split.identification, self.choose(varied))
+        self.strategy_stage(self.choose(varied))
     }
 
     /// Bases and targets of held-out sessions, as one stage on their rows.
@@ -125,7 +134,7 @@ impl<'a> Fitting<'a> {
         let whole = self.whole();
         let [first, rest @ ..] = self.strategy.stages() else { return Ok(whole.run(start)?.into()) };
         if rest.is_empty() {
-            return Ok(self.stage(&self.split.identification, self.choose(first)).run(start)?.into());
+            return Ok(self.strategy_stage(self.choose(first)).run(start)?.into());
         }
         let mut end = FitEnd {
             x: start.clone(),
@@ -139,7 +148,7 @@ impl<'a> Fitting<'a> {
         let once = self.strategy == Strategy::OneSweep;
         for _ in 0..MAX_SWEEPS {
             for chosen in self.strategy.stages() {
-                let mut stage = self.stage(&self.split.identification, self.choose(chosen));
+                let mut stage = self.strategy_stage(self.choose(chosen));
                 if !once {
                     stage.max_steps = SWEEP_STEPS;
                 }
@@ -175,7 +184,8 @@ impl<'a> Fitting<'a> {
         Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
     }
 
-    fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
+    /// Residuals measured − predicted of some rows, measuring frame [m].
+    pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
         let poses = self.placement.poses(self.measurements, rows, self.sigma);
         PoseResiduals::new(self.model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }

@@ -5,15 +5,16 @@ use std::time::Instant;
 use nalgebra::DVector;
 
 use super::fitting::{FitEnd, Fitting};
-use super::stage::{Stage, StageError};
+use super::outliers::Outlier;
+use super::stage::{Held, Stage, StageError};
 use super::statistics::Statistics;
 use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
-use crate::error::{InputError, InputErrorKind};
-use crate::fit::Identifiability;
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::fit::{Identifiability, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::parameter::{Parameter, Unit};
-use crate::problem::Problem;
+use crate::problem::{Problem, Robust, RobustLoss};
 use crate::solver::{AtBound, Termination};
 
 /// An undeclared σ has settled when it changes by less than this part.
@@ -43,9 +44,10 @@ pub enum IdentifyError {
     /// A fit could not be set up.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// Bounds were declared for a solver that cannot keep them.
+    /// Bounds or constraints were declared for a solver that cannot keep them.
     #[error(
-        "{solver} does not keep the bounds of [parameters]: take the solver bounded or auto, or leave out min and max"
+        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded or auto, or leave out \
+         min, max and [[constraint]]"
     )]
     BoundsIgnored {
         /// The solver that was asked for.
@@ -98,6 +100,30 @@ pub struct Estimate {
     pub fitted: bool,
 }
 
+/// A constraint that holds parameters back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActiveConstraint {
+    /// The limit in words: `ln A.EI − ln B.EI ≥ 0`.
+    pub words: String,
+    /// Which limit.
+    pub side: AtBound,
+    /// Where it stands in the problem file.
+    pub location: Location,
+}
+
+impl ActiveConstraint {
+    fn all(statistics: &Statistics, model: &Model) -> Vec<Self> {
+        let of = |held: &Held| {
+            let constraint = &model.constraints[held.constraint];
+            let [lower, upper] = &constraint.limits;
+            let limit = if held.side == AtBound::Lower { lower } else { upper };
+            let words = format!("{} {}", constraint.sum, limit.as_deref().unwrap_or_default());
+            Self { words, side: held.side, location: constraint.location.clone() }
+        };
+        statistics.constraints.iter().map(of).collect()
+    }
+}
+
 /// An identified arm.
 #[derive(Debug, Clone)]
 pub struct Identification {
@@ -120,6 +146,7 @@ pub struct Identification {
     /// Of the identified arm.
     pub fitted: Errors,
     /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
+    /// Where the loss is robust, outliers are left out of it.
     pub reduced_chi2: Option<f64>,
     /// By how much the declared variance was raised for the standard errors, ≥ 1.
     pub noise_factor: f64,
@@ -135,6 +162,10 @@ pub struct Identification {
     pub estimates: Vec<Estimate>,
     /// Pairs of parameters correlated by more than 0.9, strongest first.
     pub correlations: Vec<(String, String, f64)>,
+    /// Constraints that hold the fitted parameters back, in the order of the file.
+    pub active_constraints: Vec<ActiveConstraint>,
+    /// Identification rows whose residual is too long to be noise, in the order of the rows.
+    pub outliers: Vec<Outlier>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,
 }
@@ -176,8 +207,8 @@ pub(super) fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let clock = Instant::now();
     let placement = Placement::of(measurements);
-    let (strategy, solver) = (options.strategy, options.solver.decide(&model.parameters));
-    if solver != SolverChoice::Bounded && model.parameters.iter().any(Parameter::is_bounded) {
+    let (strategy, solver) = (options.strategy, options.solver.decide(model));
+    if solver != SolverChoice::Bounded && model.is_bounded() {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
     let declared = problem.data.position_sigma;
@@ -190,6 +221,7 @@ pub(super) fn identify_model(
         late: placement.late(model, split),
         strategy,
         solver,
+        loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
         sigma: declared.unwrap_or(1e-3),
     };
@@ -209,7 +241,7 @@ pub(super) fn identify_model(
     let mut fits = 0;
     let (mut end, statistics) = loop {
         let end = fitting.run(&start)?;
-        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared);
+        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared)?;
         fits += 1;
         let factor = statistics.reduced_chi2.filter(|&chi2| chi2 > 0.0).map_or(1.0, f64::sqrt);
         if noise_is_declared || (factor - 1.0).abs() < NOISE_SETTLED || fits == MAX_NOISE_FITS {
@@ -217,11 +249,13 @@ pub(super) fn identify_model(
         }
         fitting.sigma *= factor;
     };
+    let errors = fitting.position_errors(&split.identification, &end.x);
+    let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     report(&mut estimates, &fitting.whole(), &end, &statistics);
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
-        report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared));
+        report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
         end.x = late.x;
     }
     let name = |j: usize| unknowns[j].name.clone();
@@ -242,9 +276,21 @@ pub(super) fn identify_model(
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        active_constraints: ActiveConstraint::all(&statistics, &model),
+        outliers,
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// The loss that `[robust]` stands for, on the three coordinates of a position.
+fn loss(robust: Robust) -> Loss {
+    match robust.loss {
+        RobustLoss::Huber => Loss::Huber { threshold: robust.threshold.unwrap_or(Loss::HUBER_POSITION) },
+        RobustLoss::L1 => {
+            Loss::L1 { slope: Loss::L1_POSITION, smoothing: robust.threshold.unwrap_or(Loss::L1_SMOOTHING) }
+        }
+    }
 }
 
 impl Estimate {
@@ -266,7 +312,7 @@ impl Estimate {
 fn report(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
-        let learned = end.at_bound[j].is_none() && statistics.identified[j] > NOTHING_LEARNED;
+        let learned = !statistics.held[j] && statistics.identified[j] > NOTHING_LEARNED;
         let estimate = &mut estimates[k];
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));

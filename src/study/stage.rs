@@ -7,10 +7,13 @@ use argmin::core::{Error, KV, State as _};
 use nalgebra::{DMatrix, DVector};
 
 use super::SolverChoice;
-use crate::fit::{Fit, Identifiability, LinearRows, Objective as _, RowsError};
+use crate::fit::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
-use crate::solver::{self, Bounds, BoundsError, GaussNewtonSettings, PseudoInverseSettings, Settings, Solution, State};
+use crate::solver::{
+    self, AtBound, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings,
+    Settings, Solution, State,
+};
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
 /// metres measured in units of their noise, and far below what any estimate's error would show.
@@ -38,6 +41,12 @@ pub enum StageError {
     /// Bounds leave a parameter no value.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
+    /// Constraints make no sense.
+    #[error(transparent)]
+    Inequalities(#[from] InequalitiesError),
+    /// Bounds and constraints contradict each other.
+    #[error("no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]")]
+    Infeasible,
     /// Priors do not fit the unknowns.
     #[error(transparent)]
     Rows(#[from] RowsError),
@@ -52,6 +61,8 @@ pub(super) struct Stage<'a> {
     pub solver: SolverChoice,
     /// Steps after which the solver is stopped.
     pub max_steps: u64,
+    /// How the residual of a pose counts.
+    pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
 }
 
@@ -61,6 +72,17 @@ pub(super) struct StageEnd {
     pub x: DVector<f64>,
     pub solution: Solution,
     pub gauge: Gauge,
+}
+
+/// A constraint that holds the unknowns of a stage back.
+#[derive(Debug, Clone)]
+pub(super) struct Held {
+    /// Which of the model's constraints.
+    pub constraint: usize,
+    /// The limit that it is on.
+    pub side: AtBound,
+    /// Its coefficients, one per unknown.
+    pub row: Vec<f64>,
 }
 
 /// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.
@@ -107,6 +129,12 @@ impl<'a> Stage<'a> {
         Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
     }
 
+    /// The same, each pose weighted as the loss does.
+    pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = self.residuals(at);
+        Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
+    }
+
     /// Combinations that the data and the priors together leave open at `at`.
     pub fn gauge(&self, at: &DVector<f64>) -> Gauge {
         let n = self.unknowns.len();
@@ -121,18 +149,63 @@ impl<'a> Stage<'a> {
         Gauge { rows: found.gauge, visible: found.visible }
     }
 
+    /// The model's constraints on the unknowns, with the other parameters as in `at`; which they are, and their rows.
+    fn constraints(&self, at: &DVector<f64>) -> Result<(Vec<usize>, Inequalities), InequalitiesError> {
+        let n = self.unknowns.len();
+        let (mut which, mut rows, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (index, constraint) in self.model.constraints.iter().enumerate() {
+            let (mut row, mut rest) = (vec![0.0; n], 0.0);
+            for &(k, coefficient) in &constraint.terms {
+                match self.unknowns.iter().position(|&unknown| unknown == k) {
+                    Some(j) => row[j] += coefficient,
+                    None => rest += coefficient * at[k],
+                }
+            }
+            if row.iter().any(|coefficient| *coefficient != 0.0) {
+                which.push(index);
+                rows.extend(row);
+                lower.push(constraint.lower - rest);
+                upper.push(constraint.upper - rest);
+            }
+        }
+        let matrix = DMatrix::from_row_slice(which.len(), n, &rows);
+        Ok((which, Inequalities::new(matrix, DVector::from_vec(lower), DVector::from_vec(upper))?))
+    }
+
+    /// The constraints that hold the unknowns back at the full parameter vector `at`.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn held(&self, at: &DVector<f64>) -> Result<Vec<Held>, StageError> {
+        let (which, rows) = self.constraints(at)?;
+        let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
+        let held = |(i, constraint)| {
+            let row = rows.matrix().row(i).iter().copied().collect();
+            Some(Held { constraint, side: rows.at(&x, i)?, row })
+        };
+        Ok(which.into_iter().enumerate().filter_map(held).collect())
+    }
+
     /// Minimises from the full parameter vector `start`.
     ///
     /// # Errors
-    /// Bounds leave a parameter no value.
+    /// Bounds and constraints leave the parameters no values.
     pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
         let residuals = self.residuals(start);
-        let begin = residuals.reduced(start);
+        let mut begin = residuals.reduced(start);
+        let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
+        let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
+        let bounds = Bounds::new(lower, upper)?;
+        let (_, rows) = self.constraints(start)?;
+        if self.solver == SolverChoice::Bounded {
+            begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
+        }
         let priors = self.priors();
         let gauge = self.gauge(start);
         let hold = -(&gauge.rows * &begin);
         let none = DVector::zeros(priors.nrows());
         let fit = Fit::new(&residuals)
+            .with_loss(self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
         let settings =
@@ -143,15 +216,10 @@ impl<'a> Stage<'a> {
             poses: self.poses.len(),
         });
         let solution = match (self.solver, reporter) {
-            (SolverChoice::Bounded, reporter) => {
-                let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
-                let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
-                let bounds = Bounds::new(lower, upper)?;
-                match reporter {
-                    Some(reporter) => solver::minimise_bounded_observed(fit, begin, &bounds, &settings, reporter),
-                    None => solver::minimise_bounded(fit, begin, &bounds, &settings),
-                }
+            (SolverChoice::Bounded, Some(reporter)) => {
+                solver::minimise_constrained_observed(fit, begin, &bounds, &rows, &settings, reporter)
             }
+            (SolverChoice::Bounded, None) => solver::minimise_constrained(fit, begin, &bounds, &rows, &settings),
             (SolverChoice::GaussNewton, _) => {
                 let max_iterations = self.max_steps.min(GaussNewtonSettings::default().max_iterations);
                 let settings = GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
@@ -173,11 +241,11 @@ impl<'a> Stage<'a> {
         Ok(StageEnd { x: residuals.full(&solution.x), solution, gauge })
     }
 
-    /// ½‖r‖² of the data and the priors at the full parameter vector `at`.
+    /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.
     pub fn cost(&self, at: &DVector<f64>) -> f64 {
         let residuals = self.residuals(at);
         let x = residuals.reduced(at);
-        Fit::new(&residuals).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
+        Fit::new(&residuals).with_loss(self.loss).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
     }
 
     /// One row x / σ for each unknown with a prior.

@@ -1,11 +1,12 @@
 //! What the residual of a fit says about its unknowns.
 
-use nalgebra::DVector;
+use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::fitting::FitEnd;
-use super::stage::Stage;
-use crate::fit::{LeastSquares as _, Uncertainty, residual_vector};
+use super::outliers::Lengths;
+use super::stage::{Held, Stage, StageError};
+use crate::fit::{Loss, Uncertainty};
 
 /// A χ² this improbable under the declared σ means that σ is understated.
 const IMPROBABLE: f64 = 1e-3;
@@ -21,30 +22,49 @@ pub(super) struct Statistics {
     pub identified: Vec<f64>,
     /// Pairs of unknowns correlated by more than 0.9, strongest first.
     pub correlations: Vec<(usize, usize, f64)>,
-    /// χ² over its degrees of freedom; `None` without any.
+    /// χ² over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
     pub reduced_chi2: Option<f64>,
     /// By how much the assumed variance was raised, ≥ 1.
     pub noise_factor: f64,
+    /// Whether each unknown is held by bounds or constraints alone.
+    pub held: Vec<bool>,
+    /// The constraints that hold back.
+    pub constraints: Vec<Held>,
+    /// Lengths of the residuals.
+    pub lengths: Lengths,
 }
 
 impl Statistics {
     /// Of a stage that ended at `end`.
     ///
     /// The model's errors count as noise: where χ² / ν is beyond chance under a declared σ, the variance is raised by it.
-    pub fn of(stage: &Stage, end: &FitEnd, noise_is_declared: bool) -> Self {
-        let residuals = stage.residuals(&end.x);
-        let x: DVector<f64> = residuals.reduced(&end.x);
-        let chi2 = residual_vector(&residuals, &x).norm_squared();
-        let triangle = stage.data_triangle(&end.x);
+    /// With a robust loss the covariance is that of the weighted Jacobian, times [`Loss::variance_factor`].
+    /// Active constraints confine it to the directions that they leave open.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn of(stage: &Stage, end: &FitEnd, noise_is_declared: bool) -> Result<Self, StageError> {
+        let triangle = stage.weighted_triangle(&end.x);
         let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
-        let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
-        let of = |factor| Uncertainty::of(&triangle, &priors, &end.gauge.rows, &held, factor);
+        let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        let constraints = stage.held(&end.x)?;
+        let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
+        let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
         let mut uncertainty = of(1.0);
-        let freedom = (residuals.items() * residuals.rows_per_item()) as f64 - uncertainty.effective_parameters;
-        let noise_factor = if noise_is_declared { raised(chi2, freedom) } else { 1.0 };
-        if noise_factor > 1.0 {
+        let coordinates = 3.0 * stage.poses.len() as f64;
+        let freedom = coordinates - uncertainty.effective_parameters;
+        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, noise_is_declared);
+        let robust = stage.loss != Loss::Squares;
+        let counts = |length: f64| !robust || lengths.outlying(length).is_none();
+        let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
+        let left_out = if robust { 3.0 * lengths.outliers() as f64 } else { 0.0 };
+        let noise_factor = if noise_is_declared { raised(chi2, freedom - left_out) } else { 1.0 };
+        if robust {
+            uncertainty = of(stage.loss.variance_factor(&lengths.values, 3, freedom));
+        } else if noise_factor > 1.0 {
             uncertainty = of(noise_factor);
         }
+        let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
         // What can be seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
         let visible = stage.gauge(&end.x).visible;
@@ -55,14 +75,39 @@ impl Statistics {
                 None => end.gauge.visible[j].min(visible[j]),
             })
             .collect();
-        Self {
+        Ok(Self {
             correlations: uncertainty.correlations_above(STRONG),
             errors,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             noise_factor,
-        }
+            held,
+            constraints,
+            lengths,
+        })
     }
+}
+
+/// The rows of `gauge` and of active constraints, all of length one in unknowns scaled by the data.
+///
+/// A constraint on a single unknown that nothing else holds is a bound: the unknown is held.
+fn confine(triangle: &DMatrix<f64>, gauge: &DMatrix<f64>, constraints: &[Held], held: &mut [bool]) -> DMatrix<f64> {
+    let n = held.len();
+    let scale: Vec<f64> = triangle.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+    let mut left: Vec<&Held> = constraints.iter().collect();
+    loop {
+        let open = |row: &[f64]| (0..n).filter(|&j| row[j] != 0.0 && !held[j]).collect::<Vec<_>>();
+        let Some(alone) = left.iter().position(|found| open(&found.row).len() <= 1) else { break };
+        let unknowns = open(&left.remove(alone).row);
+        unknowns.into_iter().for_each(|j| held[j] = true);
+    }
+    let mut rows = gauge.clone().insert_rows(gauge.nrows(), left.len(), 0.0);
+    for (i, found) in left.iter().enumerate() {
+        let scaled = found.row.iter().zip(&scale).zip(&*held).filter(|(_, held)| !**held);
+        let length = scaled.map(|((a, s), _)| (a / s).powi(2)).sum::<f64>().sqrt();
+        (0..n).for_each(|j| rows[(gauge.nrows() + i, j)] = found.row[j] / length);
+    }
+    rows
 }
 
 /// χ² / ν where that is beyond chance, else 1.

@@ -1,5 +1,6 @@
 //! Which parameters are fitted together, and by which solver.
 
+use crate::model::Model;
 use crate::parameter::Parameter;
 
 /// Which parameters are fitted together.
@@ -21,7 +22,7 @@ pub enum Strategy {
 /// A solver by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SolverChoice {
-    /// Bounded Levenberg–Marquardt where any free parameter has a bound, plain otherwise.
+    /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise.
     #[default]
     Auto,
     /// Levenberg–Marquardt without bounds.
@@ -30,7 +31,7 @@ pub enum SolverChoice {
     GaussNewton,
     /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
     PseudoInverse,
-    /// Levenberg–Marquardt within the bounds of `[parameters]`.
+    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`.
     Bounded,
 }
 
@@ -79,11 +80,11 @@ impl SolverChoice {
         }
     }
 
-    /// The solver that `auto` stands for with these parameters.
+    /// The solver that `auto` stands for with this model.
     #[must_use]
-    pub fn decide(self, parameters: &[Parameter]) -> Self {
+    pub fn decide(self, model: &Model) -> Self {
         match self {
-            Self::Auto if parameters.iter().any(Parameter::is_bounded) => Self::Bounded,
+            Self::Auto if model.is_bounded() => Self::Bounded,
             Self::Auto => Self::LevenbergMarquardt,
             chosen => chosen,
         }

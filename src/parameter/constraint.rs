@@ -1,0 +1,123 @@
+//! From `[[constraint]]` to linear inequalities between unknowns.
+
+use super::resolve::candidates;
+use super::{Parameter, Unit};
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::problem::{Constraint, Limit, LimitKind, Problem};
+
+/// lower ≤ Σ cₖ xₖ ≤ upper over unknowns xₖ; infinite where there is no limit.
+///
+/// Geometry enters by its value, Σ cₖ (nominalₖ + xₖ), stiffness and rigidity by its logarithm, Σ cₖ (ln nominalₖ + xₖ) in
+/// SI units: both are linear in x. The nominal part, fixed parameters with it, is taken off the limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearConstraint {
+    /// Free parameters and their coefficients.
+    pub terms: Vec<(usize, f64)>,
+    /// Lower limit on Σ c x.
+    pub lower: f64,
+    /// Upper limit on Σ c x.
+    pub upper: f64,
+    /// The sum in words: `ln A.EI − ln B.EI`.
+    pub sum: String,
+    /// The limits in words, lower and upper: `≥ 0`.
+    pub limits: [Option<String>; 2],
+    /// Where it stands in the problem file.
+    pub location: Location,
+}
+
+/// The constraints of `problem` on its free `parameters`.
+///
+/// # Errors
+/// A name that is not a parameter, kinds that do not add up, a limit of another kind, or nothing free.
+pub fn constrain(
+    problem: &Problem,
+    bases: &[String],
+    targets: &[String],
+    parameters: &[Parameter],
+) -> Result<Vec<LinearConstraint>, InputError> {
+    let known: Vec<(String, Unit, f64)> =
+        candidates(problem, bases, targets).into_iter().map(|c| (c.name, c.slot.unit(), c.nominal)).collect();
+    problem.constraints.iter().map(|constraint| one(constraint, &known, parameters)).collect()
+}
+
+fn one(
+    constraint: &Constraint,
+    known: &[(String, Unit, f64)],
+    parameters: &[Parameter],
+) -> Result<LinearConstraint, InputError> {
+    let mut terms = Vec::new();
+    let mut first: Option<(&str, LimitKind)> = None;
+    let (mut nominal, mut sum) = (0.0, String::new());
+    for term in &constraint.terms {
+        let error = |kind| Err(term.location.clone().error(kind));
+        let Some((name, unit, value)) = known.iter().find(|(name, ..)| *name == term.name) else {
+            let known = known.iter().map(|(name, ..)| name.clone()).collect();
+            return error(InputErrorKind::UnknownParameter { known });
+        };
+        let kind = kind_of(*unit);
+        match first {
+            None => first = Some((name, kind)),
+            Some((other, of)) if of != kind => {
+                return error(InputErrorKind::MixedKinds { other: other.to_owned() });
+            }
+            Some(_) => {}
+        }
+        let coefficient = term.coefficient;
+        nominal += coefficient * if kind == LimitKind::Logarithm { value.ln() } else { *value };
+        if let Some(k) = parameters.iter().position(|parameter| parameter.name == *name) {
+            terms.push((k, coefficient));
+        }
+        let sign = match (sum.is_empty(), coefficient < 0.0) {
+            (true, false) => "",
+            (true, true) => "−",
+            (false, false) => " + ",
+            (false, true) => " − ",
+        };
+        let size = if coefficient.abs() == 1.0 { String::new() } else { format!("{} ", coefficient.abs()) };
+        let logarithm = if kind == LimitKind::Logarithm { "ln " } else { "" };
+        sum.push_str(&format!("{sign}{size}{logarithm}{name}"));
+    }
+    let Some((parameter, kind)) = first.filter(|_| !terms.is_empty()) else {
+        return Err(constraint.location.clone().error(InputErrorKind::NothingConstrained));
+    };
+    for limit in constraint.at_least.iter().chain(&constraint.at_most).filter(|limit| limit.kind != kind) {
+        let kind = InputErrorKind::LimitOfAnotherKind { parameter: parameter.to_owned(), write: spelled(kind) };
+        return Err(limit.location.clone().error(kind));
+    }
+    let value = |limit: &Option<Limit>, none: f64| limit.as_ref().map_or(none, |limit| limit.value - nominal);
+    let words = |limit: &Option<Limit>, relation: &str| Some(format!("{relation} {}", shown(limit.as_ref()?)));
+    Ok(LinearConstraint {
+        terms,
+        lower: value(&constraint.at_least, f64::NEG_INFINITY),
+        upper: value(&constraint.at_most, f64::INFINITY),
+        sum,
+        limits: [words(&constraint.at_least, "≥"), words(&constraint.at_most, "≤")],
+        location: constraint.location.clone(),
+    })
+}
+
+fn kind_of(unit: Unit) -> LimitKind {
+    match unit {
+        Unit::Angle => LimitKind::Angle,
+        Unit::Length => LimitKind::Length,
+        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => LimitKind::Logarithm,
+    }
+}
+
+fn spelled(kind: LimitKind) -> &'static str {
+    match kind {
+        LimitKind::Angle => "at_least_deg or at_least_rad, at_most_deg or at_most_rad",
+        LimitKind::Length => "at_least_mm or at_least_m, at_most_mm or at_most_m",
+        LimitKind::Logarithm => "at_least or at_most, of the logarithm",
+    }
+}
+
+/// A limit for people: nine digits, so that conversions do not show.
+fn shown(limit: &Limit) -> String {
+    let (value, unit) = match limit.kind {
+        LimitKind::Angle => (limit.value.to_degrees(), "°"),
+        LimitKind::Length => (limit.value * 1e3, " mm"),
+        LimitKind::Logarithm => (limit.value, ""),
+    };
+    format!("{}{unit}", (value * 1e9).round() / 1e9)
+}

@@ -1,0 +1,60 @@
+//! `[[constraint]]`: linear inequalities between parameters.
+
+use super::section::Section;
+use super::{Constraint, ConstraintTerm, Limit, LimitKind};
+use crate::error::{InputError, InputErrorKind};
+use crate::units::{ANGLE, LENGTH};
+
+/// Every constraint, in the order of the file.
+pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<Constraint>, InputError> {
+    root.sections("constraint")?.into_iter().map(constraint).collect()
+}
+
+fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
+    let item = section.require("terms", "terms = { \"A.EI\" = 1.0, \"B.EI\" = -1.0 }")?;
+    let mut terms = Vec::new();
+    for (name, term) in item.section()?.entries() {
+        // `terms = { A.EI = 1.0 }` without quotes is a table `A` that holds `EI`.
+        if term.holds_tables() {
+            let inner = term.section()?.entries().first().map_or("…", |(inner, _)| *inner);
+            return Err(term.error(InputErrorKind::UnquotedName { name: format!("{name}.{inner}") }));
+        }
+        let coefficient = term.number()?;
+        if coefficient == 0.0 {
+            return Err(term.error(InputErrorKind::NoCoefficient));
+        }
+        terms.push(ConstraintTerm { name: name.to_owned(), coefficient, location: term.location() });
+    }
+    if terms.is_empty() {
+        return Err(item.error(InputErrorKind::NoTerms));
+    }
+    let at_least = limit(&mut section, "at_least")?;
+    let at_most = limit(&mut section, "at_most")?;
+    section.finish()?;
+    match (&at_least, &at_most) {
+        (None, None) => return Err(section.error(InputErrorKind::NoLimit)),
+        (Some(least), Some(most)) if least.kind == most.kind && least.value > most.value => {
+            let kind = InputErrorKind::LimitsCross { least: least.value, most: most.value };
+            return Err(least.location.clone().error(kind));
+        }
+        _ => {}
+    }
+    Ok(Constraint { terms, at_least, at_most, location: section.location() })
+}
+
+/// A limit in one of its units, or bare for logarithms.
+fn limit(section: &mut Section<'_, '_>, base: &str) -> Result<Option<Limit>, InputError> {
+    let mut found = Vec::new();
+    if let Some(item) = section.get(base) {
+        found.push((item.number()?, LimitKind::Logarithm, item));
+    }
+    for (kind, of) in [(&ANGLE, LimitKind::Angle), (&LENGTH, LimitKind::Length)] {
+        if let Some((item, unit)) = section.pick(base, kind)? {
+            found.push(((unit.to_si)(item.number()?), of, item));
+        }
+    }
+    if let [_, (.., second), ..] = &found[..] {
+        return Err(second.error(InputErrorKind::GivenTwice { first: format!("{base} in another unit") }));
+    }
+    Ok(found.pop().map(|(value, kind, item)| Limit { value, kind, location: item.location() }))
+}

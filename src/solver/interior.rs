@@ -1,0 +1,72 @@
+//! Linear least squares under linear inequalities by Clarabel's interior-point method.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SupportedConeT, ZeroConeT};
+use nalgebra::DVector;
+
+use super::Factor;
+
+/// Tolerance on gap and feasibility.
+const TOLERANCE: f64 = 1e-11;
+
+/// g·q ≥ h; g as unknowns and coefficients.
+#[derive(Debug, Clone)]
+pub(super) struct HalfSpace {
+    pub(super) normal: Vec<(usize, f64)>,
+    pub(super) least: f64,
+}
+
+/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces, in unknowns whose columns have length one.
+///
+/// Unknowns are z = S q and y = B q + c, so that `BᵀB` is never formed; normals are brought to length one.
+pub(super) fn interior_point(factor: &Factor, lambda: f64, spaces: &[HalfSpace]) -> Option<DVector<f64>> {
+    let matrix = factor.matrix();
+    let (rows, n) = matrix.shape();
+    let sizes: Vec<f64> = matrix
+        .column_iter()
+        .map(|c| (c.norm_squared() + lambda).sqrt())
+        .map(|s| if s > 0.0 { s } else { 1.0 })
+        .collect();
+    let scale = match factor.constant().norm() {
+        0.0 => spaces.iter().fold(f64::MIN_POSITIVE, |scale, space| scale.max(space.least.abs())),
+        norm => norm,
+    };
+
+    // Rows: y − B S⁻¹ z = c, then −g S⁻¹ z ≤ −h.
+    let (mut is, mut js, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    let mut put = |i: usize, j: usize, value: f64| {
+        is.push(i);
+        js.push(j);
+        values.push(value);
+    };
+    let mut right = Vec::with_capacity(rows + spaces.len());
+    for i in 0..rows {
+        put(i, n + i, 1.0);
+        (0..n).for_each(|j| put(i, j, -matrix[(i, j)] / sizes[j]));
+        right.push(factor.constant()[i] / scale);
+    }
+    for space in spaces {
+        let length = space.normal.iter().map(|&(j, g)| (g / sizes[j]).powi(2)).sum::<f64>().sqrt();
+        space.normal.iter().for_each(|&(j, g)| put(right.len(), j, -g / sizes[j] / length));
+        right.push(-space.least / scale / length);
+    }
+    let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
+    let diagonal: Vec<f64> = sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
+    let indices: Vec<usize> = (0..n + rows).collect();
+    let quadratic = CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
+    let cones: [SupportedConeT<f64>; 2] = [ZeroConeT(rows), NonnegativeConeT(spaces.len())];
+    let settings = DefaultSettings {
+        verbose: false,
+        presolve_enable: false,
+        tol_gap_abs: TOLERANCE,
+        tol_gap_rel: TOLERANCE,
+        tol_feas: TOLERANCE,
+        ..DefaultSettings::default()
+    };
+    let linear = vec![0.0; n + rows];
+    let mut solver = DefaultSolver::new(&quadratic, &linear, &constraints, &right, &cones, settings).ok()?;
+    solver.solve();
+    let z = solver.solution.x.get(..n)?;
+    let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
+    q.iter().all(|v| v.is_finite()).then_some(q)
+}

@@ -1,0 +1,204 @@
+//! `[[constraint]]` on the lunar sampler: exact where active, without effect where not, and what they cost.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::report::{estimate_json, estimate_text};
+use flexcal::study::{Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify};
+
+fn cases() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases")
+}
+
+/// The lunar sampler's problem with more text at its end.
+fn problem(more: &str) -> Problem {
+    let file = cases().join("problem.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    Problem::parse(&format!("{text}\n{more}\n"), &file).unwrap()
+}
+
+fn run(problem: &Problem, options: &Options) -> Result<Identification, IdentifyError> {
+    let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], problem).unwrap();
+    let split = Split::new(problem, &measurements).unwrap();
+    identify(problem, &measurements, &split, options)
+}
+
+fn identified(more: &str) -> Identification {
+    run(&problem(more), &Options::default()).unwrap()
+}
+
+fn estimate<'a>(result: &'a Identification, name: &str) -> &'a Estimate {
+    result.estimates.iter().find(|estimate| estimate.name == name).unwrap()
+}
+
+fn constraint(terms: &str, limits: &str) -> String {
+    format!("[[constraint]]\nterms = {{ {terms} }}\n{limits}\n")
+}
+
+#[test]
+fn an_inactive_constraint_changes_nothing() {
+    let free = identified("");
+    let stiffer = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", "at_least = 0.0");
+    let long = constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 4000");
+    let bounded = identified(&(stiffer + &long));
+    assert_eq!((free.solver, bounded.solver), (SolverChoice::LevenbergMarquardt, SolverChoice::Bounded));
+    assert!(bounded.active_constraints.is_empty() && bounded.is_trusted());
+    let change = (&bounded.x - &free.x).amax();
+    assert!(change <= 1e-8 * free.x.amax(), "{change}");
+    for (bounded, free) in bounded.estimates.iter().zip(&free.estimates) {
+        let errors = (bounded.std_error.unwrap_or(0.0), free.std_error.unwrap_or(0.0));
+        assert!((errors.0 - errors.1).abs() <= 1e-6 * errors.1, "{}: {errors:?}", free.name);
+    }
+}
+
+#[test]
+fn an_active_constraint_holds_exactly_and_is_named() {
+    let free = identified("");
+    let ratio = estimate(&free, "A.EI").estimate / estimate(&free, "B.EI").estimate;
+    let limit = 1.3 * ratio;
+    let stiffer = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", &format!("at_least = {}", limit.ln()));
+    let stiff = identified(&stiffer);
+    let reach = estimate(&stiff, "joint3.a").estimate + estimate(&stiff, "joint4.a").estimate;
+    let short = constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", &format!("at_most_m = {}", reach - 2e-5));
+    let problem = problem(&(stiffer + &short));
+    let held = run(&problem, &Options::default()).unwrap();
+    assert!(held.is_trusted(), "{}", held.termination);
+    let (a, b) = (estimate(&held, "A.EI"), estimate(&held, "B.EI"));
+    let held_ratio = a.estimate / b.estimate;
+    assert!((held_ratio / limit - 1.0).abs() < 1e-9, "{held_ratio} on {limit}, free {ratio}");
+    let sum = estimate(&held, "joint3.a").estimate + estimate(&held, "joint4.a").estimate;
+    assert!((sum - reach + 2e-5).abs() < 1e-9 * reach, "{sum} on {}", reach - 2e-5);
+    // Along the constraints both vary together: the logarithms alike, the lengths against each other.
+    let relative = |of: &Estimate| of.std_error.unwrap() / of.estimate;
+    assert!((relative(a) / relative(b) - 1.0).abs() < 1e-6, "{} {}", relative(a), relative(b));
+    let length = |name| estimate(&held, name).std_error.unwrap();
+    assert!((length("joint3.a") / length("joint4.a") - 1.0).abs() < 1e-6);
+    assert!(length("joint3.a") < estimate(&free, "joint3.a").std_error.unwrap());
+    let words: Vec<&str> = held.active_constraints.iter().map(|active| active.words.as_str()).collect();
+    assert_eq!(words.len(), 2);
+    assert!(
+        words[0].starts_with("ln A.EI − ln B.EI ≥ ") && words[1].starts_with("joint3.a + joint4.a ≤ "),
+        "{words:?}"
+    );
+    let text = estimate_text(&problem, &held);
+    assert!(text.contains("Held by a constraint") && text.contains(words[1]), "{text}");
+    let json: serde_json::Value = serde_json::from_str(&estimate_json(&problem, &held)).unwrap();
+    assert_eq!(json["active_constraints"][0]["side"], "at_least");
+    assert_eq!(json["active_constraints"][1]["constraint"], words[1]);
+    assert_eq!(json["active_constraints"][0]["line"], 86);
+    assert_eq!(json["outliers"], serde_json::json!([]));
+
+    // Alone, the stiffnesses keep the constraint between them and know of no other.
+    let stiffness = Options { strategy: Strategy::StiffnessOnly, ..Options::default() };
+    let alone = run(&problem, &stiffness).unwrap();
+    assert!(alone.active_constraints.iter().all(|active| active.words == words[0]));
+    assert!(estimate(&alone, "A.EI").estimate / estimate(&alone, "B.EI").estimate / limit > 1.0 - 1e-9);
+}
+
+#[test]
+fn a_constraint_on_one_parameter_is_a_bound() {
+    let rule = "\"A.*\" = { sigma_relative = 0.5 }";
+    let file = cases().join("problem.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let bound = format!("{rule}\n\"A.EI\" = {{ sigma_relative = 0.5, max_relative = 0.9 }}");
+    // A bound includes the nominal value: a limit below it goes by a constraint alone.
+    assert!(Problem::parse(&text.replace(rule, &bound), &file).is_err());
+    let bound = bound.replace("max_relative = 0.9", "max_relative = 1.0");
+    let bounded = run(&Problem::parse(&text.replace(rule, &bound), &file).unwrap(), &Options::default()).unwrap();
+    let held = identified(&constraint("\"A.EI\" = 2.0", &format!("at_most = {}", 2.0 * 2.6e4_f64.ln())));
+    let change = (&bounded.x - &held.x).amax();
+    assert!(change < 1e-6 * bounded.x.amax(), "{change} of {}", bounded.x.amax());
+    assert!(estimate(&bounded, "A.EI").at_bound.is_some() && held.active_constraints.len() == 1);
+    assert!(estimate(&held, "A.EI").std_error.is_none());
+    for (held, bounded) in held.estimates.iter().zip(&bounded.estimates) {
+        let errors = (held.std_error.unwrap_or(0.0), bounded.std_error.unwrap_or(0.0));
+        assert!((errors.0 - errors.1).abs() <= 1e-5 * errors.1, "{}: {errors:?}", held.name);
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let both = constraint("\"joint3.a\" = 1", "at_least_mm = 2000")
+        + &constraint("\"joint3.a\" = 1, \"joint4.a\" = 1e-3", "at_most_mm = 1900")
+        + &constraint("\"joint4.a\" = 1", "at_least_mm = 1700");
+    let refused = run(&problem(&both), &Options::default());
+    assert!(matches!(refused, Err(IdentifyError::Stage(StageError::Infeasible))));
+    let solver = SolverChoice::LevenbergMarquardt;
+    let any = constraint("\"joint3.a\" = 1", "at_least_mm = 1000");
+    let refused = run(&problem(&any), &Options { solver, ..Options::default() });
+    assert!(matches!(refused, Err(IdentifyError::BoundsIgnored { .. })));
+
+    let mistakes: [(&str, &str, &[&str]); 7] = [
+        ("\"C.EI\" = 1", "at_least = 0", &["problem.toml:87", "\"C.EI\"", "not a parameter", "B.EI"]),
+        ("\"A.EI\" = 1, \"joint3.a\" = 1", "at_least = 0", &["problem.toml:87", "does not add up with A.EI"]),
+        ("\"A.EI\" = 1", "at_least_mm = 0", &["problem.toml:88", "at_least_mm", "A.EI takes at_least"]),
+        ("\"joint3.a\" = 1", "at_most = 0", &["problem.toml:88", "at_most", "joint3.a takes at_least_mm"]),
+        ("\"joint3.alpha\" = 1", "at_most_mm = 0", &["problem.toml:88", "at_most_mm", "at_most_rad"]),
+        ("\"base.x\" = 1", "at_most_mm = 0", &["problem.toml:86", "constraint[1]", "none of its parameters is free"]),
+        ("\"base.x\" = 1, \"tool.x\" = 1", "at_least_mm = 100", &[]),
+    ];
+    for (terms, limits, words) in mistakes {
+        let result = run(&problem(&constraint(terms, limits)), &Options::default());
+        let message = result.as_ref().err().map(ToString::to_string).unwrap_or_default();
+        assert_eq!(result.is_ok(), words.is_empty(), "{terms}: {message}");
+        for word in words {
+            assert!(message.contains(word), "{terms}: no {word:?} in {message}");
+        }
+    }
+}
+
+/// `cargo test --release --test constraints -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement"]
+fn cost_of_bounds() {
+    let file = cases().join("problem.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let rules = [
+        (
+            "\"A.*\" = { sigma_relative = 0.5 }",
+            "\"A.*\" = { sigma_relative = 0.5, max_relative = 1.02, min_relative = 0.98 }",
+        ),
+        ("\"joint*.d\" = { sigma_mm = 30.0 }", "\"joint*.d\" = { sigma_mm = 30.0, min_mm = -1, max_mm = 1 }"),
+    ];
+    let narrow = rules.iter().fold(text.clone(), |text, (from, to)| text.replace(from, to));
+    let rows = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", "at_least = 1.0")
+        + &constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_m = 3.7");
+    for data in ["a-none.csv", "h-none-large.csv"] {
+        let seconds = |text: &str| {
+            let problem = Problem::parse(text, &file).unwrap();
+            let (measurements, _) = Measurements::read(&[cases().join(data)], &problem).unwrap();
+            let split = Split::new(&problem, &measurements).unwrap();
+            let mut best = f64::INFINITY;
+            let mut last = None;
+            for _ in 0..20 {
+                let clock = Instant::now();
+                last = Some(identify(&problem, &measurements, &split, &Options::default()).unwrap());
+                best = best.min(clock.elapsed().as_secs_f64());
+            }
+            (best, last.unwrap())
+        };
+        let (free, result) = seconds(&text);
+        println!("{data}: free {:.2} ms, {} steps", free * 1e3, result.iterations);
+        for (what, text) in [
+            ("bounds", narrow.clone()),
+            ("constraints", format!("{text}\n{rows}")),
+            ("both", format!("{narrow}\n{rows}")),
+        ] {
+            let (time, result) = seconds(&text);
+            let bounds = result.estimates.iter().filter(|estimate| estimate.at_bound.is_some()).count();
+            println!(
+                "  {what}: {:.2} ms = {:.2} times; {} steps, {bounds} bounds and {} constraints active, {}",
+                time * 1e3,
+                time / free,
+                result.iterations,
+                result.active_constraints.len(),
+                result.termination
+            );
+        }
+    }
+}
