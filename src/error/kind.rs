@@ -129,7 +129,7 @@ pub enum InputErrorKind {
     NoLimit,
     #[error("at_least {least} is above at_most {most} (in SI units)")]
     LimitsCross { least: f64, most: f64 },
-    #[error("not a parameter of this arm; {}", list("they are", known, "it has none"))]
+    #[error("no such parameter; {}", list("there are", known, "the arm has none"))]
     UnknownParameter { known: Vec<String> },
     #[error(
         "does not add up with {other}: angles, lengths and logarithms of stiffnesses go in constraints of their own"

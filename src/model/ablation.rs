@@ -49,7 +49,10 @@ impl Model {
     #[must_use]
     pub fn ablated(&self, ablation: Ablation) -> Self {
         let mut model = self.clone();
+        let kept: Vec<usize> =
+            (0..model.parameters.len()).filter(|&k| ablation.keeps(model.parameters[k].slot)).collect();
         model.parameters.retain(|parameter| ablation.keeps(parameter.slot));
+        model.constraints = self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
                 joint.flexibility = None;

@@ -25,6 +25,15 @@ pub struct LinearConstraint {
     pub location: Location,
 }
 
+impl LinearConstraint {
+    /// The same constraint on the parameters listed in `kept`, counted anew; `None` where it speaks of another one.
+    pub fn on(&self, kept: &[usize]) -> Option<Self> {
+        let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&other| other == k)?, c));
+        let terms = self.terms.iter().map(place).collect::<Option<Vec<_>>>()?;
+        Some(Self { terms, ..self.clone() })
+    }
+}
+
 /// The constraints of `problem` on its free `parameters`.
 ///
 /// # Errors
