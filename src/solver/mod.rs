@@ -10,6 +10,7 @@ mod inequalities;
 mod interior;
 mod levenberg_marquardt;
 mod pivoted;
+mod polyhedron;
 mod polyhedron_step;
 mod run;
 mod settings;

@@ -1,5 +1,6 @@
 //! What to fit, in which order, and what came of it.
 
+mod active;
 mod errors;
 mod fitting;
 mod identification;
@@ -10,8 +11,9 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use active::ActiveConstraint;
 pub use errors::{AxisValues, ErrorSummary};
-pub use identification::{ActiveConstraint, Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
+pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
 pub use outliers::Outlier;
 pub use placement::Placement;
 pub use stage::{Progress, ProgressSink, StageError};
