@@ -89,7 +89,9 @@ impl Loss {
         let roots: Vec<f64> = residuals.chunks_exact(rows.max(1)).map(|item| self.weight(norm(item)).sqrt()).collect();
         for j in 0..=block.parameters() {
             for (item, root) in block.column_mut(j).chunks_exact_mut(rows.max(1)).zip(&roots) {
-                item.iter_mut().for_each(|value| *value *= root);
+                for value in item {
+                    *value *= root;
+                }
             }
         }
         Some(sum)

@@ -82,14 +82,14 @@ fn one(
             (false, false) => " + ",
             (false, true) => " − ",
         };
-        let size = if coefficient.abs() == 1.0 { String::new() } else { format!("{} ", coefficient.abs()) };
         let logarithm = if kind == LimitKind::Logarithm { "ln " } else { "" };
-        sum.push_str(&format!("{sign}{size}{logarithm}{name}"));
+        let size = Some(coefficient.abs().to_string()).filter(|size| size != "1").map_or_else(String::new, |s| s + " ");
+        sum.extend([sign, &size, logarithm, name]);
     }
     let Some((parameter, kind)) = first.filter(|_| !terms.is_empty()) else {
         return Err(constraint.location.clone().error(InputErrorKind::NothingConstrained));
     };
-    for limit in constraint.at_least.iter().chain(&constraint.at_most).filter(|limit| limit.kind != kind) {
+    if let Some(limit) = constraint.at_least.iter().chain(&constraint.at_most).find(|limit| limit.kind != kind) {
         let kind = InputErrorKind::LimitOfAnotherKind { parameter: parameter.to_owned(), write: spelled(kind) };
         return Err(limit.location.clone().error(kind));
     }

@@ -12,6 +12,7 @@ mod inequalities;
 mod interior;
 mod levenberg_marquardt;
 mod pivoted;
+mod polyhedron;
 mod polyhedron_step;
 mod pseudo_inverse;
 mod run;

@@ -4,12 +4,13 @@ use std::time::Instant;
 
 use nalgebra::DVector;
 
+use super::active::ActiveConstraint;
 use super::fitting::{FitEnd, Fitting};
 use super::outliers::Outlier;
-use super::stage::{Held, Stage, StageError};
+use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
 use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind};
 use crate::fit::{Identifiability, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
@@ -98,30 +99,6 @@ pub struct Estimate {
     pub identified: f64,
     /// Whether the strategy varied it.
     pub fitted: bool,
-}
-
-/// A constraint that holds parameters back.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ActiveConstraint {
-    /// The limit in words: `ln A.EI − ln B.EI ≥ 0`.
-    pub words: String,
-    /// Which limit.
-    pub side: AtBound,
-    /// Where it stands in the problem file.
-    pub location: Location,
-}
-
-impl ActiveConstraint {
-    fn all(statistics: &Statistics, model: &Model) -> Vec<Self> {
-        let of = |held: &Held| {
-            let constraint = &model.constraints[held.constraint];
-            let [lower, upper] = &constraint.limits;
-            let limit = if held.side == AtBound::Lower { lower } else { upper };
-            let words = format!("{} {}", constraint.sum, limit.as_deref().unwrap_or_default());
-            Self { words, side: held.side, location: constraint.location.clone() }
-        };
-        statistics.constraints.iter().map(of).collect()
-    }
 }
 
 /// An identified arm.
@@ -276,7 +253,7 @@ pub(super) fn identify_model(
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
-        active_constraints: ActiveConstraint::all(&statistics, &model),
+        active_constraints: ActiveConstraint::all(&statistics.constraints, &model),
         outliers,
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),

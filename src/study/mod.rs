@@ -1,5 +1,6 @@
 //! What to fit, in which order, and what came of it.
 
+mod active;
 mod baseline;
 mod compare;
 mod compensate;
@@ -13,11 +14,12 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use active::ActiveConstraint;
 pub use baseline::Baseline;
 pub use compare::{Comparison, compare};
 pub use compensate::{Command, compensate};
 pub use errors::{AxisValues, ErrorSummary};
-pub use identification::{ActiveConstraint, Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
+pub use identification::{Errors, Estimate, Identification, IdentifyError, Noise, Options, identify};
 pub use outliers::Outlier;
 pub use placement::Placement;
 pub use stage::{Progress, ProgressSink, StageError};

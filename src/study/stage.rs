@@ -7,12 +7,13 @@ use argmin::core::{Error, KV, State as _};
 use nalgebra::{DMatrix, DVector};
 
 use super::SolverChoice;
+use super::active::Held;
 use crate::fit::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
 use crate::solver::{
-    self, AtBound, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings,
-    Settings, Solution, State,
+    self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings, Settings,
+    Solution, State,
 };
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
@@ -72,17 +73,6 @@ pub(super) struct StageEnd {
     pub x: DVector<f64>,
     pub solution: Solution,
     pub gauge: Gauge,
-}
-
-/// A constraint that holds the unknowns of a stage back.
-#[derive(Debug, Clone)]
-pub(super) struct Held {
-    /// Which of the model's constraints.
-    pub constraint: usize,
-    /// The limit that it is on.
-    pub side: AtBound,
-    /// Its coefficients, one per unknown.
-    pub row: Vec<f64>,
 }
 
 /// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.

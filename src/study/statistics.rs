@@ -1,11 +1,11 @@
 //! What the residual of a fit says about its unknowns.
 
-use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
+use super::active::{Held, confine};
 use super::fitting::FitEnd;
 use super::outliers::Lengths;
-use super::stage::{Held, Stage, StageError};
+use super::stage::{Stage, StageError};
 use crate::fit::{Loss, Uncertainty};
 
 /// A χ² this improbable under the declared σ means that σ is understated.
@@ -86,28 +86,6 @@ impl Statistics {
             lengths,
         })
     }
-}
-
-/// The rows of `gauge` and of active constraints, all of length one in unknowns scaled by the data.
-///
-/// A constraint on a single unknown that nothing else holds is a bound: the unknown is held.
-fn confine(triangle: &DMatrix<f64>, gauge: &DMatrix<f64>, constraints: &[Held], held: &mut [bool]) -> DMatrix<f64> {
-    let n = held.len();
-    let scale: Vec<f64> = triangle.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let mut left: Vec<&Held> = constraints.iter().collect();
-    loop {
-        let open = |row: &[f64]| (0..n).filter(|&j| row[j] != 0.0 && !held[j]).collect::<Vec<_>>();
-        let Some(alone) = left.iter().position(|found| open(&found.row).len() <= 1) else { break };
-        let unknowns = open(&left.remove(alone).row);
-        unknowns.into_iter().for_each(|j| held[j] = true);
-    }
-    let mut rows = gauge.clone().insert_rows(gauge.nrows(), left.len(), 0.0);
-    for (i, found) in left.iter().enumerate() {
-        let scaled = found.row.iter().zip(&scale).zip(&*held).filter(|(_, held)| !**held);
-        let length = scaled.map(|((a, s), _)| (a / s).powi(2)).sum::<f64>().sqrt();
-        (0..n).for_each(|j| rows[(gauge.nrows() + i, j)] = found.row[j] / length);
-    }
-    rows
 }
 
 /// χ² / ν where that is beyond chance, else 1.
