@@ -25,6 +25,8 @@ pub use super::place::Workspace;
 const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
 const SETTLED: f64 = 1e-13;
+/// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the arm.
+const ROUNDING: f64 = 1e-15;
 /// Directions seeded at once when the response to moments is differentiated.
 const CHUNK: usize = 10;
 
@@ -61,6 +63,17 @@ impl Default for Equilibrated {
             position_response: Vec::new(),
             moment_response: Vec::new(),
         }
+    }
+}
+
+impl Workspace<f64> {
+    /// Sum of the sizes of all moments about the base in the last walk [N·m].
+    fn turning(&self) -> f64 {
+        let term = |event: &Event<f64>| match event {
+            Event::Load { at, force } => at.norm() * force.norm(),
+            Event::Tip { .. } | Event::Axis { .. } => 0.0,
+        };
+        self.events.iter().map(term).sum()
     }
 }
 
@@ -121,7 +134,7 @@ impl Arm<f64> {
             if !change.is_finite() {
                 break;
             }
-            if change <= SETTLED * largest {
+            if change <= SETTLED * largest || change <= ROUNDING * ws.turning() {
                 return Ok(());
             }
             pose.moments.copy_from_slice(&ws.next_moments);

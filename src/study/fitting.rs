@@ -105,7 +105,7 @@ impl<'a> Fitting<'a> {
     pub fn without_equilibrium(&self) -> Option<usize> {
         let rows: Vec<usize> = (0..self.measurements.len()).collect();
         let errors = self.position_errors(&rows, &DVector::zeros(self.model.parameters.len()));
-        errors.iter().position(|error| !error.norm().is_finite())
+        errors.iter().position(|error| error.x.is_nan())
     }
 
     /// The nominal arm with bases and targets fitted where they are free.
@@ -142,22 +142,24 @@ impl<'a> Fitting<'a> {
             iterations: 0,
             evaluations: 0,
             at_bound: vec![None; whole.unknowns.len()],
-            gauge: whole.gauge(start),
+            gauge: Gauge::default(),
         };
         let mut cost = f64::INFINITY;
-        let once = self.strategy == Strategy::OneSweep;
+        // Short stages may all be turned back where a long one gets on: only a sweep of long ones can end it.
+        let mut long = self.strategy == Strategy::OneSweep;
         for _ in 0..MAX_SWEEPS {
+            let mut termination = Termination::Cost;
             for chosen in self.strategy.stages() {
                 let mut stage = self.strategy_stage(self.choose(chosen));
-                if !once {
+                if !long {
                     stage.max_steps = SWEEP_STEPS;
                 }
                 let StageEnd { x, solution, .. } = stage.run(&end.x)?;
                 end.x = x;
                 end.iterations += solution.iterations;
                 end.evaluations += solution.evaluations();
-                if once {
-                    end.termination = solution.termination;
+                if termination.converged() {
+                    termination = solution.termination;
                 }
                 for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
                     if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
@@ -167,14 +169,15 @@ impl<'a> Fitting<'a> {
             }
             let next = whole.cost(&end.x);
             let settled = cost - next <= SWEEP_SETTLED * next;
-            if settled && !once {
-                end.termination = Termination::Cost;
-            }
-            if settled || once {
+            if self.strategy == Strategy::OneSweep || !next.is_finite() || (settled && long) {
+                end.termination = termination;
                 break;
             }
+            long = settled;
             cost = next;
         }
+        let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        end.gauge = whole.gauge(&end.x, &held);
         Ok(end)
     }
 

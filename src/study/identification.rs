@@ -91,7 +91,8 @@ pub struct Estimate {
     pub nominal: f64,
     /// Estimated value.
     pub estimate: f64,
-    /// 1 σ; `None` where nothing was learned, where the value rests on a bound, or where it was not fitted.
+    /// 1 σ; `None` where nothing was learned, where the value rests on a bound or is part of a combination that neither
+    /// data nor priors see, or where it was not fitted.
     pub std_error: Option<f64>,
     /// The bound on which the value rests.
     pub at_bound: Option<AtBound>,
@@ -253,7 +254,7 @@ pub(super) fn identify_model(
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
-        active_constraints: ActiveConstraint::all(&statistics.constraints, &model),
+        active_constraints: ActiveConstraint::all(&statistics.constraints, model),
         outliers,
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),
@@ -289,7 +290,7 @@ impl Estimate {
 fn report(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
-        let learned = !statistics.held[j] && statistics.identified[j] > NOTHING_LEARNED;
+        let learned = statistics.known[j] && statistics.identified[j] > NOTHING_LEARNED;
         let estimate = &mut estimates[k];
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));

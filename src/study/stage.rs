@@ -76,7 +76,7 @@ pub(super) struct StageEnd {
 }
 
 /// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Gauge {
     /// Rows that span them, on the unknowns.
     pub rows: DMatrix<f64>,
@@ -125,8 +125,8 @@ impl<'a> Stage<'a> {
         Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
     }
 
-    /// Combinations that the data and the priors together leave open at `at`.
-    pub fn gauge(&self, at: &DVector<f64>) -> Gauge {
+    /// Combinations of the unknowns that are not `held` which data and priors together leave open at `at`.
+    pub fn gauge(&self, at: &DVector<f64>, held: &[bool]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
@@ -135,8 +135,14 @@ impl<'a> Stage<'a> {
         let priors = self.priors();
         let stacked =
             DMatrix::from_fn(n + priors.nrows(), n, |i, j| if i < n { data[(i, j)] } else { priors[(i - n, j)] });
-        let found = Identifiability::of(&stacked.qr().unpack_r());
-        Gauge { rows: found.gauge, visible: found.visible }
+        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
+        let found = Identifiability::of(&stacked.qr().unpack_r().select_columns(&free));
+        let mut gauge = Gauge { rows: DMatrix::zeros(found.gauge.nrows(), n), visible: vec![0.0; n] };
+        for (j, &k) in free.iter().enumerate() {
+            gauge.rows.set_column(k, &found.gauge.column(j));
+            gauge.visible[k] = found.visible[j];
+        }
+        gauge
     }
 
     /// The model's constraints on the unknowns, with the other parameters as in `at`; which they are, and their rows.
@@ -178,6 +184,9 @@ impl<'a> Stage<'a> {
 
     /// Minimises from the full parameter vector `start`.
     ///
+    /// Combinations that are blind at the start are held there. What is blind at the start may be seen at the end, or
+    /// decided by a bound: then the fit goes on with that set free.
+    ///
     /// # Errors
     /// Bounds and constraints leave the parameters no values.
     pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
@@ -190,14 +199,42 @@ impl<'a> Stage<'a> {
         if self.solver == SolverChoice::Bounded {
             begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
         }
+        let hold = begin.clone();
+        let mut gauge = self.gauge(start, &vec![false; begin.len()]);
+        let (mut iterations, mut cost_evaluations, mut linearisations) = (0, 0, 0);
+        loop {
+            let mut solution = self.solve(&residuals, begin, &hold, &gauge, (&bounds, &rows))?;
+            iterations += solution.iterations;
+            cost_evaluations += solution.cost_evaluations;
+            linearisations += solution.linearisations;
+            let x = residuals.full(&solution.x);
+            let held: Vec<bool> = solution.at_bound.iter().map(Option::is_some).collect();
+            let now = self.gauge(&x, &held);
+            if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
+                (solution.iterations, solution.cost_evaluations) = (iterations, cost_evaluations);
+                solution.linearisations = linearisations;
+                return Ok(StageEnd { x, solution, gauge });
+            }
+            gauge = now;
+            begin = solution.x;
+        }
+    }
+
+    /// Minimises from the unknowns `begin`, with the combinations in `gauge` held as in `hold`.
+    fn solve(
+        &self,
+        residuals: &PoseResiduals,
+        begin: DVector<f64>,
+        hold: &DVector<f64>,
+        gauge: &Gauge,
+        (bounds, rows): (&Bounds, &Inequalities),
+    ) -> Result<Solution, StageError> {
         let priors = self.priors();
-        let gauge = self.gauge(start);
-        let hold = -(&gauge.rows * &begin);
         let none = DVector::zeros(priors.nrows());
-        let fit = Fit::new(&residuals)
+        let fit = Fit::new(residuals)
             .with_loss(self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
-            .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: hold })?;
+            .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?;
         let settings =
             Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
         let reporter = self.progress.map(|sink| Reporter {
@@ -205,11 +242,11 @@ impl<'a> Stage<'a> {
             unknowns: self.unknowns.len(),
             poses: self.poses.len(),
         });
-        let solution = match (self.solver, reporter) {
+        Ok(match (self.solver, reporter) {
             (SolverChoice::Bounded, Some(reporter)) => {
-                solver::minimise_constrained_observed(fit, begin, &bounds, &rows, &settings, reporter)
+                solver::minimise_constrained_observed(fit, begin, bounds, rows, &settings, reporter)
             }
-            (SolverChoice::Bounded, None) => solver::minimise_constrained(fit, begin, &bounds, &rows, &settings),
+            (SolverChoice::Bounded, None) => solver::minimise_constrained(fit, begin, bounds, rows, &settings),
             (SolverChoice::GaussNewton, _) => {
                 let max_iterations = self.max_steps.min(GaussNewtonSettings::default().max_iterations);
                 let settings = GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
@@ -227,8 +264,7 @@ impl<'a> Stage<'a> {
                 solver::minimise_observed(fit, begin, &settings, reporter)
             }
             (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, None) => solver::minimise(fit, begin, &settings),
-        };
-        Ok(StageEnd { x: residuals.full(&solution.x), solution, gauge })
+        })
     }
 
     /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.

@@ -6,10 +6,12 @@ use super::active::{Held, confine};
 use super::fitting::FitEnd;
 use super::outliers::Lengths;
 use super::stage::{Stage, StageError};
-use crate::fit::{Loss, Uncertainty};
+use crate::fit::{Identifiability, Loss, Uncertainty};
 
 /// A χ² this improbable under the declared σ means that σ is understated.
 const IMPROBABLE: f64 = 1e-3;
+/// A part this large in blind combinations leaves an unknown without an error of its own.
+const PARTLY_BLIND: f64 = 1e-6;
 /// Correlations beyond this are reported.
 const STRONG: f64 = 0.9;
 
@@ -18,6 +20,8 @@ const STRONG: f64 = 0.9;
 pub(super) struct Statistics {
     /// Standard error of each unknown.
     pub errors: Vec<f64>,
+    /// Whether data and priors decide each unknown: no bound, and no part in a combination that neither of them sees.
+    pub known: Vec<bool>,
     /// Part of each unknown that the data gave, 0…1.
     pub identified: Vec<f64>,
     /// Pairs of unknowns correlated by more than 0.9, strongest first.
@@ -26,8 +30,6 @@ pub(super) struct Statistics {
     pub reduced_chi2: Option<f64>,
     /// By how much the assumed variance was raised, ≥ 1.
     pub noise_factor: f64,
-    /// Whether each unknown is held by bounds or constraints alone.
-    pub held: Vec<bool>,
     /// The constraints that hold back.
     pub constraints: Vec<Held>,
     /// Lengths of the residuals.
@@ -66,22 +68,25 @@ impl Statistics {
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
-        // What can be seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
-        let visible = stage.gauge(&end.x).visible;
+        let visible = Identifiability::of(&stage.data_triangle(&end.x)).visible;
         let identified = (0..errors.len())
             .map(|j| match priors[j] {
                 _ if held[j] => 0.0,
                 Some(sigma) => (1.0 - (errors[j] / sigma).powi(2)).clamp(0.0, 1.0),
-                None => end.gauge.visible[j].min(visible[j]),
+                None => visible[j],
             })
             .collect();
+        // What was seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
+        let seen = stage.gauge(&end.x, &held).visible;
+        let known =
+            (0..errors.len()).map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND).collect();
         Ok(Self {
             correlations: uncertainty.correlations_above(STRONG),
             errors,
+            known,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             noise_factor,
-            held,
             constraints,
             lengths,
         })
