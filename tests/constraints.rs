@@ -153,6 +153,9 @@ fn what_cannot_be_is_refused() {
 }
 
 /// `cargo test --release --test constraints -- --ignored --nocapture`
+///
+/// Limits stay near the free optimum: far from it the residual is large, and Gauss–Newton steps take hundreds of
+/// iterations with bounds and constraints alike.
 #[test]
 #[ignore = "a measurement"]
 fn cost_of_bounds() {
@@ -184,11 +187,7 @@ fn cost_of_bounds() {
         };
         let (free, result) = seconds(&text);
         println!("{data}: free {:.2} ms, {} steps", free * 1e3, result.iterations);
-        for (what, text) in [
-            ("bounds", narrow.clone()),
-            ("constraints", format!("{text}\n{rows}")),
-            ("both", format!("{narrow}\n{rows}")),
-        ] {
+        for (what, text) in [("bounds", narrow.clone()), ("constraints", format!("{text}\n{rows}"))] {
             let (time, result) = seconds(&text);
             let bounds = result.estimates.iter().filter(|estimate| estimate.at_bound.is_some()).count();
             println!(
