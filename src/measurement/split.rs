@@ -93,30 +93,41 @@ fn at_random(fraction: f64, seed: u64, problem: &Problem, measurements: &Measure
 }
 
 /// The configuration of each row, numbered in order of appearance, and how many there are.
+///
+/// A row is of an earlier one's configuration when every joint agrees with it within its step. The rows to compare with are
+/// found along one weighted sum of all joints, which differs by no more than one bin then.
 fn configurations(problem: &Problem, measurements: &Measurements) -> (Vec<usize>, usize) {
     let steps: Vec<f64> = problem
         .joints
         .iter()
         .map(|joint| if joint.kind == JointKind::Prismatic { LENGTH_STEP } else { ANGLE_STEP })
         .collect();
-    let mut numbers: HashMap<Vec<i64>, usize> = HashMap::new();
-    let mut rounded = Vec::with_capacity(steps.len());
+    // Weights without a common measure, so that unlike configurations seldom share a bin.
+    let weights: Vec<f64> = (1..=steps.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();
+    let width: f64 = weights.iter().sum();
+    let mut first_rows: HashMap<i64, Vec<(usize, usize)>> = HashMap::new();
     let mut of_row = Vec::with_capacity(measurements.len());
+    let mut count = 0;
     for row in 0..measurements.len() {
-        rounded.clear();
-        let configuration = measurements.configuration(row).iter();
-        rounded.extend(configuration.zip(&steps).map(|(q, step)| round(q / step)));
-        let next = numbers.len();
-        let number = match numbers.get(&rounded) {
-            Some(&number) => number,
-            None => *numbers.entry(rounded.clone()).or_insert(next),
+        let q = measurements.configuration(row);
+        let sum: f64 = q.iter().zip(&steps).zip(&weights).map(|((q, step), weight)| weight * q / step).sum();
+        let bin = floor(sum / width);
+        let agrees = |&&(first, _): &&(usize, usize)| {
+            let pairs = q.iter().zip(measurements.configuration(first)).zip(&steps);
+            pairs.into_iter().all(|((a, b), step)| (a - b).abs() <= *step)
         };
+        let near = (-1..=1).filter_map(|side| first_rows.get(&bin.saturating_add(side))).flatten();
+        let number = near.clone().find(agrees).map_or(count, |&(_, number)| number);
+        if number == count {
+            first_rows.entry(bin).or_default().push((row, number));
+            count += 1;
+        }
         of_row.push(number);
     }
-    (of_row, numbers.len())
+    (of_row, count)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the cast keeps to the range of i64")]
-fn round(value: f64) -> i64 {
-    value.round() as i64
+fn floor(value: f64) -> i64 {
+    value.floor() as i64
 }

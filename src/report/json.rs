@@ -186,7 +186,7 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
         fitted: (&result.fitted).into(),
         reduced_chi2: result.reduced_chi2,
         estimated_sigma_mm: match result.noise {
-            Noise::Declared => None,
+            Noise::Declared | Noise::Unknown => None,
             Noise::Estimated(sigma) => Some(sigma * 1e3),
         },
         noise_factor: result.noise_factor,

@@ -31,13 +31,9 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
 
 /// Why a fit is not to be trusted, in one line.
 pub fn why_not_trusted(result: &Identification) -> String {
-    if result.is_determined() {
-        format!("the fit is not to be trusted: {}", result.termination)
-    } else {
-        format!(
-            "the fit is not to be trusted: {} measured coordinates for {} parameters without a prior",
-            result.coordinates, result.without_prior
-        )
+    match &result.distrust {
+        Some(reason) => format!("the fit is not to be trusted: {reason}"),
+        None => "the fit is to be trusted".to_owned(),
     }
 }
 
@@ -83,6 +79,10 @@ fn noise(problem: &Problem, result: &Identification) -> String {
             "No σ is declared; the scatter about the fit gives {:.4} mm per coordinate, model errors included.\n",
             sigma * 1e3
         ),
+        (Noise::Unknown, _) => {
+            "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors.\n"
+                .to_owned()
+        }
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.\n".to_owned(),
         (Noise::Declared, Some(chi2)) if result.noise_factor > 1.0 => {
             let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({:.4} mm)", s * 1e3));

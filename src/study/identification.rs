@@ -9,6 +9,7 @@ use super::fitting::{FitEnd, Fitting};
 use super::outliers::Outlier;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
+use super::trust::{Distrust, misses, underdetermined};
 use super::{ErrorSummary, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{Identifiability, Loss};
@@ -22,6 +23,8 @@ use crate::solver::{AtBound, Termination};
 const NOISE_SETTLED: f64 = 1e-3;
 /// Fits after which the search for an undeclared σ stops.
 const MAX_NOISE_FITS: usize = 20;
+/// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding [m].
+const LEAST_NOISE: f64 = 1e-9;
 /// A parameter of which the data gave no more than this part has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;
 
@@ -78,6 +81,8 @@ pub enum Noise {
     Declared,
     /// From the scatter about the fit, 1 σ per coordinate [m].
     Estimated(f64),
+    /// Neither declared nor to be seen: the fit has no degrees of freedom.
+    Unknown,
 }
 
 /// A parameter after the fit; SI units.
@@ -111,6 +116,8 @@ pub struct Identification {
     pub solver: SolverChoice,
     /// Why it stopped.
     pub termination: Termination,
+    /// Why the fit is not to be trusted, if it is not.
+    pub distrust: Option<Distrust>,
     /// Steps tried, over all stages.
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.
@@ -130,8 +137,6 @@ pub struct Identification {
     pub noise_factor: f64,
     /// Measured coordinates that were fitted.
     pub coordinates: usize,
-    /// Fitted parameters that have no prior.
-    pub without_prior: usize,
     /// Names of the fitted parameters, in the order of `identifiability`.
     pub unknowns: Vec<String>,
     /// What the identification data can tell about them, at the registered nominal arm.
@@ -149,14 +154,9 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Whether there are as many equations as unknowns without a prior.
-    pub fn is_determined(&self) -> bool {
-        self.coordinates >= self.without_prior
-    }
-
     /// Whether the fit is to be trusted.
     pub fn is_trusted(&self) -> bool {
-        self.is_determined() && self.termination.converged()
+        self.distrust.is_none()
     }
 }
 
@@ -214,42 +214,67 @@ pub(super) fn identify_model(
     let start = fitting.registered()?;
     let registered = fitting.errors(&start);
     if !noise_is_declared {
-        fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(f64::MIN_POSITIVE);
+        fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
     }
     let mut fits = 0;
     let (mut end, statistics) = loop {
         let end = fitting.run(&start)?;
         let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared)?;
         fits += 1;
-        let factor = statistics.reduced_chi2.filter(|&chi2| chi2 > 0.0).map_or(1.0, f64::sqrt);
-        if noise_is_declared || (factor - 1.0).abs() < NOISE_SETTLED || fits == MAX_NOISE_FITS {
+        let next = fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt);
+        let next = next.max(LEAST_NOISE);
+        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
+        if noise_is_declared || settled || fits == MAX_NOISE_FITS {
             break (end, statistics);
         }
-        fitting.sigma *= factor;
+        fitting.sigma = next;
+    };
+    let noise = match statistics.reduced_chi2 {
+        _ if noise_is_declared => Noise::Declared,
+        Some(_) => Noise::Estimated(fitting.sigma),
+        None => Noise::Unknown,
     };
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     report(&mut estimates, &fitting.whole(), &end, &statistics);
+    let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+    let coordinates = 3 * split.identification.len();
+    let of = "the fit".to_owned();
+    let mut distrust = (coordinates < without_prior)
+        .then_some(Distrust::TooFewEquations { of, coordinates, unknowns: without_prior })
+        .or_else(|| underdetermined(model, &placement, &split.identification))
+        .or_else(|| (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination)));
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
+        end.iterations += late.iterations;
+        end.evaluations += late.evaluations;
+        distrust = distrust
+            .or_else(|| underdetermined(model, &placement, &fitting.late.rows))
+            .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
         report(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
         end.x = late.x;
     }
+    if noise == Noise::Unknown {
+        estimates.iter_mut().for_each(|estimate| estimate.std_error = None);
+    }
+    let fitted = fitting.errors(&end.x);
+    let distrust = distrust
+        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, fitting.sigma));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
+        distrust,
         strategy,
         solver,
         termination: end.termination,
         iterations: end.iterations,
         evaluations: end.evaluations,
-        noise: if noise_is_declared { Noise::Declared } else { Noise::Estimated(fitting.sigma) },
+        noise,
         registered,
-        fitted: fitting.errors(&end.x),
+        fitted,
         reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
         noise_factor: statistics.noise_factor,
-        coordinates: 3 * split.identification.len(),
-        without_prior: unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count(),
+        coordinates,
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),

@@ -13,6 +13,7 @@ mod registration;
 mod stage;
 mod statistics;
 mod strategy;
+mod trust;
 
 pub use active::ActiveConstraint;
 pub use baseline::Baseline;
@@ -24,3 +25,4 @@ pub use outliers::Outlier;
 pub use placement::Placement;
 pub use stage::{Progress, ProgressSink, StageError};
 pub use strategy::{SolverChoice, Strategy};
+pub use trust::Distrust;

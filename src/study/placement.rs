@@ -29,6 +29,16 @@ impl Placement {
         }
     }
 
+    /// Base of a row.
+    pub fn base_of(&self, row: usize) -> usize {
+        self.base_of_row[row]
+    }
+
+    /// Target of a row.
+    pub fn target_of(&self, row: usize) -> usize {
+        self.target_of_row[row]
+    }
+
     /// Rows as poses; `sigma` [m] is that of rows without one of their own.
     pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
         let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);

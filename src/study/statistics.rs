@@ -11,7 +11,7 @@ use crate::fit::{Identifiability, Loss, Uncertainty};
 /// A χ² this improbable under the declared σ means that σ is understated.
 const IMPROBABLE: f64 = 1e-3;
 /// A part this large in blind combinations leaves an unknown without an error of its own.
-const PARTLY_BLIND: f64 = 1e-6;
+const PARTLY_BLIND: f64 = 1e-3;
 /// Correlations beyond this are reported.
 const STRONG: f64 = 0.9;
 

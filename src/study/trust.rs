@@ -1,0 +1,99 @@
+//! When a fit is not to be trusted.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use super::{ErrorSummary, Placement};
+use crate::measurement::Measurements;
+use crate::model::Model;
+use crate::parameter::Slot;
+use crate::solver::Termination;
+
+/// A fitted arm that misses the measurements by this part of their spread describes another arm.
+const MISSES: f64 = 0.02;
+/// … unless the declared noise is of that size: in units of 1 σ of a position.
+const BEYOND_NOISE: f64 = 100.0;
+
+/// Why a fit is not to be trusted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Distrust {
+    /// Fewer equations than unknowns without a prior.
+    TooFewEquations {
+        /// What the unknowns belong to: the whole fit, or a base or tool.
+        of: String,
+        /// Measured coordinates.
+        coordinates: usize,
+        /// Unknowns without a prior.
+        unknowns: usize,
+    },
+    /// The fit did not converge.
+    NotConverged(Termination),
+    /// The fit of bases and targets of held-out sessions did not converge.
+    HeldOutNotConverged(Termination),
+    /// The fitted arm is far from the measurements.
+    Misses {
+        /// Root mean squared error on the identification poses [m].
+        rms: f64,
+        /// Root mean squared distance of the measured points from their centre [m].
+        spread: f64,
+    },
+}
+
+impl fmt::Display for Distrust {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFewEquations { of, coordinates, unknowns } => {
+                write!(f, "{of}: {coordinates} measured coordinates for {unknowns} parameters without a prior")
+            }
+            Self::NotConverged(termination) => write!(f, "{termination}"),
+            Self::HeldOutNotConverged(termination) => write!(f, "the bases of held-out sessions: {termination}"),
+            Self::Misses { rms, spread } => write!(
+                f,
+                "the fitted arm misses the measurements by {:.1} mm, {:.0} % of their spread; check units, signs of \
+                 joints, and whether base and session are declared",
+                rms * 1e3,
+                100.0 * rms / spread
+            ),
+        }
+    }
+}
+
+/// A base or target with fewer measured coordinates in `rows` than parameters of its own without a prior.
+pub(super) fn underdetermined(model: &Model, placement: &Placement, rows: &[usize]) -> Option<Distrust> {
+    let check = |name: &str, of_row: &dyn Fn(usize) -> usize, index: usize, own: &dyn Fn(Slot) -> bool| {
+        let coordinates = 3 * rows.iter().filter(|&&row| of_row(row) == index).count();
+        let unknowns = model.parameters.iter().filter(|p| p.sigma.is_none() && own(p.slot)).count();
+        let of = name.to_owned();
+        (0 < coordinates && coordinates < unknowns).then_some(Distrust::TooFewEquations { of, coordinates, unknowns })
+    };
+    let base = |b: usize| {
+        let own = |slot| matches!(slot, Slot::Base { base, .. } if base == b);
+        check(&format!("base[{}]", placement.bases[b]), &|row| placement.base_of(row), b, &own)
+    };
+    let target = |t: usize| {
+        let own = |slot| matches!(slot, Slot::Target { target, .. } if target == t);
+        check(&format!("tool[{}]", placement.targets[t]), &|row| placement.target_of(row), t, &own)
+    };
+    let bases = (0..placement.bases.len()).find_map(base);
+    bases.or_else(|| (0..placement.targets.len()).find_map(target))
+}
+
+/// Whether the fitted arm is far from what was measured in `rows`; `sigma` [m] is that of a coordinate.
+pub(super) fn misses(
+    measurements: &Measurements,
+    placement: &Placement,
+    rows: &[usize],
+    fitted: &ErrorSummary,
+    sigma: f64,
+) -> Option<Distrust> {
+    let mut squares = 0.0;
+    for base in 0..placement.bases.len() {
+        let own = || rows.iter().filter(|&&row| placement.base_of(row) == base).map(|&row| measurements.positions[row]);
+        let centre = own().sum::<Vector3<f64>>() / own().count().max(1) as f64;
+        squares += own().map(|position| (position - centre).norm_squared()).sum::<f64>();
+    }
+    let spread = (squares / rows.len().max(1) as f64).sqrt();
+    let rms = fitted.rms.norm;
+    (rms > MISSES * spread && rms > BEYOND_NOISE * sigma).then_some(Distrust::Misses { rms, spread })
+}
