@@ -63,7 +63,7 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     let bench = Bench::new();
     let assert = bench.identify(&[]).success();
     let out = text(&assert.get_output().stdout);
-    for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "Rank 31 of 32", "estimate.json"] {
+    for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "rank 31 of 32", "estimate.json"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
     let json: Value =

@@ -268,3 +268,29 @@ fn a_column_split_is_used_where_nothing_is_said() {
     assert!(warnings.is_empty());
     assert_eq!(Split::new(&problem, &measurements).unwrap().held_out, [1]);
 }
+
+#[test]
+fn rows_of_one_configuration_stay_together_across_rounding() {
+    let problem = Problem::parse(
+        "name = 'arm'\n[[joint]]\na_m = 1\n[data]\nfiles = ['rows.csv']\nheld_out = { fraction = 0.5, seed = 3 }\n",
+        Path::new("problem.toml"),
+    )
+    .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rows.csv");
+    // Forty configurations, each twice, 0.002° apart on either side of a multiple of 0.005°.
+    let mut text = "q1_deg,x_mm,y_mm,z_mm\n".to_owned();
+    for k in 0..40 {
+        let centre = f64::from(k) + 0.005;
+        for q in [centre - 0.001, centre + 0.001] {
+            text += &[q.to_string(), ",0,0,0\n".to_owned()].concat();
+        }
+    }
+    fs::write(&file, text).unwrap();
+    let rows = Measurements::read(&[file], &problem).unwrap().0;
+    let split = Split::new(&problem, &rows).unwrap();
+    assert_eq!(split.held_out.len(), 40);
+    for pair in 0..40 {
+        assert_eq!(split.held_out.contains(&(2 * pair)), split.held_out.contains(&(2 * pair + 1)), "pair {pair}");
+    }
+}

@@ -389,3 +389,22 @@ fn a_pose_without_equilibrium_has_no_residual() {
     let jacobian = flexcal::fit::jacobian(&residuals, &x);
     assert_eq!(jacobian.shape(), (9, x.len()));
 }
+
+#[test]
+fn an_arm_that_its_hoist_balances_comes_to_rest() {
+    let problem = parse(
+        "name = 'balanced'\n[[joint]]\nd_mm = 300\n[[joint]]\nalpha_deg = 90\nstiffness_N_m_per_rad = 1000\n[[joint]]\n\
+         a_m = 1\nstiffness_N_m_per_rad = 1000\n[joint.beam]\nname = 'A'\nmass_kg = 4\nEIy_N_m2 = 1000\nEIz_N_m2 = 1000\n\
+         [joint.beam.hoist]\nat_mm = [500, 0, 0]\nforce_N = 39.2266\n[[joint]]\na_m = 0.5\n",
+    );
+    let arm = Arm::nominal(&problem);
+    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    for step in -80..80 {
+        for hoist in [39.2266, 39.227, 39.2] {
+            let angle = f64::from(step) * 0.017;
+            let configuration = [0.3, angle, -0.7 * angle, 0.2];
+            let setup = Setup { configuration: &configuration, payload: None, hoist: Some(hoist) };
+            arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
+        }
+    }
+}

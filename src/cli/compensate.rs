@@ -34,12 +34,14 @@ pub struct Arguments {
 
 #[derive(Debug, Deserialize)]
 struct Estimates {
+    problem: String,
     parameters: Vec<Estimated>,
 }
 
 #[derive(Debug, Deserialize)]
 struct Estimated {
     name: String,
+    nominal: f64,
     estimate: f64,
 }
 
@@ -52,6 +54,10 @@ enum EstimateError {
     Syntax { file: PathBuf, source: serde_json::Error },
     #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
     Missing { file: PathBuf, name: String },
+    #[error("{}: identifies problem {found}, not {expected}", file.display())]
+    OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
+    OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
     #[error("no targets; name them with --data")]
     NoTargets,
 }
@@ -71,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let placement = study::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
-    let values = read(&arguments.estimate)?;
+    let values = read(&arguments.estimate, &problem, &model)?;
     let x = model
         .vector_of(|name| values.get(name).copied())
         .map_err(|name| EstimateError::Missing { file: arguments.estimate.clone(), name })?;
@@ -88,10 +94,26 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if all { Outcome::Done } else { Outcome::NotTrusted })
 }
 
-fn read(file: &Path) -> Result<HashMap<String, f64>, EstimateError> {
-    let text =
-        fs::read_to_string(file).map_err(|source| EstimateError::Unreadable { file: file.to_owned(), source })?;
-    let estimates: Estimates =
-        serde_json::from_str(&text).map_err(|source| EstimateError::Syntax { file: file.to_owned(), source })?;
+/// Estimates by name, once they are known to be of this problem.
+fn read(file: &Path, problem: &Problem, model: &Model) -> Result<HashMap<String, f64>, EstimateError> {
+    let file = file.to_owned();
+    let text = match fs::read_to_string(&file) {
+        Ok(text) => text,
+        Err(source) => return Err(EstimateError::Unreadable { file, source }),
+    };
+    let estimates: Estimates = match serde_json::from_str(&text) {
+        Ok(estimates) => estimates,
+        Err(source) => return Err(EstimateError::Syntax { file, source }),
+    };
+    if estimates.problem != problem.name {
+        return Err(EstimateError::OtherProblem { file, found: estimates.problem, expected: problem.name.clone() });
+    }
+    for entry in &estimates.parameters {
+        let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name) else { continue };
+        if (own.nominal - entry.nominal).abs() > 1e-9 * own.nominal.abs().max(1.0) {
+            let (name, found, expected) = (entry.name.clone(), entry.nominal, own.nominal);
+            return Err(EstimateError::OtherNominal { file, name, found, expected });
+        }
+    }
     Ok(estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect())
 }

@@ -33,6 +33,8 @@ enum StrategyArgument {
     Joint,
     /// Stiffness, then geometry, repeated until it settles
     Sequential,
+    /// Stiffness, then geometry, once: the paper's order
+    SequentialOneSweep,
     /// Geometry; stiffnesses stay nominal
     GeometryOnly,
     /// Stiffnesses; geometry stays nominal
@@ -58,6 +60,7 @@ impl From<StrategyArgument> for Strategy {
         match argument {
             StrategyArgument::Joint => Self::Joint,
             StrategyArgument::Sequential => Self::Sequential,
+            StrategyArgument::SequentialOneSweep => Self::OneSweep,
             StrategyArgument::GeometryOnly => Self::GeometryOnly,
             StrategyArgument::StiffnessOnly => Self::StiffnessOnly,
         }

@@ -23,8 +23,8 @@ pub struct Common {
     /// Print the result as JSON on standard output, and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Print nothing but errors
-    #[arg(long, conflicts_with = "json")]
+    /// Print nothing but errors (and the JSON, where it is asked for)
+    #[arg(long)]
     pub quiet: bool,
 }
 

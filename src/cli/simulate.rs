@@ -57,12 +57,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn summary(simulation: &Simulation, problem: &Path, table: &Path) -> String {
     let (poses, held_out) = (simulation.rows.len(), simulation.held_out());
     let (identify, sigma) = (poses - held_out, simulation.truth.noise_sigma * 1e3);
-    let (problem, table) = (problem.display(), table.display());
+    let folder = table.parent().unwrap_or(table).join("identified");
+    let (problem, table, folder) = (problem.display(), table.display(), folder.display());
     format!(
         "{poses} poses: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
          Effects: {effects}\n\n\
          Written to {table}, what is true to truth.json beside it\n\
-         Next: flexcal identify {problem} --data {table}\n",
+         Next: flexcal identify {problem} --data {table} --out {folder}\n",
         effects = match simulation.effect_names().join(", ") {
             none if none.is_empty() => "none".to_owned(),
             names => names,

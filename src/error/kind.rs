@@ -20,6 +20,8 @@ pub enum InputErrorKind {
     TruthMissing,
     #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
     DataFileMissing { path: PathBuf },
+    #[error("no such file; paths on the command line are relative to the current folder")]
+    GivenFileMissing,
     #[error("cannot be read: {source}")]
     Unreadable { source: io::Error },
     #[error("not UTF-8 text; save the file as UTF-8")]
@@ -108,10 +110,6 @@ pub enum InputErrorKind {
     FixedAndMore { other: String },
     #[error("min {min} is above max {max} (in SI units)")]
     MinAboveMax { min: f64, max: f64 },
-    #[error("bounds hold the nominal value, at {nominal}: a min is not above it")]
-    MinAboveNominal { nominal: f64 },
-    #[error("bounds hold the nominal value, at {nominal}: a max is not below it")]
-    MaxBelowNominal { nominal: f64 },
 
     #[error("the pattern matches no parameter of this arm; {}", list("they are", known, "it has none"))]
     MatchesNothing { known: Vec<String> },

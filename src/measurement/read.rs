@@ -45,10 +45,12 @@ impl Measurements {
 
 /// The error of a file that is not there: at the line that names it, if the problem does.
 fn missing(file: &Path, problem: &Problem) -> InputError {
-    let path = file.to_owned();
-    let named = problem.data.files.iter().any(|known| known == file);
-    let location = if named { problem.data.files_location.clone() } else { Location::file(file) };
-    location.error(InputErrorKind::DataFileMissing { path })
+    if problem.data.files.iter().any(|known| known == file) {
+        let kind = InputErrorKind::DataFileMissing { path: file.to_owned() };
+        problem.data.files_location.clone().error(kind)
+    } else {
+        Location::file(file).error(InputErrorKind::GivenFileMissing)
+    }
 }
 
 /// Words of a column as they come.

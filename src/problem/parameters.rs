@@ -100,16 +100,9 @@ fn check(
     {
         return Err(item.error(InputErrorKind::MinAboveMax { min: *min, max: *max }));
     }
-    if let Some((min, item)) = min {
-        if nominal > 0.0 && *min <= 0.0 {
-            return Err(item.error(InputErrorKind::NotPositive { value: *min }));
-        }
-        if *min > nominal {
-            return Err(item.error(InputErrorKind::MinAboveNominal { nominal }));
-        }
-    }
-    if let Some((_, item)) = max.filter(|(max, _)| *max < nominal) {
-        return Err(item.error(InputErrorKind::MaxBelowNominal { nominal }));
+    // A ratio to the nominal value is positive; its logarithm is what has bounds.
+    if let Some((value, item)) = min.into_iter().chain(max).find(|(value, _)| nominal > 0.0 && *value <= 0.0) {
+        return Err(item.error(InputErrorKind::NotPositive { value: *value }));
     }
     Ok(())
 }

@@ -1,10 +1,12 @@
 //! Commands of `compensate`, as a table to run and as JSON.
 
+use std::fmt::Write as _;
+
 use serde::Serialize;
 
 use super::json::to_text;
 use super::quantity::number;
-use crate::measurement::Measurements;
+use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, Problem};
 use crate::study::Command;
 
@@ -14,13 +16,14 @@ struct Document<'a> {
     targets: usize,
     reached: usize,
     /// Over the targets that can be reached, as the model expects it.
-    mean_miss_before_mm: f64,
-    mean_miss_mm: f64,
+    mean_miss_before_mm: Option<f64>,
+    mean_miss_mm: Option<f64>,
     /// Rows of the targets that cannot be reached, counted from 1.
     unreached: Vec<usize>,
 }
 
-/// Commands as CSV: q of every moving joint, the desired position, and how far from it the model expects the arm.
+/// Commands as CSV: q of every moving joint (empty where the target is out of reach), the desired position with what was
+/// set, and how far from it the model expects the arm.
 pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
     let joints: Vec<(usize, &str, f64)> = problem
         .joints
@@ -33,18 +36,35 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         })
         .collect();
     let mut lines: Vec<String> = Vec::with_capacity(commands.len() + 1);
-    let header = joints.iter().map(|(j, unit, _)| format!("q{}_{unit}", j + 1));
-    let rest = ["x_mm", "y_mm", "z_mm", "miss_mm", "miss_before_mm", "reached"].map(str::to_owned);
-    lines.push(header.chain(rest).collect::<Vec<_>>().join(","));
+    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| number(values[row], 4));
+    let word = |labels: &Labels, row: usize| labels.names[labels.of_row[row]].clone();
+    let has_sessions = targets.session.names.iter().any(|name| !name.is_empty());
+    let mut header: Vec<String> = joints.iter().map(|(j, unit, _)| format!("q{}_{unit}", j + 1)).collect();
+    let optional = [
+        ("session", has_sessions),
+        ("target", targets.target.is_some()),
+        ("payload_kg", targets.payload.is_some()),
+        ("hoist_N", targets.hoist.is_some()),
+    ];
+    header.extend(["x_mm", "y_mm", "z_mm"].map(str::to_owned));
+    header.extend(optional.iter().filter(|(_, there)| *there).map(|(name, _)| (*name).to_owned()));
+    header.extend(["miss_mm", "miss_before_mm", "reached"].map(str::to_owned));
+    lines.push(header.join(","));
     for command in commands {
-        let q = joints.iter().map(|&(j, _, factor)| number(command.configuration[j] * factor, 7));
-        let at = targets.positions[command.row].iter().map(|x| number(x * 1e3, 4)).collect::<Vec<_>>();
-        let end = [
-            number(command.miss.norm() * 1e3, 4),
-            number(command.seed_miss * 1e3, 4),
-            command.is_reached().to_string(),
-        ];
-        lines.push(q.chain(at).chain(end).collect::<Vec<_>>().join(","));
+        let row = command.row;
+        // A controller must not be given a command that does not lead there.
+        let show = |value: String| if command.is_reached() { value } else { String::new() };
+        let mut cells: Vec<String> =
+            joints.iter().map(|&(j, _, factor)| show(number(command.configuration[j] * factor, 7))).collect();
+        cells.extend(targets.positions[row].iter().map(|x| number(x * 1e3, 4)));
+        cells.extend(has_sessions.then(|| word(&targets.session, row)));
+        cells.extend(targets.target.as_ref().map(|labels| word(labels, row)));
+        cells.extend(value(&targets.payload, row));
+        cells.extend(value(&targets.hoist, row));
+        cells.push(number(command.miss.norm() * 1e3, 4));
+        cells.push(number(command.seed_miss * 1e3, 4));
+        cells.push(command.is_reached().to_string());
+        lines.push(cells.join(","));
     }
     lines.join("\n") + "\n"
 }
@@ -57,10 +77,15 @@ pub fn commands_json(problem: &Problem, commands: &[Command]) -> String {
 /// What came of it, in words; targets that cannot be reached are named by file and line.
 pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
     let document = document(problem, commands);
-    let mut text = format!(
-        "{}\n{} of {} targets can be reached: {:.4} mm from them on average with these commands, {:.4} mm with those in the file,\nas the identified arm predicts\n",
-        problem.title, document.reached, document.targets, document.mean_miss_mm, document.mean_miss_before_mm
-    );
+    let mut text = format!("{}\n{} of {} targets can be reached", problem.title, document.reached, document.targets);
+    if let (Some(after), Some(before)) = (document.mean_miss_mm, document.mean_miss_before_mm) {
+        let _ = write!(
+            text,
+            ": {after:.4} mm from them on average with these commands, {before:.4} mm with those in the file,\n\
+             as the identified arm predicts"
+        );
+    }
+    text.push('\n');
     for command in commands.iter().filter(|command| !command.is_reached()) {
         let place = targets.location(command.row);
         text.push_str("  out of reach: ");
@@ -75,7 +100,8 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
 fn document<'a>(problem: &'a Problem, commands: &[Command]) -> Document<'a> {
     let reached: Vec<&Command> = commands.iter().filter(|command| command.is_reached()).collect();
     let mean = |of: &dyn Fn(&Command) -> f64| {
-        reached.iter().map(|command| of(command)).sum::<f64>() / reached.len().max(1) as f64 * 1e3
+        let sum: f64 = reached.iter().map(|command| of(command)).sum();
+        (!reached.is_empty()).then(|| sum / reached.len() as f64 * 1e3)
     };
     Document {
         problem: &problem.name,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::quantity::{Display, decimals, number, table};
 use crate::fit::BlindCombination;
+use crate::parameter::Unit;
 use crate::solver::AtBound;
 use crate::study::{Estimate, Identification};
 
@@ -37,7 +38,11 @@ pub(super) fn parameter_table(result: &Identification) -> String {
             ]
         })
         .collect();
-    table(&["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"], rows, &[0, 5, 6])
+    let header = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
+    let text = table(&header, rows, &[0, 5, 6]);
+    format!(
+        "{text}  identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations\n"
+    )
 }
 
 /// How well a parameter is identified, in a word and a share.
@@ -48,6 +53,7 @@ fn verdict(estimate: &Estimate) -> String {
         (Some(AtBound::Upper), _) => "at its upper bound".to_owned(),
         (None, false) => "not fitted".to_owned(),
         (None, true) => match estimate.identified {
+            part if part > 0.9 && is_vague(estimate) => format!("{share}  but vaguely"),
             part if part > 0.9 => format!("{share}  well"),
             part if part > 0.1 => format!("{share}  in part"),
             part if part > 1e-6 => format!("{share}  hardly"),
@@ -56,14 +62,24 @@ fn verdict(estimate: &Estimate) -> String {
     }
 }
 
+/// Whether the standard error is larger than any calibration would accept: 1°, 10 mm, or half the value of a stiffness.
+fn is_vague(estimate: &Estimate) -> bool {
+    let limit = match estimate.unit {
+        Unit::Angle => 1.0_f64.to_radians(),
+        Unit::Length => 0.01,
+        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => 0.5 * estimate.estimate,
+    };
+    estimate.std_error.is_none_or(|error| error > limit)
+}
+
 /// The combinations that no measurement sees, in words.
 pub(super) fn blind_text(result: &Identification) -> String {
     let blind = &result.identifiability.blind;
     if blind.is_empty() {
-        return "The data see every combination of the parameters.\n".to_owned();
+        return "The data see every combination of the parameters there.\n".to_owned();
     }
     let mut text = format!(
-        "{} of {} combinations cannot be seen in these data (their parameters can change together in these\n\
+        "{} of {} combinations cannot be seen there (their parameters can change together in these\n\
          proportions, each scaled by its effect, and no predicted position moves):\n",
         blind.len(),
         result.unknowns.len()
@@ -92,12 +108,18 @@ fn words(combination: &BlindCombination, result: &Identification) -> String {
 
 /// Pairs of parameters that go together.
 pub(super) fn correlation_text(result: &Identification) -> String {
-    let pairs = &result.correlations;
+    // What one blind combination ties together is told above.
+    let tied = |a: &str, b: &str| {
+        let holds =
+            |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| result.unknowns[k] == name);
+        result.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
+    };
+    let pairs: Vec<_> = result.correlations.iter().filter(|(a, b, _)| !tied(a, b)).collect();
     if pairs.is_empty() {
-        return "No two parameters are correlated by more than 0.9.\n".to_owned();
+        return "No two other parameters are correlated by more than 0.9.\n".to_owned();
     }
     let mut text = "Correlated by more than 0.9 (their sum or difference is known better than each):\n".to_owned();
-    for (a, b, correlation) in pairs.iter().take(SHOWN_CORRELATIONS) {
+    for (a, b, correlation) in pairs.iter().copied().take(SHOWN_CORRELATIONS) {
         let sign = if *correlation < 0.0 { '−' } else { '+' };
         let _ = writeln!(text, "  {a} and {b}: {sign}{:.3}", correlation.abs());
     }

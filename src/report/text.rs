@@ -139,7 +139,7 @@ fn conditioning(result: &Identification) -> String {
     let found = &result.identifiability;
     let [o1, o2, o3, o4, o5] = found.observability(result.coordinates);
     format!(
-        "Rank {} of {}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}\n",
+        "At the nominal arm: rank {} of {}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}\n",
         found.rank,
         result.unknowns.len(),
         found.condition_number(),

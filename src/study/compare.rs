@@ -26,7 +26,8 @@ pub struct Comparison {
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// Strategies that have nothing to vary are left out, and so are solvers that cannot keep bounds where there are any.
+/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds where there are any, the bounded one
+/// where there are none, and ablations of an arm without elasticity.
 ///
 /// # Errors
 /// Problem and data do not fit each other.
@@ -43,7 +44,7 @@ pub fn compare(
         identify_model(model, problem, measurements, split, &options)
     };
     let bounded = model.parameters.iter().any(Parameter::is_bounded);
-    let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
+    let solvers = SolverChoice::EACH.iter().filter(|&&solver| bounded == (solver == SolverChoice::Bounded));
     let mut strategies = Vec::new();
     for strategy in Strategy::EACH {
         for &solver in solvers.clone() {
@@ -54,8 +55,9 @@ pub fn compare(
             }
         }
     }
+    let elastic = model.parameters.iter().any(|parameter| parameter.slot.is_elastic());
     let mut ablations = Vec::new();
-    for ablation in Ablation::EACH {
+    for ablation in Ablation::EACH.into_iter().filter(|&ablation| elastic || ablation == Ablation::All) {
         let identification = run(&model.ablated(ablation), Strategy::Joint, SolverChoice::Auto)?;
         ablations.push((ablation, identification));
     }

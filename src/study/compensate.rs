@@ -44,7 +44,7 @@ impl Command {
 /// redundancy resolved towards the seed.
 ///
 /// # Errors
-/// A seed lies outside the joint limits so far that no configuration is left (limits that exclude each other).
+/// The limits of a joint exclude each other.
 pub fn compensate(
     problem: &Problem,
     model: &Model,
@@ -57,7 +57,8 @@ pub fn compensate(
     let unknowns: Vec<usize> = (0..arm.parameters.len()).collect();
     let moving = arm.moving_joints();
     let mut commands = Vec::with_capacity(rows.len());
-    for (row, pose) in placement.poses(targets, &rows, POSITION_WEIGHT).into_iter().enumerate() {
+    for (row, mut pose) in placement.poses(targets, &rows, POSITION_WEIGHT).into_iter().enumerate() {
+        pose.sigma = POSITION_WEIGHT;
         let seed = targets.configuration(row);
         let bound = |pick: fn((f64, f64)) -> f64| {
             DVector::from_iterator(moving.len(), moving.iter().map(|&j| pick(problem.joints[j].limits) - seed[j]))

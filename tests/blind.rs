@@ -1,0 +1,114 @@
+//! What data cannot see: held while it cannot, let go once it can, and never passed off as known.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod common;
+
+use common::arms::{measured as read, parse, path};
+use common::made::{at_random, labels, measure, model_of, split_at};
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::study::{Distrust, Estimate, Identification, Options, Strategy, identify};
+use nalgebra::DVector;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+const SIGMA: f64 = 5e-5;
+
+/// Two parallel axes, whose offsets along them the nominal arm cannot tell apart.
+fn parallel(free: &str) -> Problem {
+    parse(&format!(
+        "name = 'parallel'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\nd_m = 0.1\n[[joint]]\na_m = 0.5\nd_m = 0.05\n\
+         [tool]\ntarget_m = [0.1, 0.02, -0.03]\n[parameters]\n{free}\n[data]\nposition_sigma_mm = 0.05\n"
+    ))
+}
+
+fn estimate<'a>(found: &'a Identification, name: &str) -> &'a Estimate {
+    found.estimates.iter().find(|estimate| estimate.name == name).unwrap()
+}
+
+/// Ninety noisy poses of the arm with these deviations, sixty of them to identify.
+fn measured(problem: &Problem, truth: &[(&str, f64)]) -> (Measurements, Split) {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut rows = at_random(problem, 90, 2.0, &mut rng);
+    let parameters = model_of(problem, &rows).parameters;
+    let deviation = |name: &str| truth.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, x)| *x);
+    let x = DVector::from_iterator(parameters.len(), parameters.iter().map(|p| deviation(&p.name)));
+    measure(problem, &mut rows, &x, SIGMA, &mut rng);
+    let split = split_at(60, &rows);
+    (rows, split)
+}
+
+#[test]
+fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
+    let free = "'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.alpha' = { free = true }";
+    let problem = parallel(free);
+    let truth = [("joint2.d", 0.02), ("joint3.d", -0.02), ("joint3.alpha", 2.0_f64.to_radians())];
+    let (rows, split) = measured(&problem, &truth);
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    assert_eq!(found.identifiability.rank, 2);
+    assert!(found.is_trusted() && found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
+    for (name, deviation) in truth {
+        let estimate = estimate(&found, name);
+        let miss = estimate.estimate - estimate.nominal - deviation;
+        assert!(miss.abs() < 4.0 * estimate.std_error.unwrap(), "{name}: {miss:e} {estimate:?}");
+    }
+}
+
+#[test]
+fn a_bound_that_cuts_a_blind_combination_leaves_the_rest_of_it_free() {
+    let problem = parallel("'joint2.d' = { min_mm = -0.5, max_mm = 0.5 }\n'joint3.d' = { free = true }");
+    let (rows, split) = measured(&problem, &[("joint2.d", 0.0005), ("joint3.d", 0.0035)]);
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    assert!(found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
+    let sum: f64 =
+        ["joint2.d", "joint3.d"].iter().map(|name| estimate(&found, name)).map(|e| e.estimate - e.nominal).sum();
+    assert!((sum - 0.004).abs() < 5.0 * SIGMA / 60.0_f64.sqrt(), "{sum}");
+    if let Some(error) = estimate(&found, "joint3.d").std_error {
+        assert!(error > 0.1 * SIGMA / 60.0_f64.sqrt(), "± {error:e}");
+    }
+}
+
+#[test]
+fn parameters_of_a_blind_combination_have_no_error_of_their_own() {
+    let problem = parallel("'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.a' = { free = true }");
+    let (rows, split) = measured(&problem, &[("joint2.d", 0.001)]);
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    for name in ["joint2.d", "joint3.d"] {
+        let estimate = estimate(&found, name);
+        assert!(estimate.std_error.is_none() && (estimate.identified - 0.5).abs() < 1e-6, "{estimate:?}");
+    }
+    assert!(estimate(&found, "joint3.a").std_error.unwrap() < SIGMA);
+}
+
+#[test]
+fn a_session_with_too_few_poses_is_not_trusted() {
+    let problem = parallel("'joint3.a' = { free = true }\n'base.*' = { free = true }");
+    let (mut rows, split) = measured(&problem, &[("joint3.a", 0.001)]);
+    rows.session = labels((0..90).map(|row| if row == 75 { "B" } else { "A" }));
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let expected = Distrust::TooFewEquations { of: "base[B]".to_owned(), coordinates: 3, unknowns: 6 };
+    assert_eq!(found.distrust, Some(expected));
+}
+
+#[test]
+fn an_arm_that_misses_is_not_trusted() {
+    let problem = parallel("'joint3.a' = { sigma_mm = 5 }\n'joint3.theta' = { sigma_deg = 1 }");
+    let (mut rows, split) = measured(&problem, &[("joint3.a", 0.001)]);
+    for q in rows.configurations.iter_mut().skip(1).step_by(3) {
+        *q = -*q;
+    }
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    assert!(matches!(found.distrust, Some(Distrust::Misses { .. })), "{:?}", found.distrust);
+}
+
+#[test]
+fn stage_by_stage_settles_on_two_hundred_poses() {
+    let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
+    let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
+    let split = Split::new(&problem, &rows).unwrap();
+    let options = Options { strategy: Strategy::Sequential, ..Options::default() };
+    let found = identify(&problem, &rows, &split, &options).unwrap();
+    assert!(found.is_trusted());
+    assert!(found.fitted.identification.rms.norm < 0.0865e-3, "{}", found.fitted.identification.rms.norm);
+}
