@@ -26,8 +26,8 @@ pub struct Comparison {
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds where there are any, the bounded one
-/// where there are none, and ablations of an arm without elasticity.
+/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds where there are any, and ablations of
+/// an arm without elasticity.
 ///
 /// # Errors
 /// Problem and data do not fit each other.
@@ -44,7 +44,7 @@ pub fn compare(
         identify_model(model, problem, measurements, split, &options)
     };
     let bounded = model.parameters.iter().any(Parameter::is_bounded);
-    let solvers = SolverChoice::EACH.iter().filter(|&&solver| bounded == (solver == SolverChoice::Bounded));
+    let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
     let mut strategies = Vec::new();
     for strategy in Strategy::EACH {
         for &solver in solvers.clone() {
