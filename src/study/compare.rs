@@ -6,7 +6,6 @@ use super::{Identification, IdentifyError, Options, Placement, ProgressSink, Sol
 use crate::measurement::{Measurements, Split};
 use crate::model::{Ablation, Model};
 use crate::paper::Form;
-use crate::parameter::Parameter;
 use crate::problem::Problem;
 
 /// Strategies and solvers side by side.
@@ -26,7 +25,7 @@ pub struct Comparison {
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds where there are any, and ablations of
+/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds or constraints where there are any, and ablations of
 /// an arm without elasticity.
 ///
 /// # Errors
@@ -43,7 +42,7 @@ pub fn compare(
         let options = Options { strategy, solver, progress: progress.cloned() };
         identify_model(model, problem, measurements, split, &options)
     };
-    let bounded = model.parameters.iter().any(Parameter::is_bounded);
+    let bounded = model.is_bounded();
     let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
     let mut strategies = Vec::new();
     for strategy in Strategy::EACH {
