@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::arms::{measured as read, parse, path};
+use common::arms::{measured as read, parse, path, with_parameters};
 use common::made::{at_random, labels, measure, model_of, split_at};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
@@ -111,4 +111,14 @@ fn stage_by_stage_settles_on_two_hundred_poses() {
     let found = identify(&problem, &rows, &split, &options).unwrap();
     assert!(found.is_trusted());
     assert!(found.fitted.identification.rms.norm < 0.0865e-3, "{}", found.fitted.identification.rms.norm);
+}
+
+#[test]
+fn everything_free_and_no_prior_converges() {
+    let problem = with_parameters("tests/cases/problem.toml", "'joint*' = { free = true }\n'tool.*' = { free = true }");
+    let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
+    let split = Split::new(&problem, &rows).unwrap();
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    assert!(found.is_trusted() && found.identifiability.rank < found.unknowns.len());
+    assert!(found.fitted.held_out.rms.norm < 0.2e-3);
 }
