@@ -122,3 +122,36 @@ fn everything_free_and_no_prior_converges() {
     assert!(found.is_trusted() && found.identifiability.rank < found.unknowns.len());
     assert!(found.fitted.held_out.rms.norm < 0.2e-3);
 }
+
+#[test]
+fn a_constraint_that_cuts_a_blind_combination_does_what_the_bound_does() {
+    let free = "'joint2.d' = { free = true }\n'joint3.d' = { free = true }";
+    let bounded = parallel("'joint2.d' = { min_mm = 2 }\n'joint3.d' = { free = true }");
+    let constraint = "[[constraint]]\nterms = { 'joint2.d' = 1.0 }\nat_least_mm = 102";
+    let constrained = parallel(&format!("{free}\n{constraint}"));
+    let (rows, split) = measured(&parallel(free), &[("joint2.d", -0.003)]);
+    let find = |problem: &Problem| identify(problem, &rows, &split, &Options::default()).unwrap();
+    let (by_bound, by_constraint) = (find(&bounded), find(&constrained));
+    assert!(by_constraint.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", by_constraint.reduced_chi2);
+    assert!((&by_bound.x - &by_constraint.x).amax() < 1e-8);
+}
+
+#[test]
+fn base_and_tool_of_a_held_out_session_count_together() {
+    let problem = parallel("'joint3.a' = { free = true }\n'base.*' = { free = true }\n'tool.*' = { free = true }");
+    let (mut rows, split) = measured(&problem, &[]);
+    rows.session = labels((0..90).map(|row| if row >= 88 { "B" } else { "A" }));
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let expected = Distrust::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 9 };
+    assert_eq!(found.distrust, Some(expected));
+}
+
+#[test]
+fn two_points_do_not_turn_a_base() {
+    let problem = parallel("'base.*' = { free = true }");
+    let (rows, _) = measured(&problem, &[]);
+    let split = split_at(2, &rows);
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let turned: f64 = ["base.rx", "base.ry", "base.rz"].iter().map(|name| estimate(&found, name).estimate.abs()).sum();
+    assert!(turned < 0.01 && !found.identifiability.blind.is_empty(), "{turned} rad");
+}

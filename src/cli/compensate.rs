@@ -35,6 +35,7 @@ pub struct Arguments {
 #[derive(Debug, Deserialize)]
 struct Estimates {
     problem: String,
+    trusted: bool,
     parameters: Vec<Estimated>,
 }
 
@@ -58,6 +59,8 @@ enum EstimateError {
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
+    #[error("{}: {name} was identified, but is not free in the problem; identify again", file.display())]
+    NotFree { file: PathBuf, name: String },
     #[error("no targets; name them with --data")]
     NoTargets,
 }
@@ -77,7 +80,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let placement = study::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
-    let values = read(&arguments.estimate, &problem, &model)?;
+    let (values, trusted) = read(&arguments.estimate, &problem, &model)?;
+    if !trusted && !common.quiet {
+        diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
+    }
     let x = model
         .vector_of(|name| values.get(name).copied())
         .map_err(|name| EstimateError::Missing { file: arguments.estimate.clone(), name })?;
@@ -91,11 +97,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&format!("\nWritten to {}\n", path.display()))?;
     }
     let all = commands.iter().all(study::Command::is_reached);
-    Ok(if all { Outcome::Done } else { Outcome::NotTrusted })
+    Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
 }
 
-/// Estimates by name, once they are known to be of this problem.
-fn read(file: &Path, problem: &Problem, model: &Model) -> Result<HashMap<String, f64>, EstimateError> {
+/// Estimates by name, once they are known to be of this problem, and whether they are to be trusted.
+fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String, f64>, bool), EstimateError> {
     let file = file.to_owned();
     let text = match fs::read_to_string(&file) {
         Ok(text) => text,
@@ -109,11 +115,18 @@ fn read(file: &Path, problem: &Problem, model: &Model) -> Result<HashMap<String,
         return Err(EstimateError::OtherProblem { file, found: estimates.problem, expected: problem.name.clone() });
     }
     for entry in &estimates.parameters {
-        let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name) else { continue };
+        let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name) else {
+            // Sessions that the targets do not use.
+            if entry.name.starts_with("base[") || entry.name.starts_with("tool[") {
+                continue;
+            }
+            return Err(EstimateError::NotFree { file, name: entry.name.clone() });
+        };
         if (own.nominal - entry.nominal).abs() > 1e-9 * own.nominal.abs().max(1.0) {
             let (name, found, expected) = (entry.name.clone(), entry.nominal, own.nominal);
             return Err(EstimateError::OtherNominal { file, name, found, expected });
         }
     }
-    Ok(estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect())
+    let values = estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect();
+    Ok((values, estimates.trusted))
 }

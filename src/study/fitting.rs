@@ -72,6 +72,7 @@ impl<'a> Fitting<'a> {
             solver: self.solver,
             max_steps: Settings::default().max_iterations,
             loss: Loss::Squares,
+            counts_fixed: false,
             progress: self.progress,
         }
     }
@@ -98,7 +99,7 @@ impl<'a> Fitting<'a> {
     pub fn late_stage(&self) -> Option<Stage<'a>> {
         let unknowns: Vec<usize> =
             self.late.parameters.iter().enumerate().filter(|(_, late)| **late).map(|(k, _)| k).collect();
-        (!unknowns.is_empty()).then(|| self.placing(&self.late.rows, unknowns))
+        (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(&self.late.rows, unknowns) })
     }
 
     /// First row whose pose has no equilibrium on the nominal arm.
@@ -177,7 +178,7 @@ impl<'a> Fitting<'a> {
             cost = next;
         }
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
-        end.gauge = whole.gauge(&end.x, &held);
+        end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
         Ok(end)
     }
 

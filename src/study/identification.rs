@@ -128,14 +128,14 @@ pub(super) fn identify_model(
     let of = "the fit".to_owned();
     let mut distrust = (coordinates < without_prior)
         .then_some(Distrust::TooFewEquations { of, coordinates, unknowns: without_prior })
-        .or_else(|| underdetermined(model, &placement, &split.identification))
+        .or_else(|| underdetermined(model, &placement, &split.identification, |k| !fitting.late.parameters[k]))
         .or_else(|| (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination)));
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
         end.iterations += late.iterations;
         end.evaluations += late.evaluations;
         distrust = distrust
-            .or_else(|| underdetermined(model, &placement, &fitting.late.rows))
+            .or_else(|| underdetermined(model, &placement, &fitting.late.rows, |k| fitting.late.parameters[k]))
             .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
         enter(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
         end.x = late.x;
@@ -146,8 +146,10 @@ pub(super) fn identify_model(
         }
     }
     let fitted = fitting.errors(&end.x);
+    let squares = fitting.whole().poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>();
+    let declared_sigma = noise_is_declared.then(|| (squares / split.identification.len().max(1) as f64).sqrt());
     let distrust = distrust
-        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, fitting.sigma));
+        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, declared_sigma));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,

@@ -5,6 +5,10 @@ use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use crate::arm::{Equilibrated, Workspace};
 use crate::model::{Model, Pose};
 use crate::parameter::Slot;
+use crate::spatial::rotate;
+
+/// Points whose second squared spread is below this part of the first lie on a line.
+const ON_A_LINE: f64 = 1e-12;
 
 /// Sets every base that is wholly free and has no prior to the best rigid motion from the arm's own frame to the
 /// measured points of `poses`, in the full parameter vector `x`. Bases that no pose uses stay as they are.
@@ -35,7 +39,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
         if columns.len() < 6 || points.is_empty() {
             continue;
         }
-        let (rotation, translation) = rigid_motion(&points);
+        let (rotation, translation) = rigid_motion(&points, &nominal.rotation);
         let rotation = rotation - nominal.rotation;
         let translation = translation - nominal.translation;
         for (axis, k) in columns {
@@ -44,11 +48,17 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     }
 }
 
-/// The rotation vector [rad] and translation [m] that carry the first points of the pairs to the second ones best.
-fn rigid_motion(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> (Vector3<f64>, Vector3<f64>) {
+/// The rotation vector [rad] and translation [m] that carry the first points of the pairs to the second ones best; the
+/// `nominal` rotation where the points lie on a line, about which they leave the turn open.
+fn rigid_motion(pairs: &[(Vector3<f64>, Vector3<f64>)], nominal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let n = pairs.len() as f64;
     let (from, to) = pairs.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (p, y)| (a + p / n, b + y / n));
     let s: Matrix3<f64> = pairs.iter().map(|(p, y)| (p - from) * (y - to).transpose()).sum();
+    let mut spread = (s.transpose() * s).symmetric_eigenvalues();
+    spread.as_mut_slice().sort_by(f64::total_cmp);
+    if spread[1] <= ON_A_LINE * spread[2] {
+        return (*nominal, to - rotate(nominal, &from));
+    }
     let skew = Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
     let symmetric = s + s.transpose() - Matrix3::identity() * s.trace();
     let mut normal = Matrix4::zeros();
@@ -65,7 +75,6 @@ fn rigid_motion(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> (Vector3<f64>, Vector
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spatial::rotate;
 
     #[test]
     fn any_motion_is_found_from_points_in_a_plane() {
@@ -75,7 +84,7 @@ mod tests {
             let shift = Vector3::new(3.0, -1.0, 0.2);
             let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.5, 1.0]].map(|[x, y]| Vector3::new(x, y, 0.3));
             let pairs = points.map(|p| (p, rotate(&w, &p) + shift));
-            let (found, translation) = rigid_motion(&pairs);
+            let (found, translation) = rigid_motion(&pairs, &Vector3::zeros());
             for (p, y) in pairs {
                 assert!((rotate(&found, &p) + translation - y).norm() < 1e-12, "{w}");
             }

@@ -64,6 +64,8 @@ pub(super) struct Stage<'a> {
     pub max_steps: u64,
     /// How the residual of a pose counts.
     pub loss: Loss,
+    /// Whether constraints count that also speak of free parameters which do not vary here.
+    pub counts_fixed: bool,
     pub progress: Option<&'a ProgressSink>,
 }
 
@@ -125,16 +127,21 @@ impl<'a> Stage<'a> {
         Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
     }
 
-    /// Combinations of the unknowns that are not `held` which data and priors together leave open at `at`.
-    pub fn gauge(&self, at: &DVector<f64>, held: &[bool]) -> Gauge {
+    /// Combinations of the unknowns that are not `held` which data, priors and `active` constraints leave open at `at`.
+    pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
         let data = self.data_triangle(at);
         let priors = self.priors();
-        let stacked =
-            DMatrix::from_fn(n + priors.nrows(), n, |i, j| if i < n { data[(i, j)] } else { priors[(i - n, j)] });
+        let seen = n + priors.nrows();
+        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
+            i if i < n => data[(i, j)],
+            i if i < seen => priors[(i - n, j)],
+            // Weighted like a measurement of each of its parameters.
+            i => active[i - seen].row[j].signum() * f64::from(active[i - seen].row[j] != 0.0) * data.column(j).norm(),
+        });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
         let found = Identifiability::of(&stacked.qr().unpack_r().select_columns(&free));
         let mut gauge = Gauge { rows: DMatrix::zeros(found.gauge.nrows(), n), visible: vec![0.0; n] };
@@ -150,6 +157,10 @@ impl<'a> Stage<'a> {
         let n = self.unknowns.len();
         let (mut which, mut rows, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, constraint) in self.model.constraints.iter().enumerate() {
+            let varies = |&(k, _): &(usize, f64)| self.unknowns.contains(&k);
+            if !self.counts_fixed && !constraint.terms.iter().all(varies) {
+                continue;
+            }
             let (mut row, mut rest) = (vec![0.0; n], 0.0);
             for &(k, coefficient) in &constraint.terms {
                 match self.unknowns.iter().position(|&unknown| unknown == k) {
@@ -185,7 +196,7 @@ impl<'a> Stage<'a> {
     /// Minimises from the full parameter vector `start`.
     ///
     /// Combinations that are blind at the start are held there. What is blind at the start may be seen at the end, or
-    /// decided by a bound: then the fit goes on with that set free.
+    /// decided by a bound or a constraint: then the fit goes on with that set free.
     ///
     /// # Errors
     /// Bounds and constraints leave the parameters no values.
@@ -200,7 +211,7 @@ impl<'a> Stage<'a> {
             begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
         }
         let hold = begin.clone();
-        let mut gauge = self.gauge(start, &vec![false; begin.len()]);
+        let mut gauge = self.gauge(start, &vec![false; begin.len()], &[]);
         let (mut iterations, mut cost_evaluations, mut linearisations) = (0, 0, 0);
         loop {
             let mut solution = self.solve(&residuals, begin, &hold, &gauge, (&bounds, &rows))?;
@@ -209,7 +220,7 @@ impl<'a> Stage<'a> {
             linearisations += solution.linearisations;
             let x = residuals.full(&solution.x);
             let held: Vec<bool> = solution.at_bound.iter().map(Option::is_some).collect();
-            let now = self.gauge(&x, &held);
+            let now = self.gauge(&x, &held, &self.held(&x)?);
             if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
                 (solution.iterations, solution.cost_evaluations) = (iterations, cost_evaluations);
                 solution.linearisations = linearisations;

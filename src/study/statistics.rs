@@ -77,7 +77,7 @@ impl Statistics {
             })
             .collect();
         // What was seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
-        let seen = stage.gauge(&end.x, &held).visible;
+        let seen = stage.gauge(&end.x, &held, &constraints).visible;
         let known =
             (0..errors.len()).map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND).collect();
         Ok(Self {

@@ -15,6 +15,9 @@ const MISSES: f64 = 0.02;
 /// … unless the declared noise is of that size: in units of 1 σ of a position.
 const BEYOND_NOISE: f64 = 100.0;
 
+/// Points this close together say nothing about the size of an arm [m].
+const LEAST_SPREAD: f64 = 0.01;
+
 /// Why a fit is not to be trusted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Distrust {
@@ -59,33 +62,44 @@ impl fmt::Display for Distrust {
     }
 }
 
-/// A base or target with fewer measured coordinates in `rows` than parameters of its own without a prior.
-pub(super) fn underdetermined(model: &Model, placement: &Placement, rows: &[usize]) -> Option<Distrust> {
-    let check = |name: &str, of_row: &dyn Fn(usize) -> usize, index: usize, own: &dyn Fn(Slot) -> bool| {
-        let coordinates = 3 * rows.iter().filter(|&&row| of_row(row) == index).count();
-        let unknowns = model.parameters.iter().filter(|p| p.sigma.is_none() && own(p.slot)).count();
-        let of = name.to_owned();
+/// A base, with the targets that no other base of `rows` uses, or a target with fewer measured coordinates in `rows` than
+/// parameters of its own without a prior; of the parameters that are `varied` there.
+pub(super) fn underdetermined(
+    model: &Model,
+    placement: &Placement,
+    rows: &[usize],
+    varied: impl Fn(usize) -> bool,
+) -> Option<Distrust> {
+    let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
+        let coordinates = 3 * rows.iter().filter(|&&row| used(row)).count();
+        let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
+        let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         (0 < coordinates && coordinates < unknowns).then_some(Distrust::TooFewEquations { of, coordinates, unknowns })
     };
     let base = |b: usize| {
-        let own = |slot| matches!(slot, Slot::Base { base, .. } if base == b);
-        check(&format!("base[{}]", placement.bases[b]), &|row| placement.base_of(row), b, &own)
+        let alone = |t: usize| rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b);
+        let own = |slot| match slot {
+            Slot::Base { base, .. } => base == b,
+            Slot::Target { target, .. } => alone(target) && rows.iter().any(|&row| placement.target_of(row) == target),
+            Slot::Joint { .. } | Slot::Beam { .. } => false,
+        };
+        check(format!("base[{}]", placement.bases[b]), &|row| placement.base_of(row) == b, &own)
     };
     let target = |t: usize| {
         let own = |slot| matches!(slot, Slot::Target { target, .. } if target == t);
-        check(&format!("tool[{}]", placement.targets[t]), &|row| placement.target_of(row), t, &own)
+        check(format!("tool[{}]", placement.targets[t]), &|row| placement.target_of(row) == t, &own)
     };
     let bases = (0..placement.bases.len()).find_map(base);
     bases.or_else(|| (0..placement.targets.len()).find_map(target))
 }
 
-/// Whether the fitted arm is far from what was measured in `rows`; `sigma` [m] is that of a coordinate.
+/// Whether the fitted arm is far from what was measured in `rows`; `sigma` [m] is that of a coordinate, if it was declared.
 pub(super) fn misses(
     measurements: &Measurements,
     placement: &Placement,
     rows: &[usize],
     fitted: &ErrorSummary,
-    sigma: f64,
+    sigma: Option<f64>,
 ) -> Option<Distrust> {
     let mut squares = 0.0;
     for base in 0..placement.bases.len() {
@@ -95,5 +109,6 @@ pub(super) fn misses(
     }
     let spread = (squares / rows.len().max(1) as f64).sqrt();
     let rms = fitted.rms.norm;
-    (rms > MISSES * spread && rms > BEYOND_NOISE * sigma).then_some(Distrust::Misses { rms, spread })
+    let noise = sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+    (spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise).then_some(Distrust::Misses { rms, spread })
 }
