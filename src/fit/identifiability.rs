@@ -158,13 +158,20 @@ mod tests {
             DMatrix::from_columns(&[a.clone_owned(), b.clone_owned(), a.clone_owned(), DVector::zeros(4), a + b]);
         let mut padded = DMatrix::zeros(5, 5);
         padded.rows_mut(0, 4).copy_from(&jacobian);
-        let found = Identifiability::of(&padded.qr().unpack_r());
+        let triangle = padded.qr().unpack_r();
+        let found = Identifiability::of(&triangle);
         assert_eq!(found.rank, 2);
         let unknowns: Vec<Vec<usize>> =
             found.blind.iter().map(|blind| blind.weights.iter().map(|w| w.0).collect()).collect();
         assert_eq!(unknowns, [vec![0, 2], vec![1, 2, 4], vec![3]]);
         assert!(found.blind.iter().all(|blind| blind.singular_value < 1e-12 && blind.weights[0].1 > 0.0));
         assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
-        assert!((found.gauge.clone() * found.gauge.transpose()).nrows() == 3);
+        // Orthonormal in scaled unknowns, and seen by no row there.
+        let norms: Vec<f64> =
+            triangle.column_iter().map(|c| c.norm()).map(|n| if n > 1e-12 { n } else { 1.0 }).collect();
+        let unscaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(matrix.nrows(), 5, |i, j| matrix[(i, j)] / norms[j]);
+        let rows = unscaled(&found.gauge);
+        assert!((&rows * rows.transpose() - DMatrix::identity(3, 3)).amax() < 1e-12);
+        assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
     }
 }

@@ -1,12 +1,14 @@
 //! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor scaled.
 
-use argmin::core::{ArgminError, Error, Executor, KV, Problem, Solver, State as _, TerminationReason};
+use argmin::core::{Error, Executor, KV, Problem, Solver, State as _, TerminationReason};
 use argmin::core::{TerminationStatus, observers::Observe, observers::ObserverMode};
 use argmin::kv;
 use nalgebra::DVector;
 
 use super::divergence::Watch;
+use super::run::Silent;
 use super::spectrum::Spectrum;
+use super::trust_region::take_point;
 use super::{Divergence, Solution, State, Termination};
 use crate::fit::{Linearisation, Objective};
 
@@ -88,12 +90,6 @@ pub fn minimum_norm_step(linearisation: &Linearisation, tolerance: f64) -> DVect
     Spectrum::new(triangle, projected, tolerance.max(0.0)).solution(0.0, projected.len())
 }
 
-/// x out of argmin's state.
-fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
-    let text = "a solver needs a start".to_owned();
-    state.take_param().ok_or_else(|| ArgminError::NotInitialized { text }.into())
-}
-
 impl<O: Objective> Solver<O, State> for PseudoInverse {
     fn name(&self) -> &'static str {
         "pseudo-inverse"
@@ -153,10 +149,6 @@ pub fn minimise_pseudo_inverse_observed<O: Objective>(
 ) -> Solution {
     run(objective, start, settings, Some(observer))
 }
-
-struct Silent;
-
-impl Observe<State> for Silent {}
 
 fn run<O: Objective>(
     objective: O,

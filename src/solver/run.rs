@@ -132,7 +132,8 @@ pub fn minimise_constrained_observed<O: Objective>(
     constrained(objective, start, bounds, rows, settings, Some(observer))
 }
 
-struct Silent;
+/// An observer that says nothing.
+pub(super) struct Silent;
 
 impl Observe<State> for Silent {}
 

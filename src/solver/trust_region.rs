@@ -205,7 +205,7 @@ impl Trial {
 }
 
 /// x out of argmin's state.
-fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
+pub(super) fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
     let text = "a solver needs a start".to_owned();
     state.take_param().ok_or_else(|| ArgminError::NotInitialized { text }.into())
 }
