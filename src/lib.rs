@@ -29,6 +29,7 @@
 //! ```
 
 pub mod arm;
+pub mod effect;
 pub mod error;
 pub mod fit;
 pub mod measurement;

@@ -45,7 +45,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let mut targets = rows.clone();
     for row in 0..rows.len() {
         let set = &simulation.rows[row].conditions;
-        let setup = Setup { configuration: &set.configuration, payload: set.payload, hoist: set.hoist };
+        let setup = Setup { payload: set.payload, hoist: set.hoist, ..Setup::of(&set.configuration) };
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }

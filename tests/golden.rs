@@ -18,7 +18,7 @@ struct Row {
 
 impl Row {
     fn setup(&self) -> Setup<'_> {
-        Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
+        Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..Setup::of(&self.q) }
     }
 
     fn vector(&self, k: usize) -> Vector3<f64> {

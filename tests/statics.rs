@@ -26,6 +26,8 @@ const STIFF: Flexibility<f64> = Flexibility { axial: 2e-9, about_y: 3e-7, about_
 
 fn joint(a: f64) -> Joint<f64> {
     Joint {
+        nonlinear: None,
+        lateral: None,
         kind: JointKind::Fixed,
         alpha: Angle::new(0.0),
         a,
@@ -39,13 +41,18 @@ fn joint(a: f64) -> Joint<f64> {
 }
 
 fn beam(a: f64, mass: f64, flexibility: Flexibility<f64>) -> Joint<f64> {
-    let beam = Beam { mass, flexibility, masses: Vec::new(), hoist: None };
+    let beam = Beam { mass, flexibility, masses: Vec::new(), hoist: None, thermal: None, added: None };
     Joint { beam: Some(beam), ..joint(a) }
 }
 
 /// An arm under gravity along −z, loads on the bent arm, one element a beam.
 fn arm(joints: Vec<Joint<f64>>) -> Arm<f64> {
     Arm {
+        payload_error: 0.0,
+        rope: None,
+        mounting: None,
+        mixing: None,
+        reference_temperature: 20.0,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         equilibrium: Equilibrium::Deflected,
         beam_elements: 1,
@@ -59,7 +66,7 @@ fn frame(arm: &Arm<f64>, q: &[f64]) -> Result<Frame<f64>, StaticsError> {
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     let still = vec![0.0; arm.joints.len()];
     let configuration = if q.is_empty() { &still } else { q };
-    arm.equilibrate(&Setup { configuration, payload: None, hoist: None }, &mut ws, &mut rest)?;
+    arm.equilibrate(&Setup::of(configuration), &mut ws, &mut rest)?;
     Ok(rest.frame)
 }
 
@@ -403,7 +410,7 @@ fn an_arm_that_its_hoist_balances_comes_to_rest() {
         for hoist in [39.2266, 39.227, 39.2] {
             let angle = f64::from(step) * 0.017;
             let configuration = [0.3, angle, -0.7 * angle, 0.2];
-            let setup = Setup { configuration: &configuration, payload: None, hoist: Some(hoist) };
+            let setup = Setup { hoist: Some(hoist), ..Setup::of(&configuration) };
             arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         }
     }

@@ -58,7 +58,7 @@ impl<'a> Analytic<'a> {
                     target[axis] += x;
                     target_columns[axis] = Some(column);
                 }
-                Slot::Base { .. } | Slot::Beam { .. } => unreachable!("not in this bench"),
+                _ => unreachable!("not in this bench"),
             }
         }
         let links = values.iter().zip(columns).map(|(&[alpha, a, theta, d, beta], columns)| Link {

@@ -69,7 +69,7 @@ impl Ur10 {
 
     fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
         let poses = self.configurations.iter().zip(&self.measured).map(|(configuration, &measured)| Pose {
-            setup: Setup { configuration, payload: None, hoist: None },
+            setup: Setup::of(configuration),
             base: 0,
             target: 0,
             measured,

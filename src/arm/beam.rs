@@ -6,6 +6,7 @@
 
 use nalgebra::Vector3;
 
+use super::imperfection::Strain;
 use crate::scalar::Scalar;
 
 /// Flexibilities of a uniform beam; 0 means rigid.
@@ -69,6 +70,8 @@ pub struct Cantilever<'a, S> {
     pub flexibility: Flexibility<S>,
     /// Evenly spread load [N/m] over the signed length: total force / L.
     pub spread: Vector3<S>,
+    /// Strain without load, the same all along.
+    pub strain: Option<Strain<S>>,
     /// Point loads: station s [m] between 0 and L, and wrench there. The tip load is the one at s = L.
     pub points: &'a [(S, Wrench<S>)],
 }
@@ -109,6 +112,7 @@ impl<S: Scalar> Cantilever<'_, S> {
             x * (l2 * 0.5 - l * x * 0.5 + x2 / 6.0),
             x * (l - x * 0.5),
         );
+        self.superpose_strain(&mut out, x, x * x * 0.5);
         out
     }
 
@@ -141,6 +145,7 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
         let l2 = l * l;
         self.superpose_spread(&mut out, l2 * l2 * 0.05, l2 * l / 6.0, l2 / 3.0);
+        self.superpose_strain(&mut out, l * 0.5, l2 / 6.0);
         out.displacement
     }
 
@@ -173,5 +178,15 @@ impl<S: Scalar> Cantilever<'_, S> {
         out.displacement.z += k.about_y * q.z * deflection;
         out.rotation.y -= k.about_y * q.z * slope;
         out.rotation.z += k.about_z * q.y * slope;
+    }
+
+    /// Strain without load turns the section at x by κ x and moves it by ε x along and κ x²/2 across.
+    fn superpose_strain(&self, out: &mut Deflection<S>, x: S, half_square: S) {
+        let Some(Strain { axial, curvature: [about_y, about_z] }) = self.strain else { return };
+        out.displacement.x += axial * x;
+        out.displacement.y += about_z * half_square;
+        out.displacement.z -= about_y * half_square;
+        out.rotation.y += about_y * x;
+        out.rotation.z += about_z * x;
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::imperfection::Strain;
 use super::{Cantilever, Deflection, Flexibility, Wrench};
 use crate::scalar::Scalar;
 use crate::spatial::{Frame, rotate};
@@ -12,9 +13,11 @@ pub(super) struct LinkLoad<S> {
     /// Which element carries it.
     pub element: usize,
     /// Place in the beam's frame [m].
-    pub at: Vector3<f64>,
+    pub at: Vector3<S>,
     /// Force, arm base frame [N].
     pub force: Vector3<S>,
+    /// Whether a rope pulls there, whose force may depend on the place.
+    pub rope: bool,
 }
 
 /// A stretch of a beam with everything that acts on it, forces in the arm base frame.
@@ -27,6 +30,8 @@ pub(super) struct Element<'a, S> {
     /// Where it begins along the beam [m].
     pub start: S,
     pub flexibility: Flexibility<S>,
+    /// Strain without load.
+    pub strain: Option<Strain<S>>,
     /// Own weight [N].
     pub weight: Vector3<S>,
     /// Loads of the whole beam.
@@ -70,13 +75,14 @@ impl<S: Scalar> Element<'_, S> {
             length: self.length,
             flexibility: self.flexibility,
             spread: axes.resolve(&self.weight) / self.length,
+            strain: self.strain,
             points,
         }
     }
 
     /// The section that carries a load, measured from the element's root, and the rigid arm from there to it [m].
     fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
-        let x = -self.start + load.at.x;
+        let x = load.at.x - self.start;
         let part = x.re() / self.length.re();
         let station = if part < 0.0 {
             S::from(0.0)
@@ -85,7 +91,7 @@ impl<S: Scalar> Element<'_, S> {
         } else {
             x
         };
-        (station, Vector3::new(x - station, S::from(load.at.y), S::from(load.at.z)))
+        (station, Vector3::new(x - station, load.at.y, load.at.z))
     }
 
     /// Tip frame to first order [Chen2021, eq. 20-22 as corrected]: loads resolved in the frame `rigid` of the rigid arm.

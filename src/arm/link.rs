@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Flexibility;
+use super::imperfection::{AddedMass, Nonlinear, Rope, Thermal};
 use crate::problem::{self, Equilibrium, JointKind, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::{Frame, Motion};
@@ -54,6 +55,10 @@ pub struct Beam<S> {
     pub masses: Vec<PointMass>,
     /// Suspension.
     pub hoist: Option<Hoist>,
+    /// Change with temperature.
+    pub thermal: Option<Thermal<S>>,
+    /// A mass that nobody declared.
+    pub added: Option<AddedMass<S>>,
 }
 
 /// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1].
@@ -73,6 +78,10 @@ pub struct Joint<S> {
     pub beta: Angle<S>,
     /// Torsional flexibility 1/k about `z_i` [rad/(N·m)]; `None`: rigid.
     pub flexibility: Option<S>,
+    /// Turning about `z_i` that is not in proportion to the moment.
+    pub nonlinear: Option<Nonlinear<S>>,
+    /// Flexibility about x and y of the frame that has not yet turned [rad/(N·m)].
+    pub lateral: Option<[S; 2]>,
     /// Elastic link along a.
     pub beam: Option<Beam<S>>,
     /// Masses carried by frame i.
@@ -94,6 +103,16 @@ pub struct Arm<S> {
     pub payload_at: Vector3<f64>,
     /// Payload where the pose gives none [kg].
     pub payload_mass: f64,
+    /// By how much a payload is heavier than declared, whenever one is carried [kg].
+    pub payload_error: S,
+    /// How ropes pull other than declared.
+    pub rope: Option<Rope<S>>,
+    /// Flexibility of the base about its x and y [rad/(N·m)].
+    pub mounting: Option<[S; 2]>,
+    /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics are undeflected.
+    pub mixing: Option<S>,
+    /// Temperature without thermal effects [°C].
+    pub reference_temperature: f64,
 }
 
 /// What the controller and the test bench set for one pose.
@@ -105,6 +124,21 @@ pub struct Setup<'a> {
     pub payload: Option<f64>,
     /// Hoist force [N], if it is known for this pose.
     pub hoist: Option<f64>,
+    /// Temperature [°C], if it is known for this pose.
+    pub temperature: Option<f64>,
+    /// Time [s].
+    pub time: f64,
+    /// Time since the first measured pose [s].
+    pub elapsed: f64,
+    /// Direction from which each joint came, shape = (joints), −1, 0 or +1, if it is known.
+    pub approach: Option<&'a [f64]>,
+}
+
+impl<'a> Setup<'a> {
+    /// A configuration, shape = (joints) [rad] or [m], of which nothing else is known.
+    pub fn of(configuration: &'a [f64]) -> Self {
+        Self { configuration, payload: None, hoist: None, temperature: None, time: 0.0, elapsed: 0.0, approach: None }
+    }
 }
 
 impl Arm<f64> {
@@ -117,6 +151,11 @@ impl Arm<f64> {
             joints: problem.joints.iter().map(Joint::nominal).collect(),
             payload_at: problem.tool.payload_at,
             payload_mass: problem.tool.payload_mass,
+            payload_error: 0.0,
+            rope: None,
+            mounting: None,
+            mixing: None,
+            reference_temperature: problem.data.reference_temperature.unwrap_or(0.0),
         }
     }
 
@@ -129,6 +168,11 @@ impl Arm<f64> {
             joints: self.joints.iter().map(Joint::lift).collect(),
             payload_at: self.payload_at,
             payload_mass: self.payload_mass,
+            payload_error: S::from(self.payload_error),
+            rope: self.rope.as_ref().map(Rope::lift),
+            mounting: self.mounting.map(|mounting| mounting.map(S::from)),
+            mixing: self.mixing.map(S::from),
+            reference_temperature: self.reference_temperature,
         }
     }
 }
@@ -136,7 +180,13 @@ impl Arm<f64> {
 impl<S: Scalar> Arm<S> {
     /// Whether any joint or link deflects.
     pub fn is_elastic(&self) -> bool {
-        self.joints.iter().any(|joint| joint.flexibility.is_some() || joint.beam.is_some())
+        let gives = |joint: &Joint<S>| joint.turns() || joint.lateral.is_some() || joint.beam.is_some();
+        self.mounting.is_some() || self.joints.iter().any(gives)
+    }
+
+    /// Degrees above the reference [K]; 0 where the temperature is not known.
+    pub(super) fn warming(&self, setup: &Setup) -> f64 {
+        setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
     }
 
     /// The last frame of the arm that does not deflect, arm base frame.
@@ -149,8 +199,9 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Payload of a pose [kg].
-    pub(super) fn payload(&self, setup: &Setup) -> f64 {
-        setup.payload.unwrap_or(self.payload_mass)
+    pub(super) fn payload(&self, setup: &Setup) -> S {
+        let declared = setup.payload.unwrap_or(self.payload_mass);
+        if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }
     }
 }
 
@@ -168,6 +219,8 @@ impl Joint<f64> {
             d: joint.d,
             beta: Angle::new(joint.beta),
             flexibility: joint.stiffness.map(f64::recip),
+            nonlinear: None,
+            lateral: None,
             beam: joint.beam.as_ref().map(|beam| Beam {
                 mass: beam.mass,
                 flexibility: Flexibility {
@@ -182,6 +235,8 @@ impl Joint<f64> {
                     force: hoist.force,
                     direction: hoist.direction,
                 }),
+                thermal: None,
+                added: None,
             }),
             bodies: point_masses(&joint.bodies),
         }
@@ -199,6 +254,8 @@ impl Joint<f64> {
             d: S::from(self.d),
             beta: angle(&self.beta),
             flexibility: self.flexibility.map(S::from),
+            nonlinear: self.nonlinear.as_ref().map(Nonlinear::lift),
+            lateral: self.lateral.map(|lateral| lateral.map(S::from)),
             beam: self.beam.as_ref().map(|beam| Beam {
                 mass: beam.mass,
                 flexibility: Flexibility {
@@ -209,6 +266,8 @@ impl Joint<f64> {
                 },
                 masses: beam.masses.clone(),
                 hoist: beam.hoist,
+                thermal: beam.thermal.as_ref().map(Thermal::lift),
+                added: beam.added.as_ref().map(AddedMass::lift),
             }),
             bodies: self.bodies.clone(),
         }
@@ -216,9 +275,30 @@ impl Joint<f64> {
 }
 
 impl<S: Scalar> Joint<S> {
-    /// Moves `frame` through the part of `T_i` after the link: Rz(θ + q + `twist`) Tz(d + q) Ry(β).
-    pub(super) fn turn(&self, frame: &mut Frame<S>, q: f64, twist: Option<S>) {
-        let (mut angle, offset) = self.coordinates(q);
+    /// Whether the joint gives way about its axis.
+    pub(super) fn turns(&self) -> bool {
+        self.flexibility.is_some() || self.nonlinear.is_some()
+    }
+
+    /// Angle about the axis under a moment [N·m] about it.
+    pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
+        let linear = self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
+        self.nonlinear.as_ref().map_or(linear, |nonlinear| linear + nonlinear.twist(moment, approach))
+    }
+
+    /// What play adds to the joint's coordinate when it came from a known direction [rad] or [m].
+    pub(super) fn slip(&self, approach: Option<f64>) -> Option<S> {
+        self.nonlinear.as_ref().zip(approach).map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
+    }
+
+    /// Moves `frame` through the part of `T_i` after the link: Rz(θ + q + `twist`) Tz(d + q) Ry(β), `slip` added to q.
+    pub(super) fn turn(&self, frame: &mut Frame<S>, q: f64, slip: Option<S>, twist: Option<S>) {
+        let (mut angle, mut offset) = self.coordinates(q);
+        match (slip, self.kind) {
+            (Some(slip), JointKind::Prismatic) => offset += slip,
+            (Some(slip), _) => angle += slip,
+            (None, _) => {}
+        }
         if let Some(twist) = twist {
             angle += twist;
         }
@@ -252,6 +332,6 @@ impl<S: Scalar> Joint<S> {
     fn advance(&self, frame: &mut Frame<S>, q: f64) {
         frame.rotate_x(self.alpha.sin_cos);
         frame.translate_x(self.a);
-        self.turn(frame, q, None);
+        self.turn(frame, q, None, None);
     }
 }

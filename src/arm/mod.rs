@@ -2,10 +2,12 @@
 
 mod beam;
 mod element;
+mod imperfection;
 mod link;
 mod place;
 mod statics;
 
 pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
+pub use imperfection::{AddedMass, Nonlinear, Rope, Strain, Thermal};
 pub use link::{Angle, Arm, Beam, Hoist, Joint, PointMass, Setup};
 pub use statics::{Equilibrated, Response, StaticsError, Workspace};

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::Wrench;
 use super::element::{Element, LinkLoad};
-use super::link::{Arm, Beam, Setup};
+use super::link::{Arm, Beam, Hoist, PointMass, Setup};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
@@ -17,6 +17,8 @@ pub(super) enum Event<S> {
     Tip { at: Vector3<S> },
     /// A flexible joint: the moment about its axis is an unknown.
     Axis { at: Vector3<S>, axis: Vector3<S> },
+    /// What tilts about two axes: the moments about them are unknowns.
+    Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
 }
 
 /// How the walk bends the arm.
@@ -36,6 +38,10 @@ pub struct Workspace<S> {
     pub(super) events: Vec<Event<S>>,
     pub(super) moments: Vec<S>,
     pub(super) next_moments: Vec<S>,
+    /// Where each hook is, x and y in the arm base frame [m], if ropes may lean: unknowns before all moments.
+    pub(super) hooks: Vec<[S; 2]>,
+    /// Force of each link's rope [N], zero without one.
+    ropes: Vec<Vector3<S>>,
     /// Force of everything beyond each joint's link [N].
     beyond: Vec<Vector3<S>>,
     /// Frame at each link's root in the last rigid walk.
@@ -50,6 +56,8 @@ impl<S> Default for Workspace<S> {
             events: Vec::new(),
             moments: Vec::new(),
             next_moments: Vec::new(),
+            hooks: Vec::new(),
+            ropes: Vec::new(),
             beyond: Vec::new(),
             rigid_roots: Vec::new(),
             link_loads: Vec::new(),
@@ -78,36 +86,80 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
+    /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half way.
+    fn tilt(&mut self, [about_x, about_y]: &[S; 2], ws: &mut Workspace<S>) {
+        let half = self.moments().map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
+        if let Some(half) = &half {
+            self.frame.rotate(half);
+        }
+        if self.records() {
+            let [x, y, _] = self.frame.axes;
+            ws.events.push(Event::Tilt { at: self.frame.origin, axes: [x, y] });
+        }
+        if let Some(half) = &half {
+            self.frame.rotate(half);
+        }
+    }
+
     fn records(&self) -> bool {
         !matches!(self.bend, Bend::FirstOrder(_))
     }
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Forces beyond each link; they do not depend on how the arm bends.
-    pub(super) fn gather_forces(&self, setup: &Setup, ws: &mut Workspace<S>) {
+    /// Forces of ropes, and beyond each link; only ropes that lean depend on how the arm bends, by the unknowns `state`.
+    ///
+    /// Before there is a state (empty) leaning ropes are taken as if their hooks were above the base.
+    pub(super) fn gather_forces(&self, setup: &Setup, state: &[S], ws: &mut Workspace<S>) {
+        let zero = Vector3::from_element(S::from(0.0));
+        let mut hooks = state.chunks_exact(2);
+        ws.ropes.clear();
+        ws.ropes.extend(self.joints.iter().map(|joint| {
+            let Some(hoist) = joint.beam.as_ref().and_then(|beam| beam.hoist.as_ref()) else { return zero };
+            let hook = || hooks.next().map_or([S::from(0.0); 2], |hook| [hook[0], hook[1]]);
+            self.pull(hoist, setup, hook)
+        }));
         ws.beyond.clear();
-        ws.beyond.resize(self.joints.len(), Vector3::from_element(S::from(0.0)));
-        let mut mass = self.payload(setup);
-        let mut hoisted = Vector3::zeros();
-        for (joint, beyond) in self.joints.iter().zip(&mut ws.beyond).rev() {
+        ws.beyond.resize(self.joints.len(), zero);
+        let (mut mass, mut hoisted) = (self.payload(setup), zero);
+        for ((joint, beyond), rope) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).rev() {
             mass += joint.bodies.iter().map(|body| body.mass).sum::<f64>();
-            *beyond = self.gravity * S::from(mass) + hoisted.map(S::from);
+            *beyond = self.gravity * mass + hoisted;
             if let Some(beam) = &joint.beam {
                 mass += beam.mass + beam.masses.iter().map(|carried| carried.mass).sum::<f64>();
-                if let Some(hoist) = &beam.hoist {
-                    hoisted += hoist.direction * setup.hoist.unwrap_or(hoist.force);
+                if let Some(added) = &beam.added {
+                    mass += added.mass;
                 }
+                hoisted += rope;
             }
         }
     }
 
+    /// Force of a rope [N].
+    fn pull(&self, hoist: &Hoist, setup: &Setup, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
+        let tension = setup.hoist.unwrap_or(hoist.force);
+        match &self.rope {
+            None => (hoist.direction * tension).map(S::from),
+            Some(rope) => rope.pull(hoist, tension, hook()),
+        }
+    }
+
+    /// Number of unknowns that are places of hooks.
+    fn hook_unknowns(&self) -> usize {
+        let hoists = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
+        self.rope.as_ref().map_or(0, |_| 2 * hoists().count())
+    }
+
     /// Walks to the last frame, arm base frame.
     pub(super) fn walk(&self, setup: &Setup, bend: Bend<S>, ws: &mut Workspace<S>) -> Frame<S> {
-        let mut walk = Walk { setup, bend, frame: Frame::identity(), next: 0 };
+        let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns() };
         ws.events.clear();
+        ws.hooks.clear();
         if matches!(bend, Bend::Rigid) {
             ws.rigid_roots.clear();
+        }
+        if let Some(mounting) = &self.mounting {
+            walk.tilt(mounting, ws);
         }
         for (i, joint) in self.joints.iter().enumerate() {
             walk.frame.rotate_x(joint.alpha.sin_cos);
@@ -118,14 +170,19 @@ impl<S: Scalar> Arm<S> {
                 None => walk.frame.translate_x(joint.a),
                 Some(beam) => self.walk_beam(beam, i, &mut walk, ws),
             }
-            let mut twist = None;
-            if let Some(flexibility) = joint.flexibility {
+            if let Some(lateral) = &joint.lateral {
+                walk.tilt(lateral, ws);
+            }
+            let (mut twist, mut slip) = (None, None);
+            if joint.turns() {
                 if walk.records() {
                     ws.events.push(Event::Axis { at: walk.frame.origin, axis: walk.frame.axes[2] });
                 }
-                twist = walk.moments().map(|[moment]| flexibility * moment);
+                let approach = setup.approach.map(|approach| approach[i]);
+                twist = walk.moments().map(|[moment]| joint.twist(moment, approach));
+                slip = joint.slip(approach);
             }
-            joint.turn(&mut walk.frame, setup.configuration[i], twist);
+            joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
             if walk.records() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
@@ -134,19 +191,20 @@ impl<S: Scalar> Arm<S> {
             }
         }
         let payload = self.payload(setup);
-        if walk.records() && payload != 0.0 {
+        if walk.records() && payload.re() != 0.0 {
             let at = walk.frame.point(&self.payload_at.map(S::from));
-            ws.events.push(Event::Load { at, force: self.gravity * S::from(payload) });
+            ws.events.push(Event::Load { at, force: self.gravity * payload });
         }
         walk.frame
     }
 
     /// Walks along the beam of joint `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
-        let Workspace { events, beyond, rigid_roots, link_loads, points, .. } = ws;
+        let Workspace { events, hooks, ropes, beyond, rigid_roots, link_loads, points, .. } = ws;
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
-        self.load_beam(beam, walk.setup, length, link_loads);
+        self.load_beam(beam, ropes[link], length, link_loads);
+        let strain = beam.thermal.as_ref().map(|thermal| thermal.strain(self.warming(walk.setup)));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
             let further = link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
@@ -157,6 +215,7 @@ impl<S: Scalar> Arm<S> {
                 length,
                 start: length * number as f64,
                 flexibility: beam.flexibility,
+                strain,
                 weight,
                 loads: link_loads,
                 tip: Wrench { force: beyond[link] + further, moment },
@@ -169,16 +228,27 @@ impl<S: Scalar> Arm<S> {
                 Bend::Rigid => {
                     let middle = root.origin + root.axes[0] * (length * 0.5);
                     events.push(Event::Load { at: middle, force: weight });
-                    let at = |load| Event::Load { at: element.straight_point(&root, load), force: load.force };
-                    events.extend(element.own_loads().map(at));
+                    for load in element.own_loads() {
+                        let (at, mut force) = (element.straight_point(&root, load), load.force);
+                        if let (true, Some(hoist), Some(_)) = (load.rope, &beam.hoist, &self.rope) {
+                            hooks.push([at.x, at.y]);
+                            force = self.pull(hoist, walk.setup, || [at.x, at.y]);
+                        }
+                        events.push(Event::Load { at, force });
+                    }
                     walk.frame.translate_x(length);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
                 Bend::Bent(_) => {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
-                    let at = |load| Event::Load { at: bent.point(load), force: load.force };
-                    events.extend(element.own_loads().map(at));
+                    for load in element.own_loads() {
+                        let at = bent.point(load);
+                        if load.rope && self.rope.is_some() {
+                            hooks.push([at.x, at.y]);
+                        }
+                        events.push(Event::Load { at, force: load.force });
+                    }
                     walk.frame = bent.tip();
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
@@ -186,17 +256,25 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Lists the loads of a beam with elements of `length` [m].
-    fn load_beam(&self, beam: &Beam<S>, setup: &Setup, length: S, loads: &mut Vec<LinkLoad<S>>) {
+    /// Lists the loads of a beam with elements of `length` [m]; `rope` is the force of its rope [N].
+    fn load_beam(&self, beam: &Beam<S>, rope: Vector3<S>, length: S, loads: &mut Vec<LinkLoad<S>>) {
         let last = (self.beam_elements - 1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down and clamped")]
-        let load =
-            |at: Vector3<f64>, force| LinkLoad { element: (at.x / length.re()).clamp(0.0, last) as usize, at, force };
+        let load = |at: Vector3<S>, force, rope| LinkLoad {
+            element: (at.x.re() / length.re()).clamp(0.0, last) as usize,
+            at,
+            force,
+            rope,
+        };
         loads.clear();
-        loads.extend(beam.masses.iter().map(|carried| load(carried.at, self.gravity * S::from(carried.mass))));
+        let carried = |carried: &PointMass| load(carried.at.map(S::from), self.gravity * S::from(carried.mass), false);
+        loads.extend(beam.masses.iter().map(carried));
+        if let Some(added) = &beam.added {
+            let at = Vector3::new(added.at * length.re().signum(), S::from(0.0), S::from(0.0));
+            loads.push(load(at, self.gravity * added.mass, false));
+        }
         if let Some(hoist) = &beam.hoist {
-            let force = hoist.direction * setup.hoist.unwrap_or(hoist.force);
-            loads.push(load(hoist.at, force.map(S::from)));
+            loads.push(load(hoist.at.map(S::from), rope, true));
         }
     }
 }

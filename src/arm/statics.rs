@@ -1,7 +1,7 @@
 //! Static equilibrium: which moments bend the arm, and where its end point comes to rest.
 //!
-//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam element's tip and one
-//! about every flexible joint. A walk with moments x places every load, and the loads give moments G(x). The rigid
+//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam element's tip, one about
+//! every flexible joint, two where something tilts; and the places of hooks whose ropes may lean. A walk with moments x places every load, and the loads give moments G(x). The rigid
 //! walk's moments are the paper's first order; x = G(x) is equilibrium on the bent arm. With P(x) the target position,
 //! its total derivative needs no iteration in dual numbers:
 //!
@@ -71,16 +71,16 @@ impl Workspace<f64> {
     fn turning(&self) -> f64 {
         let term = |event: &Event<f64>| match event {
             Event::Load { at, force } => at.norm() * force.norm(),
-            Event::Tip { .. } | Event::Axis { .. } => 0.0,
+            Event::Tip { .. } | Event::Axis { .. } | Event::Tilt { .. } => 0.0,
         };
         self.events.iter().map(term).sum()
     }
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Moments at every section that bends, from the loads of the last walk, arm base frame [N·m].
+    /// The unknowns as the last walk gives them: places of hooks [m], then moments where something bends [N·m].
     fn sum_moments(&mut self) {
-        let Self { events, next_moments, .. } = self;
+        let Self { events, next_moments, hooks, .. } = self;
         let zero = Vector3::from_element(S::from(0.0));
         let (mut force_sum, mut moment_sum) = (zero, zero);
         next_moments.clear();
@@ -95,8 +95,13 @@ impl<S: Scalar> Workspace<S> {
                     next_moments.extend([moment.z, moment.y, moment.x]);
                 }
                 Event::Axis { at, axis } => next_moments.push(axis.dot(&(moment_sum - at.cross(&force_sum)))),
+                Event::Tilt { at, axes: [x, y] } => {
+                    let moment = moment_sum - at.cross(&force_sum);
+                    next_moments.extend([y.dot(&moment), x.dot(&moment)]);
+                }
             }
         }
+        next_moments.extend(hooks.iter().rev().flat_map(|&[x, y]| [y, x]));
         next_moments.reverse();
     }
 }
@@ -118,15 +123,20 @@ impl Arm<f64> {
             pose.frame = self.rigid_frame(setup);
             return Ok(());
         }
-        self.gather_forces(setup, ws);
+        self.gather_forces(setup, &[], ws);
         self.walk(setup, Bend::Rigid, ws);
         ws.sum_moments();
         pose.moments.extend_from_slice(&ws.next_moments);
-        if self.equilibrium == Equilibrium::Undeflected {
+        let first_order = if self.is_first_order() {
+            self.lean_ropes(setup, &pose.moments, ws);
             pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), ws);
-            return Ok(());
-        }
+            let Some(mixing) = self.mixing else { return Ok(()) };
+            Some((pose.frame, mixing))
+        } else {
+            None
+        };
         for _ in 0..MAX_PASSES {
+            self.lean_ropes(setup, &pose.moments, ws);
             pose.frame = self.walk(setup, Bend::Bent(&pose.moments), ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -135,12 +145,22 @@ impl Arm<f64> {
                 break;
             }
             if change <= SETTLED * largest || change <= ROUNDING * ws.turning() {
+                if let Some((first_order, mixing)) = &first_order {
+                    pose.frame = mixed(first_order, &pose.frame, *mixing);
+                }
                 return Ok(());
             }
             pose.moments.copy_from_slice(&ws.next_moments);
         }
         Err(StaticsError::NotSettled)
     }
+}
+
+/// (1 − λ) of one frame and λ of another, point by point; no frame between, but every point of it is.
+fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
+    let mix = |one: &Vector3<S>, other: &Vector3<S>| one + (other - one) * mixing;
+    let axes = std::array::from_fn(|i| mix(&one.axes[i], &other.axes[i]));
+    Frame { axes, origin: mix(&one.origin, &other.origin) }
 }
 
 /// Differentiates equilibrium with respect to its moments.
@@ -159,17 +179,18 @@ impl Response {
     /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame.
     pub fn adjoint(&mut self, setup: &Setup, target: &Vector3<f64>, pose: &mut Equilibrated) {
         let n = pose.moments.len();
-        if n == 0 || self.arm.equilibrium == Equilibrium::Undeflected {
+        if n == 0 || (self.arm.is_first_order() && self.arm.mixing.is_none()) {
             return;
         }
         pose.position_response.resize(3 * n, 0.0);
         pose.moment_response.resize(n * n, 0.0);
         let target = target.map(Dual::from);
         let mut moments = std::mem::take(&mut self.ws.moments);
-        self.arm.gather_forces(setup, &mut self.ws);
+        self.arm.gather_forces(setup, &[], &mut self.ws);
         for first in (0..n).step_by(CHUNK) {
             moments.clear();
             moments.extend(pose.moments.iter().enumerate().map(|(k, &x)| seeded(x, k.checked_sub(first))));
+            self.arm.lean_ropes(setup, &moments, &mut self.ws);
             let frame = self.arm.walk(setup, Bend::Bent(&moments), &mut self.ws);
             self.ws.sum_moments();
             let position = frame.point(&target);
@@ -234,28 +255,60 @@ impl<S: Scalar> Arm<S> {
         if pose.moments.is_empty() {
             return self.rigid_frame(setup).point(&target);
         }
-        self.gather_forces(setup, ws);
+        self.gather_forces(setup, &[], ws);
         let mut moments = std::mem::take(&mut ws.moments);
-        moments.clear();
-        let position = if self.equilibrium == Equilibrium::Undeflected {
+        let first_order = self.is_first_order().then(|| {
             self.walk(setup, Bend::Rigid, ws);
             ws.sum_moments();
+            moments.clear();
             moments.extend_from_slice(&ws.next_moments);
+            self.lean_ropes(setup, &moments, ws);
             self.walk(setup, Bend::FirstOrder(&moments), ws).point(&target)
-        } else {
-            moments.extend(pose.moments.iter().map(|&x| S::from(x)));
-            let mut position = self.walk(setup, Bend::Bent(&moments), ws).point(&target);
-            ws.sum_moments();
-            let n = moments.len();
-            for (j, (next, &x)) in ws.next_moments.iter().zip(&pose.moments).enumerate() {
-                let change = *next - x;
-                for i in 0..3 {
-                    position[i] += change * pose.adjoint[i * n + j];
-                }
+        });
+        let position = match (first_order, self.mixing) {
+            (Some(first_order), None) => first_order,
+            (None, _) => self.at_rest(setup, &target, pose, &mut moments, ws),
+            (Some(first_order), Some(mixing)) => {
+                first_order + (self.at_rest(setup, &target, pose, &mut moments, ws) - first_order) * mixing
             }
-            position
         };
         ws.moments = moments;
         position
+    }
+
+    /// The position on the bent arm; `moments` is memory.
+    fn at_rest(
+        &self,
+        setup: &Setup,
+        target: &Vector3<S>,
+        pose: &Equilibrated,
+        moments: &mut Vec<S>,
+        ws: &mut Workspace<S>,
+    ) -> Vector3<S> {
+        moments.clear();
+        moments.extend(pose.moments.iter().map(|&x| S::from(x)));
+        self.lean_ropes(setup, moments, ws);
+        let mut position = self.walk(setup, Bend::Bent(moments), ws).point(target);
+        ws.sum_moments();
+        let n = moments.len();
+        for (j, (next, &x)) in ws.next_moments.iter().zip(&pose.moments).enumerate() {
+            let change = *next - x;
+            for i in 0..3 {
+                position[i] += change * pose.adjoint[i * n + j];
+            }
+        }
+        position
+    }
+
+    /// Whether the declared statics take the loads on the rigid arm.
+    fn is_first_order(&self) -> bool {
+        self.equilibrium == Equilibrium::Undeflected
+    }
+
+    /// Gathers forces again where ropes lean with the unknowns.
+    fn lean_ropes(&self, setup: &Setup, state: &[S], ws: &mut Workspace<S>) {
+        if self.rope.is_some() {
+            self.gather_forces(setup, state, ws);
+        }
     }
 }

@@ -96,8 +96,6 @@ pub enum InputErrorKind {
     NoOrders,
     #[error("order {order} stands twice")]
     RepeatedOrder { order: u32 },
-    #[error("this version reads effects but does not model them yet; leave the section out")]
-    EffectNotModelled,
     #[error("declared already on line {line}")]
     RepeatedEffect { line: usize },
 
@@ -119,6 +117,8 @@ pub enum InputErrorKind {
     QuantityUseless { suffixes: &'static str },
 
     // Constraints.
+    #[error("a constraint speaks of angles, lengths, stiffnesses and rigidities only")]
+    NotConstrainable,
     #[error("no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}")]
     NoTerms,
     #[error("a coefficient of 0 says nothing; leave the parameter out")]

@@ -1,7 +1,7 @@
 //! Models that leave a part of the elasticity out.
 
 use super::Model;
-use crate::parameter::{BeamField, JointField, Slot};
+use crate::parameter::{BeamField, Slot};
 
 /// What an ablated model keeps of the elasticity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,8 +36,8 @@ impl Ablation {
     fn keeps(self, slot: Slot) -> bool {
         match (self, slot) {
             (Self::Rigid, slot) => !slot.is_elastic(),
+            (Self::LinksOnly | Self::BendingOnly, Slot::Joint { .. }) => !slot.is_elastic(),
             (Self::JointsOnly, Slot::Beam { .. })
-            | (Self::LinksOnly | Self::BendingOnly, Slot::Joint { field: JointField::Stiffness, .. })
             | (Self::BendingOnly, Slot::Beam { field: BeamField::Axial | BeamField::Twist, .. }) => false,
             _ => true,
         }
@@ -55,7 +55,7 @@ impl Model {
         model.constraints = self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
-                joint.flexibility = None;
+                (joint.flexibility, joint.nonlinear, joint.lateral) = (None, None, None);
             }
             if ablation == Ablation::Rigid {
                 joint.beam = None;

@@ -3,7 +3,9 @@
 use nalgebra::DVector;
 
 use super::Model;
-use crate::parameter::{JointField, Parameter, Slot};
+use super::driven::Commands;
+use super::observation::Observation;
+use crate::parameter::{Driver, JointField, Parameter, Slot};
 use crate::problem::{JointKind, Problem};
 
 impl Model {
@@ -27,6 +29,7 @@ impl Model {
                 Some(Parameter {
                     name: format!("q{}", joint + 1),
                     slot: Slot::Joint { joint, field },
+                    driver: Driver::Constant,
                     nominal,
                     sigma: None,
                     lower: f64::NEG_INFINITY,
@@ -36,6 +39,8 @@ impl Model {
             .collect();
         Self {
             nominal: arm,
+            driven: Commands::new(self, x.as_slice()).into_driven(),
+            observation: Observation::new(self, x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             parameters,
@@ -59,7 +64,7 @@ impl Model {
     pub fn moving_joints(&self) -> Vec<usize> {
         let joint = |parameter: &Parameter| match parameter.slot {
             Slot::Joint { joint, .. } => Some(joint),
-            Slot::Beam { .. } | Slot::Base { .. } | Slot::Target { .. } => None,
+            _ => None,
         };
         self.parameters.iter().filter_map(joint).collect()
     }

@@ -7,10 +7,13 @@
 use nalgebra::{DVector, Vector3};
 use num_dual::{Dual64, DualSVec64};
 
+use super::driven::Commands;
+use super::inputs::{Input, inputs};
+use super::observation::Observation;
 use super::{Model, Pose};
-use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Workspace};
+use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Setup, Workspace};
 use crate::fit::Block;
-use crate::parameter::{JointField, Slot};
+use crate::parameter::{Driver, JointField, Slot};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, Motion, rotation_axes};
 
@@ -22,6 +25,11 @@ type ChunkDual = DualSVec64<CHUNK>;
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
     arm: Arm<f64>,
+    commands: Commands,
+    observation: Observation,
+    /// Columns of what the measurement does: scale, and shifts by axis and driver.
+    scale: Option<usize>,
+    shifts: Vec<(usize, Driver, usize)>,
     bases: Vec<Base>,
     targets: Vec<Target>,
     inner: Inner,
@@ -43,7 +51,7 @@ struct Target {
 /// How the arm's own parameters are differentiated.
 enum Inner {
     /// Motion by motion; `passed` are those of the pose at hand.
-    Rigid { links: Vec<Link>, passed: Vec<Passed> },
+    Rigid { links: Vec<Link>, inputs: Vec<Input>, passed: Vec<Passed> },
     /// In chunks through the statics.
     Elastic(Box<Elastic>),
 }
@@ -56,23 +64,23 @@ struct Elastic {
     ws: Workspace<ChunkDual>,
 }
 
-/// A link of a rigid arm with each of its five parameters seeded, and their columns.
+/// A link of a rigid arm with each of its five parameters seeded, and which input each is.
 struct Link {
     joint: Joint<Dual64>,
-    columns: [Option<usize>; 5],
+    inputs: [Option<usize>; 5],
 }
 
-/// A motion of a rigid arm, its parameter seeded, with the frame before it (measuring frame) and its column.
+/// A motion of a rigid arm, its parameter seeded, with the frame before it (measuring frame) and which input it is.
 struct Passed {
     motion: Motion<Dual64>,
     before: Frame<f64>,
-    column: Option<usize>,
+    input: Option<usize>,
 }
 
-/// The arm with up to [`CHUNK`] of its parameters seeded, and their columns.
+/// The arm with up to [`CHUNK`] of its inputs seeded.
 struct Chunk {
     arm: Arm<ChunkDual>,
-    columns: Vec<usize>,
+    inputs: Vec<Input>,
 }
 
 impl Linearised {
@@ -93,19 +101,21 @@ impl Linearised {
             .into_iter()
             .map(|position| Target { position, columns: [None; 3] })
             .collect();
-        let mut own = Vec::new();
+        let (mut scale, mut shifts) = (None, Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
-            match model.parameters[k].slot {
+            let parameter = &model.parameters[k];
+            match parameter.slot {
                 Slot::Base { base, axis } => bases[base].columns[axis] = Some(column),
                 Slot::Target { target, axis } => targets[target].columns[axis] = Some(column),
-                Slot::Joint { .. } | Slot::Beam { .. } => own.push((column, k)),
+                Slot::Scale => scale = Some(column),
+                Slot::Shift { axis } => shifts.push((axis, parameter.driver, column)),
+                Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
             }
         }
+        let inputs = inputs(model, unknowns);
         let inner = if arm.is_elastic() {
-            let chunks = own.chunks(CHUNK).map(|part| Chunk {
-                arm: model.arm(|k| seeded(x[k], part.iter().position(|&(_, seeded)| seeded == k))),
-                columns: part.iter().map(|&(column, _)| column).collect(),
-            });
+            let chunks =
+                inputs.chunks(CHUNK).map(|part| Chunk { arm: seed_arm(model, x, part), inputs: part.to_vec() });
             Inner::Elastic(Box::new(Elastic {
                 response: Response::new(&arm),
                 chunks: chunks.collect(),
@@ -113,21 +123,30 @@ impl Linearised {
                 ws: Workspace::default(),
             }))
         } else {
-            Inner::Rigid { links: links(model, &arm, &own), passed: Vec::new() }
+            Inner::Rigid { links: links(&arm, &inputs), inputs, passed: Vec::new() }
         };
-        Self { arm, bases, targets, inner, rest: Equilibrated::default() }
+        let commands = Commands::new(model, x.as_slice());
+        let observation = Observation::new(model, x.as_slice());
+        Self { arm, commands, observation, scale, shifts, bases, targets, inner, rest: Equilibrated::default() }
     }
 
     /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros.
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
+        let setup = self.commands.apply(&pose.setup);
         let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
-        let Some(last) = self.inner.last_frame(&self.arm, pose, base, &mut self.rest) else {
+        let Some(last) = self.inner.last_frame(&self.arm, &setup, base, &mut self.rest) else {
             rows.put(rows.block.parameters(), &Vector3::from_element(f64::NAN));
             return;
         };
         let predicted = last.point(&target.position);
-        rows.put(rows.block.parameters(), &(predicted - pose.measured));
+        let seen = self.observation.of(&predicted, &pose.setup);
+        rows.put(rows.block.parameters(), &(seen - pose.measured));
+        rows.put_if(self.scale, || predicted);
+        for &(axis, driver, column) in &self.shifts {
+            rows.put(column, &(Vector3::ith(axis, driver.value(&pose.setup))));
+        }
+        rows.scale *= 1.0 + self.observation.scale;
         for (axis, &column) in base.columns.iter().enumerate() {
             if axis < 3 {
                 rows.put_if(column, || Vector3::ith(axis, 1.0));
@@ -139,7 +158,7 @@ impl Linearised {
         for (axis, &column) in target.columns.iter().enumerate() {
             rows.put_if(column, || last.axes[axis]);
         }
-        self.inner.write(pose, base, target, &mut self.rest, &mut rows);
+        self.inner.write(&pose.setup, &setup, base, target, &mut self.rest, &mut rows);
     }
 }
 
@@ -162,50 +181,79 @@ impl Rows<'_> {
             self.put(column, &derivative());
         }
     }
+
+    /// Writes the derivative with respect to an input for each parameter that acts there.
+    fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
+        if let Some(column) = input.column {
+            self.put(column, derivative);
+        }
+        for &(column, driver) in &input.driven {
+            self.put(column, &(derivative * driver.value(commanded)));
+        }
+    }
 }
 
 impl Inner {
     /// The last frame of a pose, measuring frame; `None` where it has no equilibrium.
-    fn last_frame(&mut self, arm: &Arm<f64>, pose: &Pose, base: &Base, rest: &mut Equilibrated) -> Option<Frame<f64>> {
+    fn last_frame(
+        &mut self,
+        arm: &Arm<f64>,
+        setup: &Setup,
+        base: &Base,
+        rest: &mut Equilibrated,
+    ) -> Option<Frame<f64>> {
         match self {
-            Self::Rigid { links, passed } => {
+            Self::Rigid { links, passed, .. } => {
                 let mut frame = base.frame;
                 passed.clear();
-                for (link, &q) in links.iter().zip(pose.setup.configuration) {
-                    for (motion, column) in link.joint.motions(q).into_iter().zip(link.columns) {
-                        passed.push(Passed { motion, before: frame, column });
+                for (link, &q) in links.iter().zip(setup.configuration) {
+                    for (motion, input) in link.joint.motions(q).into_iter().zip(link.inputs) {
+                        passed.push(Passed { motion, before: frame, input });
                         motion.re().apply(&mut frame);
                     }
                 }
                 Some(frame)
             }
             Self::Elastic(elastic) => {
-                arm.equilibrate(&pose.setup, &mut elastic.real, rest).ok().map(|()| base.frame.seen(&rest.frame))
+                arm.equilibrate(setup, &mut elastic.real, rest).ok().map(|()| base.frame.seen(&rest.frame))
             }
         }
     }
 
     /// Writes the derivatives with respect to the arm's own parameters, once its last frame is known.
-    fn write(&mut self, pose: &Pose, base: &Base, target: &Target, rest: &mut Equilibrated, rows: &mut Rows) {
+    ///
+    /// `setup` is the pose as the joints take it, `commanded` as it was commanded.
+    fn write(
+        &mut self,
+        commanded: &Setup,
+        setup: &Setup,
+        base: &Base,
+        target: &Target,
+        rest: &mut Equilibrated,
+        rows: &mut Rows,
+    ) {
         match self {
-            Self::Rigid { passed, .. } => {
+            Self::Rigid { passed, inputs, .. } => {
                 let mut after = target.position;
-                for Passed { motion, before, column } in passed.iter().rev() {
+                for Passed { motion, before, input } in passed.iter().rev() {
                     let moved = motion.carry(&after);
-                    rows.put_if(*column, || before.vector(&moved.map(|coordinate| coordinate.eps)));
+                    if let Some(input) = input {
+                        let derivative = before.vector(&moved.map(|coordinate| coordinate.eps));
+                        rows.put_input(&inputs[*input], commanded, &derivative);
+                    }
                     after = moved.map(|coordinate| coordinate.re);
                 }
             }
             Self::Elastic(elastic) => {
                 let Elastic { response, chunks, ws, .. } = &mut **elastic;
                 if !chunks.is_empty() {
-                    response.adjoint(&pose.setup, &target.position, rest);
+                    response.adjoint(setup, &target.position, rest);
                 }
                 for chunk in chunks {
-                    let position = chunk.arm.target_position(&pose.setup, &target.position, rest, ws);
+                    let position = chunk.arm.target_position(setup, &target.position, rest, ws);
                     let gradients = position.map(|coordinate| gradient(&coordinate));
-                    for (k, &column) in chunk.columns.iter().enumerate() {
-                        rows.put(column, &base.frame.vector(&gradients.map(|g| g[k])));
+                    for (k, input) in chunk.inputs.iter().enumerate() {
+                        rows.put_input(input, commanded, &base.frame.vector(&gradients.map(|g| g[k])));
                     }
                 }
             }
@@ -213,21 +261,38 @@ impl Inner {
     }
 }
 
+/// The arm at `x` with a derivative for each of some inputs.
+fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[Input]) -> Arm<ChunkDual> {
+    let place = |k: usize| inputs.iter().position(|input| input.parameter == Some(k));
+    let mut arm = model.arm(|k| seeded(x[k], place(k)));
+    for (direction, input) in inputs.iter().enumerate() {
+        if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
+            let seed = seeded(0.0, Some(direction));
+            let joint = &mut arm.joints[joint];
+            match field {
+                JointField::D => joint.d += seed,
+                _ => joint.theta += seed,
+            }
+        }
+    }
+    arm
+}
+
 /// The links of a rigid arm, each with its own parameters seeded.
-fn links(model: &Model, arm: &Arm<f64>, own: &[(usize, usize)]) -> Vec<Link> {
+fn links(arm: &Arm<f64>, inputs: &[Input]) -> Vec<Link> {
     let seed = |value: f64| Dual64::from(value).derivative();
     let link = |joint: &Joint<f64>| {
         let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
         let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
         let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
-        Link { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, columns: [None; 5] }
+        Link { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, inputs: [None; 5] }
     };
     let mut links: Vec<Link> = arm.joints.iter().map(link).collect();
-    for &(column, k) in own {
-        if let Slot::Joint { joint, field } = model.parameters[k].slot
+    for (index, input) in inputs.iter().enumerate() {
+        if let Slot::Joint { joint, field } = input.slot
             && let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field)
         {
-            links[joint].columns[place] = Some(column);
+            links[joint].inputs[place] = Some(index);
         }
     }
     links

@@ -4,6 +4,10 @@
 mod ablation;
 mod command;
 mod derivative;
+mod driven;
+mod enter;
+mod inputs;
+mod observation;
 mod poses;
 
 pub use ablation::Ablation;
@@ -11,17 +15,23 @@ pub use poses::{Pose, PoseResiduals};
 
 use nalgebra::Vector3;
 
-use crate::arm::{Angle, Arm};
-use crate::error::{InputError, InputErrorKind};
-use crate::parameter::{BeamField, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::arm::Arm;
+use crate::effect;
+use crate::error::InputError;
+use crate::parameter::{LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
+use driven::Driven;
+use observation::Observation;
 
 /// What predicts positions, as a function of the free parameters.
 #[derive(Debug, Clone)]
 pub struct Model {
     nominal: Arm<f64>,
+    /// What drives joints beyond their commands without being free.
+    driven: Vec<Driven>,
+    observation: Observation,
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
@@ -34,15 +44,17 @@ impl Model {
     /// The declared arm with one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, or an effect is declared.
+    /// A rule of `[parameters]` or a constraint does not fit the parameters there are.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
-        if let Some(declared) = problem.effects.first() {
-            return Err(declared.location.clone().error(InputErrorKind::EffectNotModelled));
-        }
-        let parameters = resolve(problem, bases, targets)?;
+        let effects = effect::parameters(problem);
+        let parameters = resolve(problem, bases, targets, &effects)?;
+        let mut nominal = Arm::nominal(problem);
+        effects.iter().for_each(|effect| enter::prepare(&mut nominal, effect.slot, effect.nominal));
         Ok(Self {
-            constraints: constrain(problem, bases, targets, &parameters)?,
-            nominal: Arm::nominal(problem),
+            constraints: constrain(problem, bases, targets, &effects, &parameters)?,
+            nominal,
+            driven: Vec::new(),
+            observation: Observation::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
             parameters,
@@ -57,35 +69,14 @@ impl Model {
     /// The arm with parameter k at deviation `x(k)`, as declared where no parameter is free.
     pub fn arm<S: Scalar>(&self, x: impl Fn(usize) -> S) -> Arm<S> {
         let mut arm = self.nominal.lift();
+        let mut tilt = [S::from(0.0); 2];
         for (k, parameter) in self.parameters.iter().enumerate() {
-            let nominal = parameter.nominal;
-            match parameter.slot {
-                Slot::Joint { joint, field } => {
-                    let (x, joint) = (x(k), &mut arm.joints[joint]);
-                    match field {
-                        JointField::Alpha => joint.alpha = Angle::new(x + nominal),
-                        JointField::A => joint.a = x + nominal,
-                        JointField::Theta => joint.theta = x + nominal,
-                        JointField::D => joint.d = x + nominal,
-                        JointField::Beta => joint.beta = Angle::new(x + nominal),
-                        JointField::Stiffness => joint.flexibility = Some((-x).exp() / nominal),
-                    }
-                }
-                Slot::Beam { joint, field } => {
-                    let flexibility = (-x(k)).exp() / nominal;
-                    if let Some(beam) = &mut arm.joints[joint].beam {
-                        let all = &mut beam.flexibility;
-                        match field {
-                            BeamField::Axial => all.axial = flexibility,
-                            BeamField::Bending => (all.about_y, all.about_z) = (flexibility, flexibility),
-                            BeamField::BendingY => all.about_y = flexibility,
-                            BeamField::BendingZ => all.about_z = flexibility,
-                            BeamField::Twist => all.twist = flexibility,
-                        }
-                    }
-                }
-                Slot::Base { .. } | Slot::Target { .. } => {}
+            if parameter.driver.is_constant() {
+                enter::enter(&mut arm, parameter.slot, parameter.nominal, x(k), &mut tilt);
             }
+        }
+        if self.parameters.iter().any(|parameter| matches!(parameter.slot, Slot::Arm(field) if field.turns_gravity())) {
+            enter::turn_gravity(&mut arm, tilt);
         }
         arm
     }

@@ -6,6 +6,8 @@ use nalgebra::{DVector, Vector3};
 
 use super::Model;
 use super::derivative::Linearised;
+use super::driven::Commands;
+use super::observation::Observation;
 use crate::arm::{Equilibrated, Setup, Workspace};
 use crate::fit::{Block, LeastSquares};
 
@@ -76,11 +78,16 @@ impl<'a> PoseResiduals<'a> {
         let arm = self.model.arm(|k| full[k]);
         let bases = self.model.base_frames(full.as_slice());
         let targets = self.model.target_positions(full.as_slice());
+        let observation = Observation::new(self.model, full.as_slice());
+        let mut commands = Commands::new(self.model, full.as_slice());
         let mut ws = Workspace::default();
         let mut rest = Equilibrated::default();
         for pose in &self.poses[items] {
-            let predicted = match arm.equilibrate(&pose.setup, &mut ws, &mut rest) {
-                Ok(()) => bases[pose.base].point(&rest.frame.point(&targets[pose.target])),
+            let predicted = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
+                Ok(()) => {
+                    let position = bases[pose.base].point(&rest.frame.point(&targets[pose.target]));
+                    observation.of(&position, &pose.setup)
+                }
                 Err(_) => Vector3::from_element(f64::NAN),
             };
             use_it(pose, predicted);

@@ -1,6 +1,6 @@
 //! From `[[constraint]]` to linear inequalities between unknowns.
 
-use super::resolve::candidates;
+use super::resolve::{EffectParameter, candidates};
 use super::{Parameter, Unit};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::{Constraint, Limit, LimitKind, Problem};
@@ -42,10 +42,11 @@ pub fn constrain(
     problem: &Problem,
     bases: &[String],
     targets: &[String],
+    effects: &[EffectParameter],
     parameters: &[Parameter],
 ) -> Result<Vec<LinearConstraint>, InputError> {
-    let known: Vec<(String, Unit, f64)> =
-        candidates(problem, bases, targets).into_iter().map(|c| (c.name, c.slot.unit(), c.nominal)).collect();
+    let all = candidates(problem, bases, targets, effects);
+    let known: Vec<(String, Unit, f64)> = all.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
     problem.constraints.iter().map(|constraint| one(constraint, &known, parameters)).collect()
 }
 
@@ -63,6 +64,9 @@ fn one(
             let known = known.iter().map(|(name, ..)| name.clone()).collect();
             return error(InputErrorKind::UnknownParameter { known });
         };
+        if !matches!(unit, Unit::Angle | Unit::Length) && !unit.is_relative() {
+            return error(InputErrorKind::NotConstrainable);
+        }
         let kind = kind_of(*unit);
         match first {
             None => first = Some((name, kind)),
@@ -109,7 +113,7 @@ fn kind_of(unit: Unit) -> LimitKind {
     match unit {
         Unit::Angle => LimitKind::Angle,
         Unit::Length => LimitKind::Length,
-        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => LimitKind::Logarithm,
+        _ => LimitKind::Logarithm,
     }
 }
 

@@ -4,12 +4,14 @@
 //! stiffnesses and rigidities, so that x = 0 is nominal everywhere and a stiffness never turns negative.
 
 mod constraint;
+mod driver;
 mod name;
 mod resolve;
 
 pub use constraint::{LinearConstraint, constrain};
-pub use name::{BeamField, JointField, Slot};
-pub use resolve::resolve;
+pub use driver::{Driver, Quantity};
+pub use name::{ArmField, BeamField, JointField, Slot};
+pub use resolve::{EffectParameter, resolve};
 
 /// A free parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +20,8 @@ pub struct Parameter {
     pub name: String,
     /// Where it enters the model.
     pub slot: Slot,
+    /// What it is multiplied by there.
+    pub driver: Driver,
     /// Nominal value, SI.
     pub nominal: f64,
     /// 1 σ of the Gaussian prior on x about 0.
@@ -41,6 +45,28 @@ pub enum Unit {
     AxialRigidity,
     /// EI or GJ [N·m²]
     FlexuralRigidity,
+    /// [rad/(N·m)]
+    Compliance,
+    /// [rad/(N·m)³]
+    CubicCompliance,
+    /// Of a bending beam [1/(N·m²)]
+    Flexibility,
+    /// [1/(m·K)]
+    CurvaturePerDegree,
+    /// [1/K]
+    PerDegree,
+    /// [rad/K]
+    AnglePerDegree,
+    /// [m/K]
+    LengthPerDegree,
+    /// [kg]
+    Mass,
+    /// [1/m]
+    PerLength,
+    /// [m/s]
+    Speed,
+    /// A number, or rad/rad, m/m, rad/m, m/rad
+    Ratio,
 }
 
 impl Unit {
@@ -52,6 +78,17 @@ impl Unit {
             Self::TorsionalStiffness => "N·m/rad",
             Self::AxialRigidity => "N",
             Self::FlexuralRigidity => "N·m²",
+            Self::Compliance => "rad/(N·m)",
+            Self::CubicCompliance => "rad/(N·m)³",
+            Self::Flexibility => "1/(N·m²)",
+            Self::CurvaturePerDegree => "1/(m·K)",
+            Self::PerDegree => "1/K",
+            Self::AnglePerDegree => "rad/K",
+            Self::LengthPerDegree => "m/K",
+            Self::Mass => "kg",
+            Self::PerLength => "1/m",
+            Self::Speed => "m/s",
+            Self::Ratio => "1",
         }
     }
 
@@ -64,7 +101,7 @@ impl Unit {
 impl Parameter {
     /// Kind of quantity.
     pub fn unit(&self) -> Unit {
-        self.slot.unit()
+        unit(self.slot, self.driver)
     }
 
     /// Value at x, SI.
@@ -85,5 +122,16 @@ impl Parameter {
     /// Whether x has a lower or an upper bound.
     pub fn is_bounded(&self) -> bool {
         self.lower.is_finite() || self.upper.is_finite()
+    }
+}
+
+/// Kind of a quantity that is multiplied by `driver` before it enters at `slot`.
+pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
+    match (driver, slot.unit()) {
+        (Driver::Warming { .. }, Unit::Angle) => Unit::AnglePerDegree,
+        (Driver::Warming { .. }, _) => Unit::LengthPerDegree,
+        (Driver::Elapsed, _) => Unit::Speed,
+        (Driver::Command(_), _) => Unit::Ratio,
+        (_, unit) => unit,
     }
 }

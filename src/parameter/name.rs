@@ -12,13 +12,15 @@ pub enum Slot {
         /// Which field.
         field: JointField,
     },
-    /// A rigidity of the beam before a joint.
+    /// A field of the beam before a joint.
     Beam {
         /// Index of the joint that carries the beam.
         joint: usize,
-        /// Which rigidity.
+        /// Which field.
         field: BeamField,
     },
+    /// What acts on the arm as a whole.
+    Arm(ArmField),
     /// A coordinate of a base pose: translation x, y, z, then rotation vector x, y, z.
     Base {
         /// Index of the base.
@@ -33,11 +35,18 @@ pub enum Slot {
         /// 0..3.
         axis: usize,
     },
+    /// A displacement of every measured position, measuring frame.
+    Shift {
+        /// 0..3.
+        axis: usize,
+    },
+    /// A relative error of every measured coordinate.
+    Scale,
 }
 
-/// A field of a joint that may be free.
+/// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "the letters of [Chen2021, eq. 1]")]
+#[expect(missing_docs, reason = "letters need no words")]
 pub enum JointField {
     Alpha,
     A,
@@ -45,9 +54,19 @@ pub enum JointField {
     D,
     Beta,
     Stiffness,
+    /// Added to 1/k [rad/(N·m)].
+    Compliance,
+    /// Angle per cube of the moment [rad/(N·m)³].
+    Cubic,
+    /// Play that the moment takes up [rad].
+    Play,
+    /// Flexibility about x before the joint turns [rad/(N·m)].
+    LateralX,
+    /// Flexibility about y before the joint turns [rad/(N·m)].
+    LateralY,
 }
 
-/// A rigidity of a beam that may be free.
+/// A field of a beam that may be free: rigidities, then what effects add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum BeamField {
     /// EA.
@@ -60,6 +79,50 @@ pub enum BeamField {
     BendingZ,
     /// GJ.
     Twist,
+    /// Added to 1/EI about y and z [1/(N·m²)].
+    Flexibility,
+    /// Curvature about y per degree [1/(m·K)].
+    WarmingY,
+    /// Curvature about z per degree [1/(m·K)].
+    WarmingZ,
+    /// Strain per degree [1/K].
+    Expansion,
+    /// A mass on the beam's axis [kg].
+    AddedMass,
+    /// Where that mass is, from the root [m].
+    AddedAt,
+}
+
+/// What acts on the arm as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ArmField {
+    /// Added to every payload that is carried [kg].
+    Payload,
+    /// Relative error of the hoist's force.
+    HoistForce,
+    /// Lean of the hoist's direction along x.
+    HoistLeanX,
+    /// Lean of the hoist's direction along y.
+    HoistLeanY,
+    /// Change of that lean with the hook's place [1/m].
+    HoistTrolley,
+    /// Flexibility of the base about x [rad/(N·m)].
+    MountingX,
+    /// Flexibility of the base about y [rad/(N·m)].
+    MountingY,
+    /// Gravity turned about x [rad].
+    GravityX,
+    /// Gravity turned about y [rad].
+    GravityY,
+    /// λ between loads on the rigid arm, 0, and on the bent arm, 1.
+    Mixing,
+}
+
+impl ArmField {
+    /// Whether it is a coordinate of the rotation vector that turns gravity.
+    pub fn turns_gravity(self) -> bool {
+        matches!(self, Self::GravityX | Self::GravityY)
+    }
 }
 
 impl JointField {
@@ -75,6 +138,11 @@ impl JointField {
             Self::D => "d",
             Self::Beta => "beta",
             Self::Stiffness => "stiffness",
+            Self::Compliance => "compliance",
+            Self::Cubic => "cubic",
+            Self::Play => "play",
+            Self::LateralX => "lateral_x",
+            Self::LateralY => "lateral_y",
         }
     }
 }
@@ -88,6 +156,12 @@ impl BeamField {
             Self::BendingY => "EIy",
             Self::BendingZ => "EIz",
             Self::Twist => "GJ",
+            Self::Flexibility => "flexibility",
+            Self::WarmingY => "warming_y",
+            Self::WarmingZ => "warming_z",
+            Self::Expansion => "expansion",
+            Self::AddedMass => "added_mass",
+            Self::AddedAt => "added_at",
         }
     }
 }
@@ -97,26 +171,46 @@ impl Slot {
     pub fn unit(self) -> Unit {
         match self {
             Self::Joint { field, .. } => match field {
-                JointField::Alpha | JointField::Theta | JointField::Beta => Unit::Angle,
+                JointField::Alpha | JointField::Theta | JointField::Beta | JointField::Play => Unit::Angle,
                 JointField::A | JointField::D => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
+                JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
+                JointField::Cubic => Unit::CubicCompliance,
             },
-            Self::Beam { field: BeamField::Axial, .. } => Unit::AxialRigidity,
-            Self::Beam { .. } => Unit::FlexuralRigidity,
-            Self::Base { axis, .. } => {
-                if axis < 3 {
-                    Unit::Length
-                } else {
-                    Unit::Angle
+            Self::Beam { field, .. } => match field {
+                BeamField::Axial => Unit::AxialRigidity,
+                BeamField::Bending | BeamField::BendingY | BeamField::BendingZ | BeamField::Twist => {
+                    Unit::FlexuralRigidity
                 }
-            }
-            Self::Target { .. } => Unit::Length,
+                BeamField::Flexibility => Unit::Flexibility,
+                BeamField::WarmingY | BeamField::WarmingZ => Unit::CurvaturePerDegree,
+                BeamField::Expansion => Unit::PerDegree,
+                BeamField::AddedMass => Unit::Mass,
+                BeamField::AddedAt => Unit::Length,
+            },
+            Self::Arm(field) => match field {
+                ArmField::Payload => Unit::Mass,
+                ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::Mixing => Unit::Ratio,
+                ArmField::HoistTrolley => Unit::PerLength,
+                ArmField::MountingX | ArmField::MountingY => Unit::Compliance,
+                ArmField::GravityX | ArmField::GravityY => Unit::Angle,
+            },
+            Self::Base { axis, .. } if axis >= 3 => Unit::Angle,
+            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
+            Self::Scale => Unit::Ratio,
         }
     }
 
-    /// Whether the slot describes elasticity rather than geometry.
+    /// Whether the slot describes elasticity or loads rather than geometry.
     pub fn is_elastic(self) -> bool {
-        matches!(self, Self::Beam { .. } | Self::Joint { field: JointField::Stiffness, .. })
+        match self {
+            Self::Joint { field, .. } => !JointField::GEOMETRY.contains(&field) && field != JointField::Play,
+            Self::Beam { field, .. } => {
+                !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)
+            }
+            Self::Arm(_) => true,
+            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } | Self::Scale => false,
+        }
     }
 
     /// Whether the slot belongs to a session's set-up (base or target) rather than to the arm.

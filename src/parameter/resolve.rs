@@ -1,6 +1,6 @@
 //! From the rules of `[parameters]` to free parameters.
 
-use super::{BeamField, JointField, Parameter, Slot, Unit};
+use super::{BeamField, Driver, JointField, Parameter, Slot, Unit, unit};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
@@ -11,7 +11,37 @@ pub(super) struct Candidate {
     /// The name without the session or target in brackets, which patterns may use as well.
     plain: String,
     pub(super) slot: Slot,
+    pub(super) driver: Driver,
     pub(super) nominal: f64,
+    /// For a parameter of an effect, which is free with this prior where no rule speaks of it.
+    of_effect: Option<f64>,
+}
+
+impl Candidate {
+    pub(super) fn unit(&self) -> Unit {
+        unit(self.slot, self.driver)
+    }
+
+    fn matches(&self, rule: &ParameterRule) -> bool {
+        matches(&rule.pattern, &self.name) || matches(&rule.pattern, &self.plain)
+    }
+}
+
+/// A parameter of a declared effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectParameter {
+    /// `gear-ratio[3].error`
+    pub name: String,
+    /// The name without the place in brackets: `gear-ratio.error`.
+    pub plain: String,
+    /// Where it enters.
+    pub slot: Slot,
+    /// What it is multiplied by there.
+    pub driver: Driver,
+    /// Value of no effect, or where an effect of no size would be.
+    pub nominal: f64,
+    /// 1 σ of a prior that leaves every realistic size possible.
+    pub sigma: f64,
 }
 
 /// Free parameters of `problem` with one base per name in `bases` and one target per name in `targets`.
@@ -20,14 +50,22 @@ pub(super) struct Candidate {
 ///
 /// # Errors
 /// A rule matches nothing, or gives a quantity of the wrong kind.
-pub fn resolve(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Vec<Parameter>, InputError> {
-    let candidates = candidates(problem, bases, targets);
+pub fn resolve(
+    problem: &Problem,
+    bases: &[String],
+    targets: &[String],
+    effects: &[EffectParameter],
+) -> Result<Vec<Parameter>, InputError> {
+    let candidates = candidates(problem, bases, targets, effects);
     let mut decided: Vec<Option<&ParameterRule>> = vec![None; candidates.len()];
     for rule in &problem.parameters {
         let mut matched = false;
         for (candidate, decision) in candidates.iter().zip(&mut decided) {
-            if matches(&rule.pattern, &candidate.name) || matches(&rule.pattern, &candidate.plain) {
+            if candidate.matches(rule) {
                 matched = true;
+                if candidate.of_effect.is_some() && !fits(rule, candidate.unit()) {
+                    continue;
+                }
                 *decision = Some(rule);
             }
         }
@@ -44,14 +82,20 @@ pub fn resolve(problem: &Problem, bases: &[String], targets: &[String]) -> Resul
     }
     let mut parameters = Vec::new();
     for (candidate, rule) in candidates.into_iter().zip(decided) {
-        let Some(ParameterRule { freedom: Freedom::Free { sigma, min, max }, .. }) = rule else { continue };
-        let unit = candidate.slot.unit();
+        let none = Quantities::default();
+        let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.of_effect) {
+            (Some(Freedom::Free { sigma, min, max }), _) => (of_kind(sigma, candidate.unit()), min, max),
+            (None, Some(sigma)) => (Some(sigma), &none, &none),
+            (Some(Freedom::Fixed), _) | (None, None) => continue,
+        };
+        let unit = candidate.unit();
         let bound = |q: &Quantities| of_kind(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v });
         parameters.push(Parameter {
             name: candidate.name,
             slot: candidate.slot,
+            driver: candidate.driver,
             nominal: candidate.nominal,
-            sigma: of_kind(sigma, unit),
+            sigma,
             lower: bound(min).unwrap_or(f64::NEG_INFINITY),
             upper: bound(max).unwrap_or(f64::INFINITY),
         });
@@ -59,20 +103,33 @@ pub fn resolve(problem: &Problem, bases: &[String], targets: &[String]) -> Resul
     Ok(parameters)
 }
 
-/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets.
-pub(super) fn candidates(problem: &Problem, bases: &[String], targets: &[String]) -> Vec<Candidate> {
+/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, effects.
+pub(super) fn candidates(
+    problem: &Problem,
+    bases: &[String],
+    targets: &[String],
+    effects: &[EffectParameter],
+) -> Vec<Candidate> {
     let mut out = Vec::new();
-    for (joint, declared) in problem.joints.iter().enumerate() {
-        let nominal = [declared.alpha, declared.a, declared.theta, declared.d, declared.beta];
+    let declared = |name: String, plain: String, slot, nominal| Candidate {
+        name,
+        plain,
+        slot,
+        driver: Driver::Constant,
+        nominal,
+        of_effect: None,
+    };
+    for (joint, own) in problem.joints.iter().enumerate() {
+        let nominal = [own.alpha, own.a, own.theta, own.d, own.beta];
         let geometry = JointField::GEOMETRY.into_iter().zip(nominal);
-        let stiffness = declared.stiffness.map(|k| (JointField::Stiffness, k));
+        let stiffness = own.stiffness.map(|k| (JointField::Stiffness, k));
         for (field, nominal) in geometry.chain(stiffness) {
             let name = format!("joint{}.{}", joint + 1, field.name());
-            out.push(Candidate { plain: name.clone(), name, slot: Slot::Joint { joint, field }, nominal });
+            out.push(declared(name.clone(), name, Slot::Joint { joint, field }, nominal));
         }
     }
-    for (joint, declared) in problem.joints.iter().enumerate() {
-        let Some(beam) = &declared.beam else { continue };
+    for (joint, own) in problem.joints.iter().enumerate() {
+        let Some(beam) = &own.beam else { continue };
         let bending = if beam.ei_y == beam.ei_z {
             [(BeamField::Bending, beam.ei_y), (BeamField::BendingZ, None)]
         } else {
@@ -82,7 +139,7 @@ pub(super) fn candidates(problem: &Problem, bases: &[String], targets: &[String]
         for (field, nominal) in all {
             let Some(nominal) = nominal else { continue };
             let name = format!("{}.{}", beam.name, field.name());
-            out.push(Candidate { plain: name.clone(), name, slot: Slot::Beam { joint, field }, nominal });
+            out.push(declared(name.clone(), name, Slot::Beam { joint, field }, nominal));
         }
     }
     let label = |what: &str, word: &str| if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") };
@@ -90,15 +147,23 @@ pub(super) fn candidates(problem: &Problem, bases: &[String], targets: &[String]
     for (base, word) in bases.iter().enumerate() {
         for (axis, (suffix, &nominal)) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose.clone()).enumerate() {
             let name = format!("{}.{suffix}", label("base", word));
-            out.push(Candidate { name, plain: format!("base.{suffix}"), slot: Slot::Base { base, axis }, nominal });
+            out.push(declared(name, format!("base.{suffix}"), Slot::Base { base, axis }, nominal));
         }
     }
     for (target, word) in targets.iter().enumerate() {
         for (axis, (suffix, &nominal)) in ["x", "y", "z"].iter().zip(&problem.tool.target).enumerate() {
             let name = format!("{}.{suffix}", label("tool", word));
-            out.push(Candidate { name, plain: format!("tool.{suffix}"), slot: Slot::Target { target, axis }, nominal });
+            out.push(declared(name, format!("tool.{suffix}"), Slot::Target { target, axis }, nominal));
         }
     }
+    out.extend(effects.iter().cloned().map(|effect| Candidate {
+        name: effect.name,
+        plain: effect.plain,
+        slot: effect.slot,
+        driver: effect.driver,
+        nominal: effect.nominal,
+        of_effect: Some(effect.sigma),
+    }));
     out
 }
 
@@ -111,16 +176,17 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     if !kinds.iter().any(|&unit| given(unit)) {
         return Ok(());
     }
-    let matched: Vec<&Candidate> = candidates
-        .iter()
-        .filter(|candidate| matches(&rule.pattern, &candidate.name) || matches(&rule.pattern, &candidate.plain))
-        .collect();
-    if let Some(candidate) = matched.iter().find(|candidate| !given(candidate.slot.unit())) {
-        let (parameter, suffixes) = (candidate.name.clone(), suffixes(candidate.slot.unit()));
+    let matched: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
+    // A rule that speaks of others as well leaves the effects that it does not fit as they are.
+    let all_of_effects = matched.iter().all(|candidate| candidate.of_effect.is_some());
+    let missing =
+        |candidate: &&&Candidate| (all_of_effects || candidate.of_effect.is_none()) && !given(candidate.unit());
+    if let Some(candidate) = matched.iter().find(missing) {
+        let (parameter, suffixes) = (candidate.name.clone(), suffixes(candidate.unit()));
         return fail(InputErrorKind::QuantityMissing { parameter, suffixes });
     }
     for unit in kinds {
-        let fits = |candidate: &&Candidate| suffixes(candidate.slot.unit()) == suffixes(unit);
+        let fits = |candidate: &&Candidate| suffixes(candidate.unit()) == suffixes(unit);
         if given(unit) && !matched.iter().any(fits) {
             return fail(InputErrorKind::QuantityUseless { suffixes: suffixes(unit) });
         }
@@ -128,11 +194,19 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     Ok(())
 }
 
+/// Whether a rule can be meant for a quantity of this kind: it holds it, frees it, or gives its unit.
+fn fits(rule: &ParameterRule, unit: Unit) -> bool {
+    let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
+    let all = [sigma, min, max];
+    all.iter().all(|q| **q == Quantities::default()) || all.iter().any(|q| of_kind(q, unit).is_some())
+}
+
 fn suffixes(unit: Unit) -> &'static str {
     match unit {
         Unit::Angle => "_deg or _rad",
         Unit::Length => "_mm or _m",
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => "_relative",
+        _ => "free = true or fixed = true",
     }
 }
 
@@ -141,5 +215,6 @@ fn of_kind(quantities: &Quantities, unit: Unit) -> Option<f64> {
         Unit::Angle => quantities.angle,
         Unit::Length => quantities.length,
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => quantities.relative,
+        _ => None,
     }
 }

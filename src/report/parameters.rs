@@ -68,6 +68,7 @@ fn is_vague(estimate: &Estimate) -> bool {
         Unit::Angle => 1.0_f64.to_radians(),
         Unit::Length => 0.01,
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => 0.5 * estimate.estimate,
+        _ => f64::INFINITY,
     };
     estimate.std_error.is_none_or(|error| error > limit)
 }

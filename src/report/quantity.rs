@@ -15,6 +15,16 @@ impl Display {
         match unit {
             Unit::Angle => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°".to_owned() },
             Unit::Length => Self { factor: 1e3, symbol: "mm".to_owned() },
+            Unit::AnglePerDegree => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°/K".to_owned() },
+            Unit::LengthPerDegree => Self { factor: 1e3, symbol: "mm/K".to_owned() },
+            Unit::Speed => Self { factor: 3.6e6, symbol: "mm/h".to_owned() },
+            Unit::Compliance => Self { factor: 1e6, symbol: "µrad/(N·m)".to_owned() },
+            Unit::CubicCompliance => Self { factor: 1e9, symbol: "nrad/(N·m)³".to_owned() },
+            Unit::Flexibility => Self { factor: 1e6, symbol: "1/(MN·m²)".to_owned() },
+            Unit::CurvaturePerDegree => Self { factor: 1e6, symbol: "µrad/(m·K)".to_owned() },
+            Unit::PerDegree => Self { factor: 1e6, symbol: "10⁻⁶/K".to_owned() },
+            Unit::Ratio => Self { factor: 1e3, symbol: "‰".to_owned() },
+            Unit::Mass | Unit::PerLength => Self { factor: 1.0, symbol: unit.symbol().to_owned() },
             Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
                 let (factor, prefix) = match magnitude.abs() {
                     m if m >= 1e9 => (1e-9, "G"),

@@ -42,12 +42,18 @@ impl Placement {
     /// Rows as poses; `sigma` [m] is that of rows without one of their own.
     pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
         let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
+        let n = measurements.joints;
+        let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
         rows.iter()
             .map(|&row| Pose {
                 setup: Setup {
                     configuration: measurements.configuration(row),
                     payload: at(&measurements.payload, row),
                     hoist: at(&measurements.hoist, row),
+                    temperature: at(&measurements.temperature, row),
+                    time: measurements.time[row],
+                    elapsed: measurements.time[row] - first,
+                    approach: measurements.approach.as_ref().map(|all| &all[row * n..(row + 1) * n]),
                 },
                 base: self.base_of_row[row],
                 target: self.target_of_row[row],
@@ -74,7 +80,7 @@ impl Placement {
             .map(|parameter| match parameter.slot {
                 Slot::Base { base, .. } => bases[base],
                 Slot::Target { target, .. } => targets[target],
-                Slot::Joint { .. } | Slot::Beam { .. } => false,
+                _ => false,
             })
             .collect();
         let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];

@@ -81,7 +81,7 @@ pub(super) fn underdetermined(
         let own = |slot| match slot {
             Slot::Base { base, .. } => base == b,
             Slot::Target { target, .. } => alone(target) && rows.iter().any(|&row| placement.target_of(row) == target),
-            Slot::Joint { .. } | Slot::Beam { .. } => false,
+            _ => false,
         };
         check(format!("base[{}]", placement.bases[b]), &|row| placement.base_of(row) == b, &own)
     };

@@ -80,7 +80,7 @@ pub fn table_2_deviations(parameters: &[Parameter]) -> DVector<f64> {
             JointField::Theta => theta.to_radians(),
             JointField::D => d,
             JointField::Beta => beta.to_radians(),
-            JointField::Stiffness => return 0.0,
+            _ => return 0.0,
         };
         value - parameter.nominal
     };

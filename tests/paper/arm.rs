@@ -24,7 +24,7 @@ impl Row {
     }
 
     pub fn arm_setup(&self) -> arm::Setup<'_> {
-        arm::Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
+        arm::Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..arm::Setup::of(&self.q) }
     }
 }
 

@@ -196,6 +196,7 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
                         BeamField::BendingY => Flexibility::BendingY(joint),
                         BeamField::BendingZ => Flexibility::BendingZ(joint),
                         BeamField::Twist => Flexibility::Twist(joint),
+                        _ => continue,
                     },
                     _ => continue,
                 };

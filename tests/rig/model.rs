@@ -64,7 +64,7 @@ payload_at_m = [0.1, 0.0, 0.3]
 fn closed_form(problem: &Problem, set: &Conditions) -> Vector3<f64> {
     let mut arm = Arm::nominal(problem);
     arm.beam_elements = 12;
-    let setup = Setup { configuration: &set.configuration, payload: set.payload, hoist: set.hoist };
+    let setup = Setup { payload: set.payload, hoist: set.hoist, ..Setup::of(&set.configuration) };
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)

@@ -1,0 +1,110 @@
+//! What an arm may do beyond its declared parameters; every term is inert at zero.
+
+use nalgebra::Vector3;
+
+use super::link::Hoist;
+use crate::scalar::Scalar;
+
+/// Moment at which play is taken up to three quarters [N·m].
+const PLAY_MOMENT: f64 = 1.0;
+
+/// How a joint turns about its axis other than in proportion to the moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nonlinear<S> {
+    /// Angle per cube of the moment [rad/(N·m)³].
+    pub cubic: S,
+    /// Play [rad], [m] where the joint slides: taken up by the direction of approach, by the moment where that is not known.
+    pub play: S,
+}
+
+/// How a link changes with temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thermal<S> {
+    /// Curvature about y and z per degree, turning per metre of +x [1/(m·K)].
+    pub curvature: [S; 2],
+    /// Strain per degree [1/K].
+    pub expansion: S,
+}
+
+/// A mass on a link's axis that nobody declared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AddedMass<S> {
+    /// Mass [kg].
+    pub mass: S,
+    /// Distance from the link's root [m].
+    pub at: S,
+}
+
+/// How ropes pull other than declared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rope<S> {
+    /// Relative error of the force.
+    pub force: S,
+    /// Lean of the direction, x and y of the base frame.
+    pub lean: [S; 2],
+    /// Change of the lean with the hook's x and y [1/m].
+    pub trolley: S,
+}
+
+impl<S: Scalar> Nonlinear<S> {
+    /// Angle under a moment [N·m]; play counts where no direction of approach takes it up.
+    pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
+        let cubic = self.cubic * moment * moment * moment;
+        if approach.is_some() { cubic } else { cubic + self.play * (moment / PLAY_MOMENT).tanh() * 0.5 }
+    }
+}
+
+impl<S: Scalar> Thermal<S> {
+    /// Strain and curvatures at a warming of `degrees` [K].
+    pub(super) fn strain(&self, degrees: f64) -> Strain<S> {
+        Strain { axial: self.expansion * degrees, curvature: self.curvature.map(|k| k * degrees) }
+    }
+}
+
+/// Strain of a beam without load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strain<S> {
+    /// Elongation per length.
+    pub axial: S,
+    /// Curvature about y and z [1/m].
+    pub curvature: [S; 2],
+}
+
+impl<S: Scalar> Rope<S> {
+    /// Force [N] with the hook at these x and y [m], base frame.
+    pub(super) fn pull(&self, hoist: &Hoist, tension: f64, [x, y]: [S; 2]) -> Vector3<S> {
+        let mut direction = hoist.direction.map(S::from);
+        direction.x += self.lean[0] + self.trolley * x;
+        direction.y += self.lean[1] + self.trolley * y;
+        let length = direction.dot(&direction).sqrt();
+        direction * ((self.force + 1.0) * tension / length)
+    }
+}
+
+impl Nonlinear<f64> {
+    /// The same as constants of another scalar.
+    pub(super) fn lift<S: Scalar>(&self) -> Nonlinear<S> {
+        Nonlinear { cubic: S::from(self.cubic), play: S::from(self.play) }
+    }
+}
+
+impl Thermal<f64> {
+    /// The same as constants of another scalar.
+    pub(super) fn lift<S: Scalar>(&self) -> Thermal<S> {
+        Thermal { curvature: self.curvature.map(S::from), expansion: S::from(self.expansion) }
+    }
+}
+
+impl AddedMass<f64> {
+    /// The same as constants of another scalar.
+    pub(super) fn lift<S: Scalar>(&self) -> AddedMass<S> {
+        AddedMass { mass: S::from(self.mass), at: S::from(self.at) }
+    }
+}
+
+impl Rope<f64> {
+    /// The same as constants of another scalar.
+    pub(super) fn lift<S: Scalar>(&self) -> Rope<S> {
+        Rope { force: S::from(self.force), lean: self.lean.map(S::from), trolley: S::from(self.trolley) }
+    }
+}

@@ -1,0 +1,41 @@
+//! What the data know about the poses besides their configurations.
+
+use nalgebra::Vector3;
+
+/// Which drivers of effects the poses at hand have, and vary.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conditions {
+    /// Whether the temperature is known and changes.
+    pub temperature: bool,
+    /// Whether directions of approach are known.
+    pub approach: bool,
+    /// For each joint, whether it was approached from both sides.
+    pub both_sides: Vec<bool>,
+    /// Whether a payload is carried in some poses.
+    pub payload: bool,
+    /// For each joint, the range of its commands [rad] or [m].
+    pub ranges: Vec<(f64, f64)>,
+    /// Times between which a station may have moved [s], ascending.
+    pub times: Vec<f64>,
+    /// Gravity, arm base frame [m/s²].
+    pub gravity: Vector3<f64>,
+}
+
+impl Conditions {
+    /// Whether a joint, counted from 0, moves at all.
+    pub fn moves(&self, joint: usize) -> bool {
+        self.ranges.get(joint).is_some_and(|(low, high)| high > low)
+    }
+
+    /// Whether loads act at all.
+    pub fn weighs(&self) -> bool {
+        self.gravity.norm() > 0.0
+    }
+}
+
+/// Why an effect that needs the temperature cannot be shown.
+pub(super) const NO_TEMPERATURE: &str = "no temperature that changes, or no reference_temperature_C";
+/// Why an effect of a joint that stands still cannot be shown.
+pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
+/// Why an effect of loads cannot be shown.
+pub(super) const NO_LOADS: &str = "no gravity, so no loads";

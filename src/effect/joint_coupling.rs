@@ -1,0 +1,31 @@
+//! `joint-coupling`: one joint turns another, Δθ_joint = k q_from.
+
+use super::conditions::STANDS_STILL;
+use super::place::{commanded, coordinate};
+use super::{Candidate, Family, Term};
+use crate::parameter::Driver;
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "joint-coupling",
+    terms: |effect, problem| match effect {
+        Effect::JointCoupling { joint, from } => {
+            vec![Term::driven("factor", coordinate(problem, *joint), Driver::Command(from - 1), 0.01)]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let pairs = commanded(problem).flat_map(|joint| commanded(problem).map(move |from| (joint, from)));
+        pairs
+            .filter(|(joint, from)| joint != from)
+            .map(|(joint, from)| {
+                Candidate::needing(Effect::JointCoupling { joint, from }, conditions.moves(from - 1), STANDS_STILL)
+            })
+            .collect()
+    },
+    describe: |effect| match effect {
+        Effect::JointCoupling { joint, from } => format!("joint {from} turns joint {joint} along"),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,61 @@
+//! What adds to the joints' commands, pose by pose.
+
+use super::Model;
+use crate::arm::Setup;
+use crate::parameter::{Driver, JointField, Slot};
+
+/// A known addition to a joint's coordinate: value × driver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Driven {
+    pub joint: usize,
+    pub driver: Driver,
+    /// [rad] or [m] per unit of the driver.
+    pub value: f64,
+}
+
+impl Driven {
+    /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate.
+    fn of(slot: Slot, driver: Driver, x: f64) -> Option<Self> {
+        match slot {
+            Slot::Joint { joint, field: JointField::Theta | JointField::D } if !driver.is_constant() => {
+                Some(Self { joint, driver, value: x })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Configurations with what drives them added, one pose at a time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Commands {
+    all: Vec<Driven>,
+    configuration: Vec<f64>,
+}
+
+impl Commands {
+    /// Of the model at the full parameter vector `x`.
+    pub fn new(model: &Model, x: &[f64]) -> Self {
+        let free = model.parameters.iter().zip(x);
+        let mut all = model.driven.clone();
+        all.extend(free.filter_map(|(parameter, &x)| Driven::of(parameter.slot, parameter.driver, x)));
+        Self { all, configuration: Vec::new() }
+    }
+
+    /// Everything that is added.
+    pub fn into_driven(self) -> Vec<Driven> {
+        self.all
+    }
+
+    /// The pose as the joints take it.
+    pub fn apply<'b>(&'b mut self, setup: &Setup<'b>) -> Setup<'b> {
+        if self.all.is_empty() {
+            return *setup;
+        }
+        self.configuration.clear();
+        self.configuration.extend_from_slice(setup.configuration);
+        for driven in &self.all {
+            self.configuration[driven.joint] += driven.value * driven.driver.value(setup);
+        }
+        Setup { configuration: &self.configuration, ..*setup }
+    }
+}

@@ -1,0 +1,137 @@
+//! How a parameter enters the arm, by its slot.
+
+use crate::arm::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Thermal};
+use crate::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::scalar::Scalar;
+use crate::spatial::rotate;
+use nalgebra::Vector3;
+
+/// Makes room at a slot for an effect's parameter, whose value without the effect is `nominal`.
+pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
+    match slot {
+        Slot::Joint { joint, field } => {
+            let joint = &mut arm.joints[joint];
+            match field {
+                JointField::Compliance => _ = joint.flexibility.get_or_insert(0.0),
+                JointField::Cubic | JointField::Play => {
+                    joint.nonlinear.get_or_insert(Nonlinear { cubic: 0.0, play: 0.0 });
+                }
+                JointField::LateralX | JointField::LateralY => _ = joint.lateral.get_or_insert([0.0; 2]),
+                _ => {}
+            }
+        }
+        Slot::Beam { joint, field } => {
+            let beam = arm.joints[joint].beam.get_or_insert_with(weightless);
+            match field {
+                BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion => {
+                    beam.thermal.get_or_insert(Thermal { curvature: [0.0; 2], expansion: 0.0 });
+                }
+                BeamField::AddedMass | BeamField::AddedAt => {
+                    let added = beam.added.get_or_insert(AddedMass { mass: 0.0, at: 0.0 });
+                    if field == BeamField::AddedAt {
+                        added.at = nominal;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Slot::Arm(field) => match field {
+            ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::HoistTrolley => {
+                arm.rope.get_or_insert(Rope { force: 0.0, lean: [0.0; 2], trolley: 0.0 });
+            }
+            ArmField::MountingX | ArmField::MountingY => _ = arm.mounting.get_or_insert([0.0; 2]),
+            ArmField::Mixing => _ = arm.mixing.get_or_insert(0.0),
+            ArmField::Payload | ArmField::GravityX | ArmField::GravityY => {}
+        },
+        Slot::Base { .. } | Slot::Target { .. } | Slot::Shift { .. } | Slot::Scale => {}
+    }
+}
+
+/// A link that was declared rigid, ready to bend.
+fn weightless() -> Beam<f64> {
+    Beam {
+        mass: 0.0,
+        flexibility: Flexibility { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0 },
+        masses: Vec::new(),
+        hoist: None,
+        thermal: None,
+        added: None,
+    }
+}
+
+/// Turns gravity by the rotation vector (x, y, 0) [rad].
+pub(super) fn turn_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
+    arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
+}
+
+/// Sets a slot of the arm to its nominal value and a deviation x; effects add to what is declared.
+///
+/// The turn of gravity is collected in `tilt`: both of its angles belong to one rotation vector.
+pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S, tilt: &mut [S; 2]) {
+    match slot {
+        Slot::Joint { joint, field } => {
+            let joint = &mut arm.joints[joint];
+            match (field, &mut joint.nonlinear, &mut joint.lateral) {
+                (JointField::Alpha, ..) => joint.alpha = Angle::new(x + nominal),
+                (JointField::A, ..) => joint.a = x + nominal,
+                (JointField::Theta, ..) => joint.theta = x + nominal,
+                (JointField::D, ..) => joint.d = x + nominal,
+                (JointField::Beta, ..) => joint.beta = Angle::new(x + nominal),
+                (JointField::Stiffness, ..) => joint.flexibility = Some((-x).exp() / nominal),
+                (JointField::Compliance, ..) => joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x)),
+                (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic = x,
+                (JointField::Play, Some(nonlinear), _) => nonlinear.play = x,
+                (JointField::LateralX, _, Some(lateral)) => lateral[0] = x,
+                (JointField::LateralY, _, Some(lateral)) => lateral[1] = x,
+                (JointField::Cubic | JointField::Play | JointField::LateralX | JointField::LateralY, ..) => {}
+            }
+        }
+        Slot::Beam { joint, field } => {
+            if let Some(beam) = &mut arm.joints[joint].beam {
+                enter_beam(beam, field, nominal, x);
+            }
+        }
+        Slot::Arm(field) => enter_arm(arm, field, x, tilt),
+        Slot::Base { .. } | Slot::Target { .. } | Slot::Shift { .. } | Slot::Scale => {}
+    }
+}
+
+fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
+    let all = &mut beam.flexibility;
+    let flexibility = (-x).exp() / nominal;
+    match (field, &mut beam.thermal, &mut beam.added) {
+        (BeamField::Axial, ..) => all.axial = flexibility,
+        (BeamField::Bending, ..) => (all.about_y, all.about_z) = (flexibility, flexibility),
+        (BeamField::BendingY, ..) => all.about_y = flexibility,
+        (BeamField::BendingZ, ..) => all.about_z = flexibility,
+        (BeamField::Twist, ..) => all.twist = flexibility,
+        (BeamField::Flexibility, ..) => {
+            all.about_y += x;
+            all.about_z += x;
+        }
+        (BeamField::WarmingY, Some(thermal), _) => thermal.curvature[0] = x,
+        (BeamField::WarmingZ, Some(thermal), _) => thermal.curvature[1] = x,
+        (BeamField::Expansion, Some(thermal), _) => thermal.expansion = x,
+        (BeamField::AddedMass, _, Some(added)) => added.mass = x,
+        (BeamField::AddedAt, _, Some(added)) => added.at = x + nominal,
+        (BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion, None, _)
+        | (BeamField::AddedMass | BeamField::AddedAt, _, None) => {}
+    }
+}
+
+fn enter_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
+    match (field, &mut arm.rope, &mut arm.mounting) {
+        (ArmField::Payload, ..) => arm.payload_error = x,
+        (ArmField::GravityX, ..) => tilt[0] = x,
+        (ArmField::GravityY, ..) => tilt[1] = x,
+        (ArmField::Mixing, ..) => arm.mixing = Some(x),
+        (ArmField::HoistForce, Some(rope), _) => rope.force = x,
+        (ArmField::HoistLeanX, Some(rope), _) => rope.lean[0] = x,
+        (ArmField::HoistLeanY, Some(rope), _) => rope.lean[1] = x,
+        (ArmField::HoistTrolley, Some(rope), _) => rope.trolley = x,
+        (ArmField::MountingX, _, Some(mounting)) => mounting[0] = x,
+        (ArmField::MountingY, _, Some(mounting)) => mounting[1] = x,
+        (ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::HoistTrolley, None, _)
+        | (ArmField::MountingX | ArmField::MountingY, _, None) => {}
+    }
+}

@@ -1,0 +1,40 @@
+//! From positions to what is measured of them.
+
+use nalgebra::Vector3;
+
+use super::Model;
+use crate::arm::Setup;
+use crate::parameter::{Driver, Slot};
+
+/// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Observation {
+    /// s.
+    pub scale: f64,
+    /// Axis, driver and size [m per unit of the driver].
+    shifts: Vec<(usize, Driver, f64)>,
+}
+
+impl Observation {
+    /// Of the model at the full parameter vector `x`.
+    pub fn new(model: &Model, x: &[f64]) -> Self {
+        let mut observation = model.observation.clone();
+        for (parameter, &x) in model.parameters.iter().zip(x) {
+            match parameter.slot {
+                Slot::Scale => observation.scale += x,
+                Slot::Shift { axis } => observation.shifts.push((axis, parameter.driver, x)),
+                _ => {}
+            }
+        }
+        observation
+    }
+
+    /// What is measured of a position, measuring frame [m].
+    pub fn of(&self, position: &Vector3<f64>, setup: &Setup) -> Vector3<f64> {
+        let mut seen = position * (1.0 + self.scale);
+        for &(axis, driver, size) in &self.shifts {
+            seen[axis] += size * driver.value(setup);
+        }
+        seen
+    }
+}
