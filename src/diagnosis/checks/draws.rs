@@ -52,12 +52,7 @@ pub(super) fn chances(
 }
 
 /// Residuals r* of some draws as columns, shape = (3 N, draws).
-fn draw(
-    leverage: &Leverage,
-    studentised: &[Vector3<f64>],
-    draws: std::ops::Range<usize>,
-    seed: u64,
-) -> DMatrix<f64> {
+fn draw(leverage: &Leverage, studentised: &[Vector3<f64>], draws: std::ops::Range<usize>, seed: u64) -> DMatrix<f64> {
     let mut residuals = DMatrix::zeros(3 * studentised.len(), draws.len());
     let mut by_priors = DMatrix::zeros(leverage.prior.ncols(), draws.len());
     let normal = Normal::standard();

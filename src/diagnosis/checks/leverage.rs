@@ -40,10 +40,7 @@ impl Leverage {
             return Err(Untestable::NoFreedom);
         }
         let squared_freedom = freedom - gram.trace() + gram.norm_squared();
-        let left = (DMatrix::identity(p, p) - gram).symmetric_eigen();
-        let by_priors: Vec<usize> = (0..p).filter(|&k| left.eigenvalues[k] > LEAST_PRIOR).collect();
-        let root = |i: usize, k: usize| left.eigenvectors[(i, by_priors[k])] * left.eigenvalues[by_priors[k]].sqrt();
-        let prior = DMatrix::from_fn(p, by_priors.len(), root);
+        let prior = prior_root(DMatrix::identity(p, p) - gram);
         let whiteners = (0..fitted.nrows() / 3).map(|pose| {
             let rows = transposed.columns(3 * pose, 3);
             let taken = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
@@ -59,6 +56,18 @@ impl Leverage {
         let poses = residual.chunks_exact(3).zip(&self.whiteners);
         poses.map(|(residual, whitener)| whitener * Vector3::from_column_slice(residual)).collect()
     }
+}
+
+/// A root of I − QᵀQ, a column for each direction that priors help to decide.
+fn prior_root(left: DMatrix<f64>) -> DMatrix<f64> {
+    let p = left.nrows();
+    if p == 0 {
+        return left;
+    }
+    let eigen = left.symmetric_eigen();
+    let by_priors: Vec<usize> = (0..p).filter(|&k| eigen.eigenvalues[k] > LEAST_PRIOR).collect();
+    let entry = |i: usize, k: usize| eigen.eigenvectors[(i, by_priors[k])] * eigen.eigenvalues[by_priors[k]].sqrt();
+    DMatrix::from_fn(p, by_priors.len(), entry)
 }
 
 /// A^(−½) of a symmetric matrix, zero along directions in which A vanishes.

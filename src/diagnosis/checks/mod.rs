@@ -139,7 +139,8 @@ fn testable(remainder: &Remainder) -> Result<(), Untestable> {
 /// Every check, with the same reason why it is not testable.
 fn all_untestable(remainder: &Remainder, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
-    let mut tests = vec![Test::ReducedChiSquared, Test::LackOfFit, Test::Runs { sequence }, Test::LjungBox { sequence }];
+    let mut tests =
+        vec![Test::ReducedChiSquared, Test::LackOfFit, Test::Runs { sequence }, Test::LjungBox { sequence }];
     tests.extend(remainder.drivers.iter().map(|driver| Test::Dependence { driver: driver.name.clone() }));
     tests.extend([Test::Outliers { worst: None }, Test::Normality]);
     tests.into_iter().map(|test| Tried { test, trial: Err(why.clone()) }).collect()

@@ -44,9 +44,10 @@ fn statistic(values: &mut [f64]) -> Result<f64, Untestable> {
     }
     let normal = Normal::standard();
     let log = |z: f64| normal.cdf(z).max(EXTREME).ln();
-    let terms = values.iter().zip(values.iter().rev()).enumerate().map(|(i, (low, high))| {
-        (2.0 * i as f64 + 1.0) * (log((low - mean) / spread) + log((mean - high) / spread))
-    });
+    let terms =
+        values.iter().zip(values.iter().rev()).enumerate().map(|(i, (low, high))| {
+            (2.0 * i as f64 + 1.0) * (log((low - mean) / spread) + log((mean - high) / spread))
+        });
     let squared = -n - terms.sum::<f64>() / n;
     Ok(squared * (1.0 + 0.75 / n + 2.25 / (n * n)))
 }

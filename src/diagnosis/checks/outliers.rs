@@ -10,8 +10,8 @@ use super::judgement::{ALPHA, Trial, Tried};
 use super::leverage::Leverage;
 use super::outcome::{Test, Untestable};
 
-/// Rounds of leaving out outliers, since large ones hide small ones.
-const ROUNDS: usize = 5;
+/// Poses left out in one round: one in so many, at least one. Large outliers pull the fit off others and hide smaller ones.
+const ONE_A_ROUND_IN: usize = 100;
 /// More than one pose in so many is no outlier.
 const ONE_IN: usize = 5;
 
@@ -23,11 +23,12 @@ pub(super) struct Found {
     pub kept: Option<Kept>,
 }
 
-/// Leaves out poses that are too far off, round by round.
+/// Leaves out poses that are too far off, the farthest first.
 ///
 /// Of pose b with studentised residual eᵦ, F = (|eᵦ|² / 3) / s², s² = (‖r‖² − |eᵦ|²) / (ν − 3) is the variance of the others'
 /// fit, so that F has the F distribution with 3 and ν − 3 degrees of freedom whatever σ is; it is too far off where
-/// N P(F) < 0.01 [Cook and Weisberg 1982, section 2.2; Bonferroni].
+/// N P(F) < 0.01 [Cook and Weisberg 1982, section 2.2; Bonferroni]. Nearly so with priors. Where more than one
+/// pose in five is, the rest stays in: that is no outlier, but what the noise is like.
 pub(super) fn find(remainder: &Remainder, studentised: &[Vector3<f64>], leverage: &Leverage) -> Found {
     let poses = studentised.len();
     let untested = |why| Found { tried: Tried { test: Test::Outliers { worst: None }, trial: Err(why) }, kept: None };
@@ -43,29 +44,30 @@ pub(super) fn find(remainder: &Remainder, studentised: &[Vector3<f64>], leverage
     let tried = Tried { test: Test::Outliers { worst: Some(worst) }, trial };
 
     let mut out = vec![false; poses];
-    let mut kept: Option<Kept> = None;
-    for _ in 0..ROUNDS {
-        let (present, ratios, freedom) = match &kept {
-            None => ((0..poses).collect(), all.clone(), leverage.freedom),
-            Some(kept) => {
-                let studentised = kept.leverage.studentise(kept.residual.as_slice());
-                let freedom = kept.leverage.freedom;
-                (kept.poses.clone(), ratios(&studentised, kept.residual.norm_squared(), freedom), freedom)
-            }
-        };
-        let Ok(distribution) = FisherSnedecor::new(3.0, freedom - 3.0) else { break };
-        let too_far = |ratio: f64| present.len() as f64 * distribution.sf(ratio) < ALPHA;
-        let far: Vec<usize> =
-            present.iter().zip(&ratios).filter(|&(_, &ratio)| too_far(ratio)).map(|(&pose, _)| pose).collect();
-        let gone = poses - present.len() + far.len();
-        if far.is_empty() || gone > (poses / ONE_IN).max(1) {
+    let mut kept = None;
+    let mut far = too_far(&all, &(0..poses).collect::<Vec<_>>(), leverage.freedom);
+    while !far.is_empty() {
+        far.iter().for_each(|&pose| out[pose] = true);
+        if out.iter().filter(|&&out| out).count() > (poses / ONE_IN).max(1) {
             break;
         }
-        far.iter().for_each(|&pose| out[pose] = true);
-        let Some(without) = Kept::without(remainder, &out) else { break };
-        kept = Some(without);
+        let Some(rest) = Kept::without(remainder, &out) else { break };
+        let studentised = rest.leverage.studentise(rest.residual.as_slice());
+        let ratios = ratios(&studentised, rest.residual.norm_squared(), rest.leverage.freedom);
+        far = too_far(&ratios, &rest.poses, rest.leverage.freedom);
+        kept = Some(rest);
     }
     Found { tried, kept }
+}
+
+/// Those of some poses with the largest F that are too far off, as many as leave in one round.
+fn too_far(ratios: &[f64], poses: &[usize], freedom: f64) -> Vec<usize> {
+    let Ok(distribution) = FisherSnedecor::new(3.0, freedom - 3.0) else { return Vec::new() };
+    let count = poses.len();
+    let mut ranked: Vec<usize> = (0..count).collect();
+    ranked.sort_by(|&a, &b| ratios[b].total_cmp(&ratios[a]));
+    let is_far = |&number: &usize| count as f64 * distribution.sf(ratios[number]) < ALPHA;
+    ranked.into_iter().take((count / ONE_A_ROUND_IN).max(1)).take_while(is_far).map(|number| poses[number]).collect()
 }
 
 /// F of each pose; 0 of a pose that the fit always meets.
