@@ -136,18 +136,20 @@ pub fn describe(effect: &Effect) -> String {
 
 /// Parameters of every effect that `problem` declares, in order.
 pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
-    let of = |effect: &Effect| {
-        let (name, place) = (name(effect), place(effect));
-        let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
-        let parameter = move |term: Term| EffectParameter {
-            name: format!("{name}{bracket}.{}", term.name),
-            plain: format!("{name}.{}", term.name),
-            slot: term.slot,
-            driver: term.driver,
-            nominal: term.nominal,
-            sigma: term.size,
-        };
-        terms(effect, problem).into_iter().map(parameter).collect::<Vec<_>>()
+    problem.effects.iter().flat_map(|declared| parameters_of(&declared.effect, problem)).collect()
+}
+
+/// Parameters of one effect, with their full names: `gear-ratio[3].error`.
+pub fn parameters_of(effect: &Effect, problem: &Problem) -> Vec<EffectParameter> {
+    let (name, place) = (name(effect), place(effect));
+    let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
+    let parameter = |term: Term| EffectParameter {
+        name: format!("{name}{bracket}.{}", term.name),
+        plain: format!("{name}.{}", term.name),
+        slot: term.slot,
+        driver: term.driver,
+        nominal: term.nominal,
+        sigma: term.size,
     };
-    problem.effects.iter().flat_map(|declared| of(&declared.effect)).collect()
+    terms(effect, problem).into_iter().map(parameter).collect()
 }

@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use crate::arm::Arm;
 use crate::effect;
 use crate::error::InputError;
-use crate::parameter::{LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::parameter::{Driver, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -59,6 +59,32 @@ impl Model {
             targets: vec![problem.tool.target; targets.len()],
             parameters,
         })
+    }
+
+    /// The same model with a further parameter, free and without effect at zero, at each of these slots.
+    ///
+    /// Given with each slot is the value that it has where nothing deviates; what the arm declares goes before it.
+    #[must_use]
+    pub fn probing(&self, slots: &[(Slot, f64)]) -> Self {
+        let mut model = self.clone();
+        for &(slot, nominal) in slots {
+            enter::prepare(&mut model.nominal, slot, nominal);
+            let added = match slot {
+                Slot::Joint { field, .. } => matches!(field, JointField::Theta | JointField::D),
+                Slot::Shift { .. } => true,
+                _ => false,
+            };
+            model.parameters.push(Parameter {
+                name: String::new(),
+                slot,
+                driver: if added { Driver::Unit } else { Driver::Constant },
+                nominal,
+                sigma: None,
+                lower: f64::NEG_INFINITY,
+                upper: f64::INFINITY,
+            });
+        }
+        model
     }
 
     /// Whether bounds or constraints limit the parameters.

@@ -9,6 +9,8 @@ use crate::arm::Setup;
 pub enum Driver {
     /// 1: the parameter acts the same in every pose.
     Constant,
+    /// 1, for what is added to a parameter that acts at the same place.
+    Unit,
     /// q of a joint [rad] or [m].
     Command(usize),
     /// sin kq.
@@ -67,7 +69,7 @@ impl Driver {
     /// Its value in a pose.
     pub fn value(self, setup: &Setup) -> f64 {
         match self {
-            Self::Constant => 1.0,
+            Self::Constant | Self::Unit => 1.0,
             Self::Command(joint) => setup.configuration[joint],
             Self::Sine(joint, order) => (f64::from(order) * setup.configuration[joint]).sin(),
             Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),

@@ -1,0 +1,64 @@
+//! Which effects a round adds.
+
+use super::super::candidates::same_family;
+use super::super::data::Data;
+use super::super::trace::{Scan, Tried};
+use crate::problem::Effect;
+
+/// Level of a whole scan: probability that noise alone points to anything.
+pub(super) const LEVEL: f64 = 0.01;
+/// Candidates whose criterion is this close to the best are its rivals: odds of about 150 to 1.
+pub(super) const RIVAL: f64 = 10.0;
+/// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.
+const OVERWHELMING: f64 = 1e-12;
+/// Effects that a round adds at most.
+const MOST: usize = 40;
+
+/// What a round adds.
+pub(super) struct Pick {
+    pub effect: Effect,
+    /// Corrected p.
+    pub p: f64,
+    /// Other candidates that explain the residual about as well, best first.
+    pub rivals: Vec<Effect>,
+}
+
+/// The candidates that stand out of what is left, each the best after those before it.
+pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
+    let mut picks: Vec<Pick> = Vec::new();
+    while picks.len() < MOST {
+        let ranking = scan.ranking();
+        let Some(best) = ranking.iter().find(|tried| stands_out(scan, data, tried)) else { break };
+        let rivals: Vec<Effect> = ranking
+            .iter()
+            .filter(|tried| tried.index != best.index && tried.criterion < best.criterion + RIVAL)
+            .map(|tried| scan.effects[tried.index].clone())
+            .collect();
+        let p = scan.corrected(best);
+        let effect = scan.effects[best.index].clone();
+        let alone = rivals.iter().all(|rival| same_family(rival, &effect)) && p < OVERWHELMING;
+        if !picks.is_empty() && !alone {
+            break;
+        }
+        let index = best.index;
+        picks.push(Pick { effect, p, rivals });
+        if !alone {
+            break;
+        }
+        scan.take(index);
+    }
+    picks
+}
+
+/// Whether a candidate is beyond chance, better than nothing, and predicts poses that were left out better than without it.
+fn stands_out(scan: &Scan, data: &Data, tried: &Tried) -> bool {
+    if scan.corrected(tried) >= LEVEL || tried.criterion >= 0.0 {
+        return false;
+    }
+    let mut with = scan.linear.clone();
+    with.add(&scan.columns(tried.index));
+    match (scan.linear.cross_validate(&data.block), with.cross_validate(&data.block)) {
+        (Some(without), Some(with)) => with < without,
+        _ => true,
+    }
+}

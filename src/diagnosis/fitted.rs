@@ -1,0 +1,150 @@
+//! A problem with its effects, fitted, and its linear neighbourhood.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::data::Data;
+use super::trace::{Library, Linear};
+use crate::effect;
+use crate::model::{Model, Pose};
+use crate::problem::{Effect, EffectDeclaration, Problem};
+use crate::study::{IdentifyError, Identification, Noise, Options, Placement, identify};
+
+/// A fitted problem.
+pub(super) struct Fitted {
+    pub problem: Problem,
+    pub model: Model,
+    pub found: Identification,
+    placement: Placement,
+    /// Parameters that were fitted to the identification rows and rest on no bound.
+    pub unknowns: Vec<usize>,
+    /// 1 σ of a coordinate in rows without one of their own [m].
+    pub sigma: f64,
+}
+
+impl Fitted {
+    /// Fits `problem` to the identification rows.
+    pub fn new(problem: Problem, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
+        let found = identify(&problem, data.measurements, data.split, options)?;
+        let placement = Placement::of(data.measurements);
+        let model = Model::new(&problem, &placement.bases, &placement.targets)?;
+        let free = |&k: &usize| {
+            let name = &model.parameters[k].name;
+            found.unknowns.contains(name) && found.estimates[k].at_bound.is_none()
+        };
+        let unknowns = (0..model.parameters.len()).filter(free).collect();
+        let sigma = match found.noise {
+            Noise::Estimated(sigma) => sigma,
+            Noise::Declared | Noise::Unknown => problem.data.position_sigma.unwrap_or(1e-3),
+        };
+        Ok(Self { problem, model, found, placement, unknowns, sigma })
+    }
+
+    /// The same problem with other effects declared.
+    pub fn with_effects(&self, effects: &[Effect]) -> Problem {
+        let mut problem = self.problem.clone();
+        let location = problem.data.location.clone();
+        problem.effects = effects
+            .iter()
+            .map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() })
+            .collect();
+        problem
+    }
+
+    /// Declared effects.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
+    }
+
+    /// The identification poses.
+    pub fn poses<'a>(&self, data: &Data<'a>) -> Vec<Pose<'a>> {
+        self.placement.poses(data.measurements, data.rows(), self.sigma)
+    }
+
+    /// The model about the fit, with every place where `effects` enter.
+    pub fn library<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Library<'a> {
+        Library::new(&self.problem, &self.model, self.poses(data), &self.unknowns, &self.found.x, effects)
+    }
+
+    /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it.
+    pub fn linear(&self, library: &Library, without: &[usize]) -> Linear {
+        let columns = library.fitted();
+        let kept: Vec<usize> = (0..self.unknowns.len()).filter(|&j| !without.contains(&self.unknowns[j])).collect();
+        let mut residual = library.residual().clone();
+        for (j, &k) in self.unknowns.iter().enumerate() {
+            if without.contains(&k) {
+                residual.axpy(-self.found.x[k], &columns.column(j), 1.0);
+            }
+        }
+        let x: Vec<f64> = kept.iter().map(|&j| self.found.x[self.unknowns[j]]).collect();
+        let priors: Vec<Option<f64>> =
+            kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma).collect();
+        Linear::new(&columns.select_columns(&kept), &residual, &x, &priors)
+    }
+
+    /// Numbers of an effect's parameters in the model.
+    pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
+        let own = effect::parameters_of(effect, &self.problem);
+        let is_own = |&k: &usize| own.iter().any(|parameter| parameter.name == self.model.parameters[k].name);
+        (0..self.model.parameters.len()).filter(is_own).collect()
+    }
+
+    /// What the fit would lose without some of its parameters: sum of squares, priors included, in the linear neighbourhood.
+    ///
+    /// xᵀ ([N⁻¹])⁻¹ x over those parameters, with N = JᵀJ + Λ and what neither data nor priors see left out.
+    pub fn loss_without(&self, normal: &Normal, parameters: &[usize]) -> Option<f64> {
+        let places: Vec<usize> =
+            parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
+        let x = DVector::from_iterator(places.len(), places.iter().map(|&j| self.found.x[self.unknowns[j]]));
+        let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| normal.inverse[(places[i], places[j])]);
+        Some((x.transpose() * covariance.try_inverse()? * &x)[(0, 0)])
+    }
+
+    /// N = JᵀJ + Λ of the fit.
+    pub fn normal(&self, library: &Library) -> Normal {
+        let columns = library.fitted();
+        let mut matrix = columns.tr_mul(&columns);
+        for (j, &k) in self.unknowns.iter().enumerate() {
+            if let Some(sigma) = self.model.parameters[k].sigma {
+                matrix[(j, j)] += sigma.powi(-2);
+            }
+        }
+        Normal::new(matrix)
+    }
+
+    /// Columns of some of the model's parameters, shape = (3 N, k).
+    pub fn columns(&self, library: &Library, parameters: &[usize]) -> DMatrix<f64> {
+        let places: Vec<usize> =
+            parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
+        library.fitted().select_columns(&places)
+    }
+
+    /// Sum of squares of data and priors.
+    pub fn squares(&self, library: &Library) -> f64 {
+        let prior = |&k: &usize| self.model.parameters[k].sigma.map_or(0.0, |sigma| (self.found.x[k] / sigma).powi(2));
+        library.residual().norm_squared() + self.unknowns.iter().map(prior).sum::<f64>()
+    }
+
+    /// Full parameter vector.
+    pub fn x(&self) -> &DVector<f64> {
+        &self.found.x
+    }
+}
+
+/// The inverse of a normal matrix.
+pub(super) struct Normal {
+    inverse: DMatrix<f64>,
+}
+
+/// Eigenvalues of a normal matrix of unit diagonal below this are what nothing sees.
+const UNSEEN: f64 = 1e-12;
+
+impl Normal {
+    fn new(matrix: DMatrix<f64>) -> Self {
+        let scale: Vec<f64> = matrix.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
+        let n = matrix.nrows();
+        let eigen = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
+        let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
+        let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
+        Self { inverse: DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j])) }
+    }
+}

@@ -1,0 +1,129 @@
+//! Columns of every effect that may be at work, without a fit: derivatives at the places, times drivers.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::effect::{self, Term};
+use crate::fit::{Block, LeastSquares};
+use crate::model::{Model, Pose, PoseResiduals};
+use crate::parameter::{ArmField, BeamField, Slot};
+use crate::problem::{Effect, Problem};
+
+/// Poses linearised together.
+const CHUNK: usize = 256;
+/// Mass at which the place of an added mass is differentiated: without any, the place does not matter [kg].
+const PROBE_MASS: f64 = 1e-4;
+
+/// A model linearised with every place where effects may enter.
+pub(crate) struct Library<'a> {
+    problem: &'a Problem,
+    poses: Vec<Pose<'a>>,
+    places: Vec<(Slot, usize)>,
+    /// ∂r/∂(parameters, then places), shape = (3 N, …).
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+    fitted: usize,
+}
+
+impl<'a> Library<'a> {
+    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects given.
+    pub fn new(
+        problem: &'a Problem,
+        model: &Model,
+        poses: Vec<Pose<'a>>,
+        unknowns: &[usize],
+        x: &DVector<f64>,
+        effects: &[Effect],
+    ) -> Self {
+        let mut slots: Vec<(Slot, f64)> = Vec::new();
+        for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect::terms(effect, problem)) {
+            if !slots.iter().any(|(known, _)| *known == slot) {
+                slots.push((slot, nominal));
+            }
+        }
+        let first = model.parameters.len();
+        let probing = model.probing(&slots);
+        let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
+        for (index, (slot, _)) in slots.iter().enumerate() {
+            if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {
+                at[first + index] = PROBE_MASS;
+            }
+        }
+        let all: Vec<usize> = unknowns.iter().copied().chain(first..first + slots.len()).collect();
+        let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
+        let (jacobian, _) = linearise(&residuals, &residuals.reduced(&at));
+        let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
+        let (_, residual) = linearise(&plain, &DVector::zeros(0));
+        let fitted = unknowns.len();
+        let places = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index)).collect();
+        Self { problem, poses, places, jacobian, residual, fitted }
+    }
+
+    /// Columns of the fitted parameters, shape = (3 N, n).
+    pub fn fitted(&self) -> DMatrix<f64> {
+        self.jacobian.columns(0, self.fitted).into_owned()
+    }
+
+    /// Whitened residual, 3 N.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.residual
+    }
+
+    /// The poses.
+    pub fn poses(&self) -> &[Pose<'a>] {
+        &self.poses
+    }
+
+    /// Columns of an effect's parameters, shape = (3 N, k).
+    pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
+        let terms = effect::terms(effect, self.problem);
+        let mut columns = DMatrix::zeros(self.jacobian.nrows(), terms.len());
+        for (term, mut out) in terms.iter().zip(columns.column_iter_mut()) {
+            let Some(&(_, place)) = self.places.iter().find(|(slot, _)| *slot == term.slot) else { continue };
+            let at_place = self.jacobian.column(place);
+            for (k, pose) in self.poses.iter().enumerate() {
+                let driver = term.driver.value(&pose.setup);
+                for row in 3 * k..3 * k + 3 {
+                    out[row] = at_place[row] * driver;
+                }
+            }
+        }
+        columns
+    }
+
+    /// Column of a place, 3 N; `None` where no effect enters there.
+    pub fn place(&self, slot: Slot) -> Option<DVector<f64>> {
+        let &(_, place) = self.places.iter().find(|(known, _)| *known == slot)?;
+        Some(self.jacobian.column(place).into_owned())
+    }
+}
+
+/// Jacobian and residual of all items, in parallel, the same for any number of threads.
+fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (poses, n) = (residuals.items(), residuals.parameters());
+    let mut jacobian = DMatrix::zeros(3 * poses, n);
+    let mut residual = DVector::zeros(3 * poses);
+    let blocks: Vec<Block> = (0..poses.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let items = chunk * CHUNK..((chunk + 1) * CHUNK).min(poses);
+            let mut block = Block::zeros(3 * items.len(), n);
+            residuals.linearise(x, items, &mut block);
+            block
+        })
+        .collect();
+    let mut row = 0;
+    for block in blocks {
+        for j in 0..n {
+            jacobian.view_mut((row, j), (block.rows(), 1)).copy_from_slice(block.column(j));
+        }
+        residual.rows_mut(row, block.rows()).copy_from_slice(block.column(n));
+        row += block.rows();
+    }
+    (jacobian, residual)
+}
+
+/// Whether a place acts through the loads of the arm.
+pub(crate) fn is_of_loads(slot: Slot) -> bool {
+    slot.is_elastic() && !matches!(slot, Slot::Arm(ArmField::Mixing))
+}
