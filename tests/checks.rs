@@ -278,7 +278,7 @@ fn a_driver_is_found_and_named() {
 fn few_degrees_of_freedom_still_show_strong_structure() {
     let found = count(30, |seed| driven(28, 20, 6.0, seed).is_structured());
     println!("28 poses, 20 unknowns: structure in {found} of 30");
-    assert!(found >= 15);
+    assert!(found >= 25);
 }
 
 /// AR(1) noise in the order of time; `shuffled` rows are not in that order.
@@ -410,6 +410,7 @@ fn left_out_poses_leave_no_trace() {
         linear.check(&residual)
     };
     let (near, far) = (at(20.0, &mut data), at(200.0, &mut data));
+    assert!(outliers(&near).failed());
     assert_eq!((&near.outliers, &far.outliers), (&vec![30], &vec![30]));
     for (a, b) in p_values(&near).iter().zip(p_values(&far)) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");

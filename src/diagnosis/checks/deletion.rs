@@ -1,6 +1,6 @@
 //! What a fit would leave without some of its poses.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 use super::Remainder;
 use super::leverage::Leverage;
@@ -46,4 +46,41 @@ impl Kept {
         let fitted = decided.l().solve_lower_triangular(&fitted.transpose())?.transpose();
         Some(Self { poses, residual, leverage: Leverage::of(&fitted).ok()? })
     }
+}
+
+/// What a fit without one pose leaves at the others.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Others {
+    /// ‖r‖² of the others.
+    pub squares: f64,
+    /// Its degrees of freedom.
+    pub freedom: f64,
+}
+
+/// Leaves out each pose in turn.
+///
+/// The rows of pose b are Q_b; with D = (I − H_bb)⁻¹, a = D r_b and W = Q_b QᵀQ Q_bᵀ, as in [`Kept::without`],
+///
+/// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a,  tr H becomes tr H − tr H_bb + tr D (W − H_bb²)
+pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
+    let fitted = &leverage.fitted;
+    let gram_rows = &leverage.transposed * fitted * &leverage.transposed;
+    let again = fitted * (&leverage.transposed * residual);
+    let total = residual.norm_squared();
+    let poses = residual.as_slice().chunks_exact(3).zip(again.as_slice().chunks_exact(3)).zip(&leverage.whiteners);
+    let others = poses.enumerate().map(|(pose, ((own, again), whitener))| {
+        let (own, again) = (Vector3::from_column_slice(own), Vector3::from_column_slice(again));
+        let rows = leverage.transposed.columns(3 * pose, 3);
+        let products = |of: &DMatrix<f64>| Matrix3::from_fn(|i, j| rows.column(i).dot(&of.column(3 * pose + j)));
+        let taken = products(&leverage.transposed);
+        let more = products(&gram_rows) - taken * taken;
+        let inverse = whitener * whitener;
+        let pull = inverse * own;
+        let change = 2.0 * pull.dot(&(again - taken * own)) + pull.dot(&(more * pull));
+        Others {
+            squares: total - own.norm_squared() + change,
+            freedom: leverage.freedom - 3.0 + taken.trace() - (inverse * more).trace(),
+        }
+    });
+    others.collect()
 }

@@ -90,7 +90,7 @@ mod tests {
     fn both_forms_agree() {
         let x = [0.3, -1.2, 2.5, 0.3, 0.9, -0.4];
         let y: Vec<Vector3<f64>> =
-            (0..6).map(|k| f64::from(k)).map(|k| Vector3::new((3.0 * k).sin(), k * k, 1.0 / (k + 1.0))).collect();
+            (0..6).map(f64::from).map(|k| Vector3::new((3.0 * k).sin(), k * k, 1.0 / (k + 1.0))).collect();
         let sample = Sample::of(y);
         let distance = |i: usize, j: usize| -> f64 { f64::abs(x[i] - x[j]) };
         let mean = |i: usize| (0..6).map(|j| distance(i, j)).sum::<f64>() / 6.0;

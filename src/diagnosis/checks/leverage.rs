@@ -23,7 +23,8 @@ pub(super) struct Leverage {
     pub freedom: f64,
     /// tr (I − H)², ν without priors.
     pub squared_freedom: f64,
-    whiteners: Vec<Matrix3<f64>>,
+    /// (I − H)ᵦᵦ^(−½) of each pose b.
+    pub whiteners: Vec<Matrix3<f64>>,
 }
 
 impl Leverage {

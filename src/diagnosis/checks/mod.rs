@@ -26,7 +26,7 @@ mod statistic;
 use nalgebra::{DMatrix, DVector};
 
 use deletion::Kept;
-use judgement::{Trial, Tried, judge};
+use judgement::{ALPHA, Trial, Tried, judge};
 use leverage::Leverage;
 use statistic::{Sample, Statistic};
 
@@ -70,7 +70,7 @@ pub struct Remainder<'a> {
 /// Tests what a fit leaves; `seed` draws the permutations.
 ///
 /// The checks come in a fixed order: χ², lack of fit, runs and Ljung–Box in the order of time (and of the rows, where that
-/// is another), each driver, outliers, normality. Outliers are left out of all others but the last, with their pull on the
+/// is another), each driver, outliers, normality. Outliers are left out of all but these last two, with their pull on the
 /// fit undone. The judgement is Holm's over all checks at the family-wise level 0.01; outliers and normality take part in it,
 /// but are not structure, since no effect explains them.
 pub fn check(remainder: &Remainder, seed: u64) -> Findings {
@@ -80,7 +80,9 @@ pub fn check(remainder: &Remainder, seed: u64) -> Findings {
         Err(why) => return judge(all_untestable(remainder, &why), Vec::new()),
     };
     let studentised = leverage.studentise(remainder.residual.as_slice());
-    let found = outliers::find(remainder, &studentised, &leverage);
+    // At most so many checks: what is left out fails in the judgement, too.
+    let most = remainder.drivers.len() + 8;
+    let found = outliers::find(remainder, &leverage, ALPHA / most as f64);
     let kept = found.kept.unwrap_or_else(|| Kept::all(remainder, leverage));
     let mut tried = vec![size::reduced_chi_squared(remainder, &kept), size::lack_of_fit(remainder, &kept)];
     tried.extend(permuted(remainder, &kept, seed));

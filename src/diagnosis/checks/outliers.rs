@@ -1,12 +1,12 @@
 //! Poses that are too far off to be noise.
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::Remainder;
 use super::chance::Chance;
-use super::deletion::Kept;
-use super::judgement::{ALPHA, Trial, Tried};
+use super::deletion::{Kept, Others, each_left_out};
+use super::judgement::{Trial, Tried};
 use super::leverage::Leverage;
 use super::outcome::{Test, Untestable};
 
@@ -25,57 +25,74 @@ pub(super) struct Found {
 
 /// Leaves out poses that are too far off, the farthest first.
 ///
-/// Of pose b with studentised residual eᵦ, F = (|eᵦ|² / 3) / s², s² = (‖r‖² − |eᵦ|²) / (ν − 3) is the variance of the others'
-/// fit, so that F has the F distribution with 3 and ν − 3 degrees of freedom whatever σ is; it is too far off where
-/// N P(F) < 0.01 [Cook and Weisberg 1982, section 2.2; Bonferroni]. Nearly so with priors. Where more than one
-/// pose in five is, the rest stays in: that is no outlier, but what the noise is like.
-pub(super) fn find(remainder: &Remainder, studentised: &[Vector3<f64>], leverage: &Leverage) -> Found {
-    let poses = studentised.len();
-    let untested = |why| Found { tried: Tried { test: Test::Outliers { worst: None }, trial: Err(why) }, kept: None };
-    let Ok(distribution) = FisherSnedecor::new(3.0, leverage.freedom - 3.0) else {
-        return untested(Untestable::NoFreedom);
-    };
-    let all = ratios(studentised, remainder.residual.norm_squared(), leverage.freedom);
-    let Some((worst, statistic)) = all.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else {
-        return untested(Untestable::TooFewPoses);
-    };
-    let chance = Chance::Fisher { distribution, of: poses as f64 };
-    let trial = Ok(Trial { statistic, chance, shown: |ratio| (3.0 * ratio).sqrt() });
-    let tried = Tried { test: Test::Outliers { worst: Some(worst) }, trial };
-
+/// Of pose b with studentised residual e_b, F = |e_b|² / 3 s², where s² is the variance of what a fit without b leaves of its ν
+/// degrees of freedom: it has the F distribution with 3 and ν of them, whatever σ is (nearly so with priors). The pose is
+/// too far off where N P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. Where more than one pose in five is, the
+/// rest stays in: that is no outlier, but what the noise is like.
+pub(super) fn find(remainder: &Remainder, leverage: &Leverage, level: f64) -> Found {
+    let poses = remainder.residual.len() / 3;
+    let mut distances = distances(leverage, remainder.residual);
+    let mut kept: Option<Kept> = None;
+    let tried = test(&distances);
     let mut out = vec![false; poses];
-    let mut kept = None;
-    let mut far = too_far(&all, &(0..poses).collect::<Vec<_>>(), leverage.freedom);
-    while !far.is_empty() {
-        far.iter().for_each(|&pose| out[pose] = true);
+    loop {
+        let far = too_far(&distances, level);
+        if far.is_empty() {
+            break;
+        }
+        let pose_of = |number: usize| kept.as_ref().map_or(number, |kept| kept.poses[number]);
+        for number in far {
+            out[pose_of(number)] = true;
+        }
         if out.iter().filter(|&&out| out).count() > (poses / ONE_IN).max(1) {
             break;
         }
         let Some(rest) = Kept::without(remainder, &out) else { break };
-        let studentised = rest.leverage.studentise(rest.residual.as_slice());
-        let ratios = ratios(&studentised, rest.residual.norm_squared(), rest.leverage.freedom);
-        far = too_far(&ratios, &rest.poses, rest.leverage.freedom);
+        distances = self::distances(&rest.leverage, &rest.residual);
         kept = Some(rest);
     }
     Found { tried, kept }
 }
 
-/// Those of some poses with the largest F that are too far off, as many as leave in one round.
-fn too_far(ratios: &[f64], poses: &[usize], freedom: f64) -> Vec<usize> {
-    let Ok(distribution) = FisherSnedecor::new(3.0, freedom - 3.0) else { return Vec::new() };
-    let count = poses.len();
-    let mut ranked: Vec<usize> = (0..count).collect();
-    ranked.sort_by(|&a, &b| ratios[b].total_cmp(&ratios[a]));
-    let is_far = |&number: &usize| count as f64 * distribution.sf(ratios[number]) < ALPHA;
-    ranked.into_iter().take((count / ONE_A_ROUND_IN).max(1)).take_while(is_far).map(|number| poses[number]).collect()
+/// F of a pose and its distribution.
+struct Distance {
+    ratio: f64,
+    distribution: FisherSnedecor,
 }
 
-/// F of each pose; 0 of a pose that the fit always meets.
-fn ratios(studentised: &[Vector3<f64>], squares: f64, freedom: f64) -> Vec<f64> {
-    let ratio = |value: &Vector3<f64>| {
-        let own = value.norm_squared();
-        let others = (squares - own).max(f64::EPSILON * squares) / (freedom - 3.0);
-        if own > 0.0 { own / 3.0 / others } else { 0.0 }
+/// Of each pose; `None` where the others leave no degrees of freedom.
+fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distance>> {
+    let studentised = leverage.studentise(residual.as_slice());
+    let rounding = f64::EPSILON * residual.norm_squared();
+    let distance = |(own, others): (Vector3<f64>, Others)| {
+        let distribution = FisherSnedecor::new(3.0, others.freedom).ok()?;
+        let own = own.norm_squared();
+        let variance = others.squares.max(rounding) / others.freedom;
+        Some(Distance { ratio: if own > 0.0 { own / 3.0 / variance } else { 0.0 }, distribution })
     };
-    studentised.iter().map(ratio).collect()
+    studentised.into_iter().zip(each_left_out(leverage, residual)).map(distance).collect()
+}
+
+/// The test of the pose that is farthest off.
+fn test(distances: &[Option<Distance>]) -> Tried {
+    let testable = distances.iter().enumerate().filter_map(|(pose, distance)| Some((pose, distance.as_ref()?)));
+    let Some((worst, distance)) = testable.max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio)) else {
+        return Tried { test: Test::Outliers { worst: None }, trial: Err(Untestable::NoFreedom) };
+    };
+    let chance = Chance::Fisher { distribution: distance.distribution, of: distances.len() as f64 };
+    let trial = Trial { statistic: distance.ratio, chance, shown: |ratio| (3.0 * ratio).sqrt() };
+    Tried { test: Test::Outliers { worst: Some(worst) }, trial: Ok(trial) }
+}
+
+/// Those that are too far off, the farthest first, as many as leave in one round.
+fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
+    let count = distances.len();
+    let far = |(number, distance): (usize, &Option<Distance>)| {
+        let Distance { ratio, distribution } = distance.as_ref()?;
+        (count as f64 * distribution.sf(*ratio) <= level).then_some((number, *ratio))
+    };
+    let mut far: Vec<(usize, f64)> = distances.iter().enumerate().filter_map(far).collect();
+    far.sort_by(|a, b| b.1.total_cmp(&a.1));
+    far.truncate((count / ONE_A_ROUND_IN).max(1));
+    far.into_iter().map(|(number, _)| number).collect()
 }
