@@ -68,17 +68,21 @@ impl Fitted {
     /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it.
     pub fn linear(&self, library: &Library, without: &[usize]) -> Linear {
         let columns = library.fitted();
-        let kept: Vec<usize> = (0..self.unknowns.len()).filter(|&j| !without.contains(&self.unknowns[j])).collect();
+        let n = self.unknowns.len();
+        let kept: Vec<usize> = (0..n).filter(|&j| !without.contains(&self.unknowns[j])).collect();
         let mut residual = library.residual().clone();
         for (j, &k) in self.unknowns.iter().enumerate() {
             if without.contains(&k) {
                 residual.axpy(-self.found.x[k], &columns.column(j), 1.0);
             }
         }
-        let x: Vec<f64> = kept.iter().map(|&j| self.found.x[self.unknowns[j]]).collect();
-        let priors: Vec<Option<f64>> =
+        let mut x: Vec<f64> = kept.iter().map(|&j| self.found.x[self.unknowns[j]]).collect();
+        let mut priors: Vec<Option<f64>> =
             kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma).collect();
-        Linear::new(&columns.select_columns(&kept), &residual, &x, &priors)
+        x.resize(x.len() + library.let_go().len(), 0.0);
+        priors.extend(library.let_go());
+        let places: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
+        Linear::new(&columns.select_columns(&places), &residual, &x, &priors)
     }
 
     /// Numbers of an effect's parameters in the model.
@@ -103,8 +107,9 @@ impl Fitted {
     pub fn normal(&self, library: &Library) -> Normal {
         let columns = library.fitted();
         let mut matrix = columns.tr_mul(&columns);
-        for (j, &k) in self.unknowns.iter().enumerate() {
-            if let Some(sigma) = self.model.parameters[k].sigma {
+        let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
+        for (j, sigma) in own.chain(library.let_go().iter().copied()).enumerate() {
+            if let Some(sigma) = sigma {
                 matrix[(j, j)] += sigma.powi(-2);
             }
         }

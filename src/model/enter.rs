@@ -105,6 +105,7 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
         (BeamField::BendingY, ..) => all.about_y = flexibility,
         (BeamField::BendingZ, ..) => all.about_z = flexibility,
         (BeamField::Twist, ..) => all.twist = flexibility,
+        (BeamField::Anisotropy, ..) => all.about_z *= (-x).exp(),
         (BeamField::Flexibility, ..) => {
             all.about_y += x;
             all.about_z += x;

@@ -79,6 +79,8 @@ pub enum BeamField {
     BendingZ,
     /// GJ.
     Twist,
+    /// ln of EI about z over the value that it shares with EI about y.
+    Anisotropy,
     /// Added to 1/EI about y and z [1/(N·m²)].
     Flexibility,
     /// Curvature about y per degree [1/(m·K)].
@@ -156,6 +158,7 @@ impl BeamField {
             Self::BendingY => "EIy",
             Self::BendingZ => "EIz",
             Self::Twist => "GJ",
+            Self::Anisotropy => "anisotropy",
             Self::Flexibility => "flexibility",
             Self::WarmingY => "warming_y",
             Self::WarmingZ => "warming_z",
@@ -182,6 +185,7 @@ impl Slot {
                 BeamField::Bending | BeamField::BendingY | BeamField::BendingZ | BeamField::Twist => {
                     Unit::FlexuralRigidity
                 }
+                BeamField::Anisotropy => Unit::Ratio,
                 BeamField::Flexibility => Unit::Flexibility,
                 BeamField::WarmingY | BeamField::WarmingZ => Unit::CurvaturePerDegree,
                 BeamField::Expansion => Unit::PerDegree,

@@ -23,6 +23,8 @@ pub(crate) struct Library<'a> {
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
     fitted: usize,
+    /// σ of the priors of what is let go: the columns behind those of the fitted parameters.
+    let_go: Vec<Option<f64>>,
 }
 
 impl<'a> Library<'a> {
@@ -41,6 +43,17 @@ impl<'a> Library<'a> {
                 slots.push((slot, nominal));
             }
         }
+        // Stiffnesses that the problem holds equal are let go: that they differ is no effect of any other kind.
+        let shared = |&k: &usize| match model.parameters[k].slot {
+            Slot::Beam { joint, field: BeamField::Bending } => {
+                let slot = Slot::Beam { joint, field: BeamField::Anisotropy };
+                Some((slot, model.parameters[k].sigma))
+            }
+            _ => None,
+        };
+        let shared: Vec<(Slot, Option<f64>)> = unknowns.iter().filter_map(shared).collect();
+        let let_go: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
+        slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
         let first = model.parameters.len();
         let probing = model.probing(&slots);
         let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
@@ -56,12 +69,17 @@ impl<'a> Library<'a> {
         let (_, residual) = linearise(&plain, &DVector::zeros(0));
         let fitted = unknowns.len();
         let places = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index)).collect();
-        Self { problem, poses, places, jacobian, residual, fitted }
+        Self { problem, poses, places, jacobian, residual, fitted, let_go }
     }
 
-    /// Columns of the fitted parameters, shape = (3 N, n).
+    /// Columns of the fitted parameters and of what is let go beside them, shape = (3 N, n).
     pub fn fitted(&self) -> DMatrix<f64> {
-        self.jacobian.columns(0, self.fitted).into_owned()
+        self.jacobian.columns(0, self.fitted + self.let_go.len()).into_owned()
+    }
+
+    /// σ of the priors of what is let go, in the order of its columns.
+    pub fn let_go(&self) -> &[Option<f64>] {
+        &self.let_go
     }
 
     /// Whitened residual, 3 N.
