@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::checks::Driver;
 use crate::effect::Conditions;
 use crate::measurement::{Measurements, Split};
+use crate::parameter::Quantity;
 use crate::problem::{JointKind, Problem};
 
 /// Blocks of a cross-validation.
@@ -55,6 +56,42 @@ impl<'a> Data<'a> {
     /// A column at the identification rows.
     fn pick(&self, column: &[f64]) -> Vec<f64> {
         self.rows().iter().map(|&row| column[row]).collect()
+    }
+
+    /// The same with no more than `most` identification rows, taken evenly.
+    pub fn thinned(&self, most: usize) -> Vec<usize> {
+        let rows = self.rows();
+        rows.iter().copied().step_by(rows.len().div_ceil(most).max(1)).collect()
+    }
+
+    /// Values of a quantity at the identification rows.
+    fn values(&self, of: Quantity) -> Vec<f64> {
+        let measurements = self.measurements;
+        let column = |column: &Option<Vec<f64>>| column.as_deref().map_or_else(Vec::new, |all| self.pick(all));
+        match of {
+            Quantity::Command(joint) => self.rows().iter().map(|&row| measurements.configuration(row)[joint]).collect(),
+            Quantity::Temperature => column(&measurements.temperature),
+            Quantity::Payload => column(&measurements.payload),
+            Quantity::Hoist => column(&measurements.hoist),
+            Quantity::Elapsed => {
+                let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+                self.time().into_iter().map(|time| time - first).collect()
+            }
+        }
+    }
+
+    /// Range of a quantity at the identification rows.
+    pub fn range(&self, of: Quantity) -> (f64, f64) {
+        let widest = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+        self.values(of).into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), widest)
+    }
+
+    /// Number of distinct values of a quantity at the identification rows.
+    pub fn distinct(&self, of: Quantity) -> usize {
+        let mut values = self.values(of);
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values.len()
     }
 
     /// Time of each identification row [s].
@@ -150,7 +187,7 @@ fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     key
 }
 
-fn bits(values: &[f64]) -> Vec<u64> {
+pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 

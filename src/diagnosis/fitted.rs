@@ -1,13 +1,15 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
+use super::generic::Generic;
 use super::trace::{Library, Linear};
 use crate::effect;
-use crate::model::{Model, Pose};
+use crate::model::{Model, Pose, PoseResiduals};
+use crate::parameter::Slot;
 use crate::problem::{Effect, EffectDeclaration, Problem};
-use crate::study::{IdentifyError, Identification, Noise, Options, Placement, identify};
+use crate::study::{Identification, IdentifyError, Noise, Options, Placement, identify};
 
 /// A fitted problem.
 pub(super) struct Fitted {
@@ -55,18 +57,42 @@ impl Fitted {
         self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
     }
 
-    /// The identification poses.
-    pub fn poses<'a>(&self, data: &Data<'a>) -> Vec<Pose<'a>> {
-        self.placement.poses(data.measurements, data.rows(), self.sigma)
+    /// The poses of some rows.
+    pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
+        self.placement.poses(data.measurements, rows, self.sigma)
     }
 
-    /// The model about the fit, with every place where `effects` enter.
-    pub fn library<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Library<'a> {
-        Library::new(&self.problem, &self.model, self.poses(data), &self.unknowns, &self.found.x, effects)
+    /// Residuals of some rows, measuring frame [m].
+    pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
+        let residuals = PoseResiduals::new(&self.model, self.poses(data, rows), Vec::new(), self.found.x.clone());
+        residuals.position_errors(&DVector::zeros(0))
     }
 
-    /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it.
-    pub fn linear(&self, library: &Library, without: &[usize]) -> Linear {
+    /// The model about the fit at the identification rows, with every place where `effects` enter and those of `generics`.
+    pub fn library<'a>(&'a self, data: &Data<'a>, effects: &[Effect], generics: &[Generic]) -> Library<'a> {
+        self.library_of(data, data.rows(), effects, generics)
+    }
+
+    /// The same at other rows.
+    pub fn library_of<'a>(
+        &'a self,
+        data: &Data<'a>,
+        rows: &[usize],
+        effects: &[Effect],
+        generics: &[Generic],
+    ) -> Library<'a> {
+        let mut places: Vec<Slot> = Vec::new();
+        for generic in generics {
+            if !places.contains(&generic.slot) {
+                places.push(generic.slot);
+            }
+        }
+        let poses = self.poses(data, rows);
+        Library::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, &places))
+    }
+
+    /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it and `generics` put in.
+    pub fn linear(&self, library: &Library, without: &[usize], generics: &[Generic]) -> Linear {
         let columns = library.fitted();
         let n = self.unknowns.len();
         let kept: Vec<usize> = (0..n).filter(|&j| !without.contains(&self.unknowns[j])).collect();
@@ -82,7 +108,11 @@ impl Fitted {
         x.resize(x.len() + library.let_go().len(), 0.0);
         priors.extend(library.let_go());
         let places: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
-        Linear::new(&columns.select_columns(&places), &residual, &x, &priors)
+        let mut linear = Linear::new(&columns.select_columns(&places), &residual, &x, &priors);
+        for generic in generics {
+            linear.add(&generic.columns(library));
+        }
+        linear
     }
 
     /// Numbers of an effect's parameters in the model.
@@ -103,17 +133,11 @@ impl Fitted {
         Some((x.transpose() * covariance.try_inverse()? * &x)[(0, 0)])
     }
 
-    /// N = JᵀJ + Λ of the fit.
-    pub fn normal(&self, library: &Library) -> Normal {
-        let columns = library.fitted();
-        let mut matrix = columns.tr_mul(&columns);
+    /// N = JᵀJ + Λ of the fit, with `generics` put in.
+    pub fn normal(&self, library: &Library, generics: &[Generic]) -> Normal {
         let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
-        for (j, sigma) in own.chain(library.let_go().iter().copied()).enumerate() {
-            if let Some(sigma) = sigma {
-                matrix[(j, j)] += sigma.powi(-2);
-            }
-        }
-        Normal::new(matrix)
+        let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
+        Normal::new(&with_generics(library, generics), &priors)
     }
 
     /// Columns of some of the model's parameters, shape = (3 N, k).
@@ -135,18 +159,40 @@ impl Fitted {
     }
 }
 
-/// The inverse of a normal matrix.
+/// Fitted columns, then those of `generics`, shape = (3 N, …).
+pub(super) fn with_generics(library: &Library, generics: &[Generic]) -> DMatrix<f64> {
+    let mut columns = library.fitted();
+    for generic in generics {
+        let more = generic.columns(library);
+        let first = columns.ncols();
+        columns = columns.resize_horizontally(first + more.ncols(), 0.0);
+        columns.columns_mut(first, more.ncols()).copy_from(&more);
+    }
+    columns
+}
+
+/// The inverse of a normal matrix; 0 in directions that neither data nor priors see.
 pub(super) struct Normal {
-    inverse: DMatrix<f64>,
+    pub inverse: DMatrix<f64>,
 }
 
 /// Eigenvalues of a normal matrix of unit diagonal below this are what nothing sees.
 const UNSEEN: f64 = 1e-12;
 
 impl Normal {
-    fn new(matrix: DMatrix<f64>) -> Self {
+    /// Of columns, shape = (3 N, n), with priors on the first of them.
+    pub fn new(columns: &DMatrix<f64>, priors: &[Option<f64>]) -> Self {
+        let mut matrix = columns.tr_mul(columns);
+        for (j, sigma) in priors.iter().enumerate() {
+            if let Some(sigma) = sigma {
+                matrix[(j, j)] += sigma.powi(-2);
+            }
+        }
         let scale: Vec<f64> = matrix.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
         let n = matrix.nrows();
+        if n == 0 {
+            return Self { inverse: matrix };
+        }
         let eigen = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
         let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
         let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();

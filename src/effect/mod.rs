@@ -50,6 +50,24 @@ pub struct Family {
     pub describe: fn(&Effect) -> String,
 }
 
+impl Family {
+    /// One over the share of a family's chance that falls to one of its `members`: as many as there are, but for harmonics,
+    /// of which order k of each of n joints has n π²/6 k²: low orders have causes, high ones are found by trying.
+    pub fn tries(&self, effect: &Effect, members: &[&Effect]) -> f64 {
+        let Effect::JointHarmonic { orders, .. } = effect else { return members.len().max(1) as f64 };
+        let mut joints: Vec<usize> = Vec::new();
+        for member in members {
+            if let Effect::JointHarmonic { joint, .. } = member
+                && !joints.contains(joint)
+            {
+                joints.push(*joint);
+            }
+        }
+        let order = f64::from(orders.iter().copied().max().unwrap_or(1));
+        joints.len().max(1) as f64 * std::f64::consts::PI.powi(2) / 6.0 * order * order
+    }
+}
+
 /// A parameter of an effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {

@@ -270,7 +270,10 @@ fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[Input]) -> Arm<ChunkDual>
             let seed = seeded(0.0, Some(direction));
             let joint = &mut arm.joints[joint];
             match field {
+                JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
+                JointField::A => joint.a += seed,
                 JointField::D => joint.d += seed,
+                JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
                 _ => joint.theta += seed,
             }
         }

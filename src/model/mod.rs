@@ -70,7 +70,7 @@ impl Model {
         for &(slot, nominal) in slots {
             enter::prepare(&mut model.nominal, slot, nominal);
             let added = match slot {
-                Slot::Joint { field, .. } => matches!(field, JointField::Theta | JointField::D),
+                Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field),
                 Slot::Shift { .. } => true,
                 _ => false,
             };

@@ -87,7 +87,7 @@ impl Driver {
 }
 
 /// The uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
-fn cubic(u: f64) -> f64 {
+pub(crate) fn cubic(u: f64) -> f64 {
     let v = 2.0 - (u - 2.0).abs();
     match v {
         v if v <= 0.0 => 0.0,

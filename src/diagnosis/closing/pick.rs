@@ -6,9 +6,9 @@ use super::super::trace::{Scan, Tried};
 use crate::problem::Effect;
 
 /// Level of a whole scan: probability that noise alone points to anything.
-pub(super) const LEVEL: f64 = 0.01;
+pub(in crate::diagnosis) const LEVEL: f64 = 0.01;
 /// Candidates whose criterion is this close to the best are its rivals: odds of about 150 to 1.
-pub(super) const RIVAL: f64 = 10.0;
+const RIVAL: f64 = 10.0;
 /// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.
 const OVERWHELMING: f64 = 1e-12;
 /// Effects that a round adds at most.
@@ -17,8 +17,6 @@ const MOST: usize = 40;
 /// What a round adds.
 pub(super) struct Pick {
     pub effect: Effect,
-    /// Corrected p.
-    pub p: f64,
     /// Other candidates that explain the residual about as well, best first.
     pub rivals: Vec<Effect>,
 }
@@ -34,14 +32,14 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
             .filter(|tried| tried.index != best.index && tried.criterion < best.criterion + RIVAL)
             .map(|tried| scan.effects[tried.index].clone())
             .collect();
-        let p = scan.corrected(best);
+        let p = best.corrected;
         let effect = scan.effects[best.index].clone();
         let alone = rivals.iter().all(|rival| same_family(rival, &effect)) && p < OVERWHELMING;
         if !picks.is_empty() && !alone {
             break;
         }
         let index = best.index;
-        picks.push(Pick { effect, p, rivals });
+        picks.push(Pick { effect, rivals });
         if !alone {
             break;
         }
@@ -52,7 +50,7 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
 
 /// Whether a candidate is beyond chance, better than nothing, and predicts poses that were left out better than without it.
 fn stands_out(scan: &Scan, data: &Data, tried: &Tried) -> bool {
-    if scan.corrected(tried) >= LEVEL || tried.criterion >= 0.0 {
+    if tried.corrected >= LEVEL || tried.criterion >= 0.0 {
         return false;
     }
     let mut with = scan.linear.clone();

@@ -4,6 +4,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::super::candidates::parts;
 use super::super::fitted::Fitted;
+use super::super::generic::Generic;
 use super::super::trace::{Library, Linear};
 use crate::problem::Effect;
 
@@ -14,25 +15,16 @@ pub(super) struct Retested {
     pub p: f64,
 }
 
-/// p of each added effect as a whole, in order.
-pub(super) fn p_values(fitted: &Fitted, library: &Library, added: &[Effect]) -> Vec<f64> {
-    tested(fitted, library, added.iter().cloned()).into_iter().map(|tested| tested.p).collect()
-}
-
-/// Every added effect with its p, harmonics order by order.
-pub(super) fn retest(fitted: &Fitted, library: &Library, added: &[Effect]) -> Vec<Retested> {
-    tested(fitted, library, added.iter().flat_map(parts))
-}
-
-fn tested(fitted: &Fitted, library: &Library, effects: impl Iterator<Item = Effect>) -> Vec<Retested> {
-    let (linear, normal) = (fitted.linear(library, &[]), fitted.normal(library));
+/// Every added effect with its p, harmonics order by order: what the fit would lose without it.
+pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], added: &[Effect]) -> Vec<Retested> {
+    let (linear, normal) = (fitted.linear(library, &[], generics), fitted.normal(library, generics));
     let test = |effect: Effect| {
         let parameters = fitted.parameters_of(&effect);
         let loss = fitted.loss_without(&normal, &parameters);
         let p = loss.map_or(1.0, |loss| chance(&linear, loss, parameters.len()));
         Retested { effect, p }
     };
-    effects.map(test).collect()
+    added.iter().flat_map(parts).map(test).collect()
 }
 
 /// Probability that k directions without an effect take off so much of the sum of squares.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::effect::{self, Term};
 use crate::fit::{Block, LeastSquares};
 use crate::model::{Model, Pose, PoseResiduals};
-use crate::parameter::{ArmField, BeamField, Slot};
+use crate::parameter::{BeamField, Slot};
 use crate::problem::{Effect, Problem};
 
 /// Poses linearised together.
@@ -28,16 +28,17 @@ pub(crate) struct Library<'a> {
 }
 
 impl<'a> Library<'a> {
-    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects given.
+    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects and other places
+    /// given.
     pub fn new(
         problem: &'a Problem,
         model: &Model,
         poses: Vec<Pose<'a>>,
         unknowns: &[usize],
         x: &DVector<f64>,
-        effects: &[Effect],
+        (effects, places): (&[Effect], &[Slot]),
     ) -> Self {
-        let mut slots: Vec<(Slot, f64)> = Vec::new();
+        let mut slots: Vec<(Slot, f64)> = places.iter().map(|&slot| (slot, 0.0)).collect();
         for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect::terms(effect, problem)) {
             if !slots.iter().any(|(known, _)| *known == slot) {
                 slots.push((slot, nominal));
@@ -139,9 +140,4 @@ fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVec
         row += block.rows();
     }
     (jacobian, residual)
-}
-
-/// Whether a place acts through the loads of the arm.
-pub(crate) fn is_of_loads(slot: Slot) -> bool {
-    slot.is_elastic() && !matches!(slot, Slot::Arm(ArmField::Mixing))
 }

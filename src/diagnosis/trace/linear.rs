@@ -180,8 +180,7 @@ impl Linear {
         let n = self.basis.ncols();
         let mut sum = 0.0;
         for number in 0..blocks {
-            let rows: Vec<usize> =
-                (0..self.rows).filter(|row| block[row / 3] == number).collect();
+            let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
             let (basis, residual) = (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
             let inner = DMatrix::identity(n, n) - basis.tr_mul(&basis);
             let left_out = &residual + &basis * inner.cholesky()?.solve(&basis.tr_mul(&residual));
@@ -196,6 +195,9 @@ impl Score {
     fn reduction(&self) -> Option<(f64, usize)> {
         let scale = DVector::from_iterator(self.lengths.len(), self.lengths.iter().map(|length| length.sqrt()));
         let kept: Vec<usize> = (0..scale.len()).filter(|&j| scale[j] > 0.0).collect();
+        if kept.is_empty() {
+            return None;
+        }
         let gram = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
             self.gram[(kept[i], kept[j])] / (scale[kept[i]] * scale[kept[j]])
         });

@@ -6,4 +6,4 @@ mod scan;
 
 pub(super) use library::Library;
 pub(super) use linear::{Gain, Linear};
-pub(super) use scan::{Scan, Tried};
+pub(super) use scan::{Scan, Tried, tries};

@@ -15,8 +15,10 @@ pub(crate) struct Scan<'a, 'l> {
     /// The candidates tried.
     pub effects: Vec<Effect>,
     scores: Vec<Score>,
-    /// Members of each candidate's family: how often chance has a try at it.
-    members: Vec<usize>,
+    /// How often chance has a try at each candidate within its family.
+    tries: Vec<f64>,
+    /// Families that are tried.
+    families: usize,
 }
 
 /// A candidate with its gain.
@@ -25,25 +27,27 @@ pub(crate) struct Tried {
     /// Index in the scan's list.
     pub index: usize,
     pub gain: Gain,
-    /// The information criterion with 2 ln(members of the family) for the search in it; negative is better than nothing.
+    /// The information criterion with 2 ln(tries) for the search; negative is better than nothing.
     pub criterion: f64,
+    /// p times the tries in its family and the number of families: Holm's first step with a weight for each candidate.
+    pub corrected: f64,
 }
 
 impl<'a, 'l> Scan<'a, 'l> {
     /// Tries `effects` against the fit that `linear` describes.
     pub fn new(library: &'l Library<'a>, linear: Linear, effects: Vec<Effect>) -> Self {
         let scores = effects.par_iter().map(|effect| linear.score(&library.columns(effect))).collect();
-        let family = |effect: &Effect| effects.iter().filter(|other| effect::name(other) == effect::name(effect)).count();
-        let members = effects.iter().map(family).collect();
-        Self { library, linear, effects, scores, members }
+        let (tries, families) = tries(&effects);
+        Self { library, linear, effects, scores, tries, families }
     }
 
     /// Candidates that the fit does not absorb, best first.
     pub fn ranking(&self) -> Vec<Tried> {
-        let tried = |(index, score)| {
+        let tried = |(index, score): (usize, &Score)| {
             let gain = self.linear.gain(score)?;
-            let search = 2.0 * (self.members[index] as f64).ln();
-            Some(Tried { index, gain, criterion: gain.criterion + search })
+            let tries = self.tries[index] * self.families as f64;
+            let (criterion, corrected) = (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
+            Some(Tried { index, gain, criterion, corrected })
         };
         let mut all: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
         all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
@@ -54,11 +58,6 @@ impl<'a, 'l> Scan<'a, 'l> {
     pub fn absorbed(&self) -> Vec<&Effect> {
         let gone = |(effect, score)| self.linear.gain(score).is_none().then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
-    }
-
-    /// p of the best of so many tries: the Holm correction of a ranking's first entry [Holm 1979].
-    pub fn corrected(&self, tried: &Tried) -> f64 {
-        (tried.gain.p * self.effects.len() as f64).min(1.0)
     }
 
     /// Takes a candidate into the fit, in the linear neighbourhood.
@@ -87,4 +86,18 @@ impl<'a, 'l> Scan<'a, 'l> {
         let cosines = a.tr_mul(&b).singular_values();
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
+}
+
+/// For each candidate how often chance has a try at it within its family, and the number of families.
+pub(crate) fn tries(effects: &[Effect]) -> (Vec<f64>, usize) {
+    let (mut tries, mut families) = (vec![1.0; effects.len()], 0);
+    for family in effect::FAMILIES {
+        let own = |effect: &&Effect| effect::name(effect) == family.name;
+        let members: Vec<&Effect> = effects.iter().filter(own).collect();
+        families += usize::from(!members.is_empty());
+        for (effect, tries) in effects.iter().zip(&mut tries).filter(|(effect, _)| own(effect)) {
+            *tries = family.tries(effect, &members);
+        }
+    }
+    (tries, families)
 }

@@ -1,0 +1,166 @@
+//! The whole story: before, what was found, after, what remains.
+
+use super::super::candidates::{Candidates, covers};
+use super::super::checks::Findings;
+use super::super::data::Data;
+use super::super::fitted::Fitted;
+use super::super::tracing::{Trace, check_fit, trace_fit};
+use super::super::unexplained::{self, Unexplained};
+use super::alternatives::alternatives;
+use super::interval::{self, Interval};
+use super::pick::LEVEL;
+use super::rounds::Rounds;
+pub use super::rounds::Step;
+use crate::measurement::{Measurements, Split};
+use crate::problem::{Effect, Problem};
+use crate::study::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
+
+/// Effects that are exchanged for better ones at most.
+const MOST_EXCHANGES: usize = 4;
+
+/// What the loop came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// No effect, no structure.
+    NothingFound,
+    /// Effects were found and what is left passes the checks.
+    Explained,
+    /// Structure is left.
+    Unexplained,
+}
+
+/// An effect that the loop added.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Which.
+    pub effect: Effect,
+    /// Probability that it is none, corrected for the candidates tried.
+    pub p_value: f64,
+    /// Its parameters.
+    pub estimates: Vec<Estimate>,
+    /// Candidates that these data cannot tell from it, best first.
+    pub alternatives: Vec<Effect>,
+    /// Error on held-out poses once it was in the model.
+    pub held_out_after: ErrorSummary,
+}
+
+/// The loop from the declared problem to one that leaves nothing to find.
+#[derive(Debug, Clone)]
+pub struct Closure {
+    /// What it came to.
+    pub verdict: Verdict,
+    /// The fit of the declared problem, its checks, and what its residual points to.
+    pub before: Trace,
+    /// The fit with every effect that was found.
+    pub after: Identification,
+    /// Checks of what it leaves.
+    pub findings: Findings,
+    /// The problem with what was found declared.
+    pub closed: Problem,
+    /// In the order in which they were found.
+    pub effects: Vec<Found>,
+    /// What each round came to.
+    pub steps: Vec<Step>,
+    /// Structure that no effect explains.
+    pub unexplained: Option<Unexplained>,
+    /// Mean reduction of the error on held-out poses [m].
+    pub gain: Interval,
+}
+
+/// Finds what `problem` lacks, from the identification rows alone; held-out rows only measure the outcome.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn close(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Closure, IdentifyError> {
+    let data = Data::new(measurements, split);
+    let first = Fitted::new(problem.clone(), &data, options)?;
+    let before = trace_fit(&first, &data);
+    let errors_before = first.errors(&data, &split.held_out);
+    let declared = first.effects();
+    let mut rounds =
+        Rounds { data: &data, options, declared, generics: Vec::new(), steps: Vec::new(), seen: Vec::new() };
+    let mut fitted = rounds.run(first)?;
+    for _ in 0..MOST_EXCHANGES {
+        let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
+        fitted = rounds.run(next)?;
+    }
+    let candidates = Candidates::of(&fitted.problem, &data).testable;
+    if let Some((generic, rest)) = unexplained::withdraw(&fitted, &data, &rounds.added(&fitted), &candidates) {
+        rounds.generics.push(generic);
+        let without = rounds.fit(&fitted, &rest)?;
+        let without = rounds.without_insignificant(without)?;
+        rounds.seen.clear();
+        rounds.note(&without);
+        fitted = rounds.run(without)?;
+    }
+    let findings = check_fit(&fitted, &data);
+    let unexplained = match rounds.generics.first() {
+        Some(known) => unexplained::localise(&fitted, &data, Some(known), LEVEL),
+        None => unexplained::localise(&fitted, &data, None, LEVEL),
+    };
+    let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
+    let effects = found(&rounds, &fitted);
+    let verdict = match (&unexplained, effects.is_empty()) {
+        (Some(_), _) => Verdict::Unexplained,
+        (None, true) => Verdict::NothingFound,
+        (None, false) => Verdict::Explained,
+    };
+    let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &split.held_out));
+    let steps = rounds.steps;
+    Ok(Closure {
+        verdict,
+        before,
+        after: fitted.found,
+        findings,
+        closed: fitted.problem,
+        effects,
+        steps,
+        unexplained,
+        gain,
+    })
+}
+
+/// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
+fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
+    let added = rounds.added(fitted);
+    if added.len() < 2 {
+        return Ok(None);
+    }
+    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    for effect in &added {
+        let other = alternatives(fitted, rounds.data, effect, &candidates, &rounds.generics);
+        if let (true, Some(better)) = (other.better, other.effects.first()) {
+            let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
+            let next = rounds.fit(fitted, &kept)?;
+            let next = rounds.without_insignificant(next)?;
+            if rounds.is_new(&next) {
+                rounds.note(&next);
+                return Ok(Some(next));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Every added effect with what is known of it.
+fn found(rounds: &Rounds, fitted: &Fitted) -> Vec<Found> {
+    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let tested = rounds.tested(fitted);
+    let first_with = |effect: &Effect| {
+        let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known) || covers(known, effect));
+        rounds.steps.iter().find(holds).map_or(fitted.found.fitted.held_out, |step| step.held_out)
+    };
+    let one = |effect: Effect| Found {
+        p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
+        estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
+        alternatives: alternatives(fitted, rounds.data, &effect, &candidates, &rounds.generics).effects,
+        held_out_after: first_with(&effect),
+        effect,
+    };
+    rounds.added(fitted).into_iter().map(one).collect()
+}

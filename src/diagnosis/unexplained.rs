@@ -1,0 +1,207 @@
+//! Structure that no effect of the catalogue explains: where it is, what it depends on, and what a smooth correction gains.
+
+use nalgebra::{DVector, Vector3};
+
+use super::checks::Findings;
+use super::data::Data;
+use super::fitted::{Fitted, Normal, with_generics};
+use super::generic::Generic;
+use super::trace::{Gain, Linear, tries};
+use crate::effect;
+use crate::parameter::{JointField, Quantity, Slot};
+use crate::problem::Effect;
+use crate::study::ErrorSummary;
+
+/// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
+const BETTER: f64 = 6.0;
+
+/// Structure that is left.
+#[derive(Debug, Clone)]
+pub struct Unexplained {
+    /// `joint 2`, `link before joint 3`, or `nowhere in particular`.
+    pub place: String,
+    /// `q2`, `temperature`, …: what it depends on.
+    pub depends_on: Vec<String>,
+    /// Probability that it is chance, corrected for the places and quantities tried.
+    pub p_value: f64,
+    /// What an empirical correction gains; `None` where it does not predict poses that were left out.
+    pub correction: Option<Correction>,
+}
+
+/// A smooth correction of one place's error as a function of one quantity.
+#[derive(Debug, Clone)]
+pub struct Correction {
+    /// Range of the quantity that the identification poses cover, in its unit: nothing is corrected beyond it.
+    pub range: (f64, f64),
+    /// Held-out poses beyond it, which stay uncorrected.
+    pub beyond: usize,
+    /// Root mean squared error of identification poses left out in turn, before and with the correction [m].
+    pub cross_validated: (f64, f64),
+    /// Error on held-out poses with the correction.
+    pub held_out: ErrorSummary,
+    /// The quantity and the correction of the place there [rad] or [m].
+    pub curve: Vec<(f64, f64)>,
+}
+
+/// A generic with its gain.
+pub(super) struct Tried {
+    pub generic: Generic,
+    pub gain: Gain,
+    /// The criterion with 2 ln(places and quantities tried).
+    pub criterion: f64,
+    /// p times their number.
+    pub corrected: f64,
+}
+
+/// The best of some generics against a fit.
+pub(super) fn best(
+    linear: &Linear,
+    library: &super::trace::Library,
+    generics: &[Generic],
+    wanted: impl Fn(&Generic) -> bool,
+) -> Option<Tried> {
+    let count = generics.len() as f64;
+    let tried = |generic: &Generic| {
+        let gain = linear.gain(&linear.score(&generic.columns(library)))?;
+        let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
+        Some(Tried { generic: generic.clone(), gain, criterion, corrected })
+    };
+    let all = generics.iter().filter(|generic| wanted(generic)).filter_map(tried);
+    all.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+/// Added effects that are functions of one joint's command at one joint, where a smooth function is the better explanation:
+/// the function, and the effects that remain.
+pub(super) fn withdraw(
+    fitted: &Fitted,
+    data: &Data,
+    added: &[Effect],
+    candidates: &[Effect],
+) -> Option<(Generic, Vec<Effect>)> {
+    let generics = Generic::all(&fitted.problem, data);
+    let library = fitted.library(data, &[], &generics);
+    let everything: Vec<Effect> = candidates.iter().chain(added).cloned().collect();
+    let (all_tries, families) = tries(&everything);
+    let search = |effect: &Effect| {
+        let parts = super::candidates::parts(effect).into_iter();
+        parts
+            .map(|part| {
+                let known = everything.iter().position(|other| *other == part);
+                2.0 * (known.map_or(1.0, |index| all_tries[index]) * families as f64).ln()
+            })
+            .sum::<f64>()
+    };
+    let mut places: Vec<(usize, usize)> = added.iter().filter_map(function_of).collect();
+    places.sort_unstable();
+    places.dedup();
+    for (joint, from) in places {
+        let (own, rest): (Vec<Effect>, Vec<Effect>) =
+            added.iter().cloned().partition(|effect| function_of(effect) == Some((joint, from)));
+        let parameters: Vec<usize> = own.iter().flat_map(|effect| fitted.parameters_of(effect)).collect();
+        let linear = fitted.linear(&library, &parameters, &[]);
+        let explained = linear.gain(&linear.score(&fitted.columns(&library, &parameters)));
+        let explained = explained.map_or(0.0, |gain| gain.criterion + own.iter().map(search).sum::<f64>());
+        let here = |generic: &Generic| {
+            let coordinate = matches!(generic.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }
+                if own + 1 == joint);
+            coordinate && generic.of == Quantity::Command(from - 1)
+        };
+        if let Some(tried) = best(&linear, &library, &generics, here)
+            && tried.criterion + BETTER < explained
+        {
+            return Some((tried.generic, rest));
+        }
+    }
+    None
+}
+
+/// The joint at which an effect is a function of a command alone, and the joint commanded, both from 1.
+fn function_of(effect: &Effect) -> Option<(usize, usize)> {
+    match effect {
+        Effect::JointHarmonic { joint, .. } | Effect::GearRatio { joint } => Some((*joint, *joint)),
+        Effect::JointCoupling { joint, from } => Some((*joint, *from)),
+        _ => None,
+    }
+}
+
+/// What is known of structure at a generic, or of the strongest one where `known` is none; `level` is that of chance.
+pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, level: f64) -> Option<Unexplained> {
+    let generics = Generic::all(&fitted.problem, data);
+    let library = fitted.library(data, &[], &generics);
+    let linear = fitted.linear(&library, &[], &[]);
+    let tried = match known {
+        None => best(&linear, &library, &generics, |_| true),
+        Some(known) => {
+            best(&linear, &library, &generics, |generic| generic.slot == known.slot && generic.of == known.of)
+        }
+    }?;
+    if tried.corrected >= level || tried.criterion >= 0.0 {
+        return None;
+    }
+    let Tried { generic, corrected, gain, .. } = tried;
+    debug_assert!(gain.freedom > 0);
+    let mut with = linear.clone();
+    with.add(&generic.columns(&library));
+    let coordinates = linear.rows() as f64;
+    let rms = |squares: f64| (3.0 * squares / coordinates).sqrt() * fitted.sigma;
+    let validated = linear.cross_validate(&data.block).zip(with.cross_validate(&data.block));
+    let correction = validated
+        .filter(|(without, with)| with < without)
+        .map(|(without, with)| correct(fitted, data, &generic, (rms(without), rms(with))));
+    Some(Unexplained { place: generic.place(), depends_on: vec![generic.depends_on()], p_value: corrected, correction })
+}
+
+/// Structure that the checks see and no place or quantity shows.
+pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
+    if !findings.is_structured() {
+        return None;
+    }
+    let strongest = findings.strongest()?;
+    Some(Unexplained {
+        place: "nowhere in particular".to_owned(),
+        depends_on: strongest.about().map(str::to_owned).into_iter().collect(),
+        p_value: strongest.outcome.as_ref().map_or(1.0, |outcome| outcome.p_value),
+        correction: None,
+    })
+}
+
+/// Fits the correction together with all parameters, in the linear neighbourhood, and applies it to the held-out poses.
+fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f64, f64)) -> Correction {
+    let generics = std::slice::from_ref(generic);
+    let library = fitted.library(data, &[], generics);
+    let columns = with_generics(&library, generics);
+    let own = fitted.unknowns.iter().map(|&k| fitted.model.parameters[k].sigma);
+    let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
+    let mut pull = columns.tr_mul(library.residual());
+    for (j, &k) in fitted.unknowns.iter().enumerate() {
+        if let Some(sigma) = fitted.model.parameters[k].sigma {
+            pull[j] += fitted.x()[k] / (sigma * sigma);
+        }
+    }
+    let step: DVector<f64> = -(Normal::new(&columns, &priors).inverse * pull);
+    let held_out = fitted.library_of(data, &data.split.held_out, &[], generics);
+    let change = with_generics(&held_out, generics) * &step;
+    let mut errors = fitted.errors(data, &data.split.held_out);
+    let mut beyond = 0;
+    for (k, (pose, error)) in held_out.poses().iter().zip(&mut errors).enumerate() {
+        if generic.reaches(&pose.setup) {
+            *error += Vector3::from_fn(|axis, _| change[3 * k + axis]) * pose.sigma;
+        } else {
+            beyond += 1;
+        }
+    }
+    let splines = step.rows(step.len() - generic.splines(), generic.splines());
+    Correction {
+        range: generic.range,
+        beyond,
+        cross_validated,
+        held_out: ErrorSummary::of(&errors),
+        curve: generic.curve(splines.as_slice()),
+    }
+}
+
+/// Name of an effect with its place, for people.
+pub(super) fn named(effect: &Effect) -> String {
+    let place = effect::place(effect);
+    if place.is_empty() { effect::name(effect).to_owned() } else { format!("{} {place}", effect::name(effect)) }
+}
