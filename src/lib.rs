@@ -7,7 +7,8 @@
 //! - [`spatial`], [`scalar`], [`arm`]: frames, and the arm's physics written once for real and dual numbers.
 //! - [`parameter`], [`model`]: free parameters, and positions with their derivatives as a function of them.
 //! - [`fit`], [`solver`]: least squares over many small items, which know no arms.
-//! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`report`] writes it down.
+//! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`campaign`]: the same many
+//!   times over, where the truth is known; [`report`] writes it down.
 //! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
 //!   the model.
 //!
@@ -29,6 +30,7 @@
 //! ```
 
 pub mod arm;
+pub mod campaign;
 pub mod error;
 pub mod fit;
 pub mod measurement;

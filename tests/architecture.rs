@@ -32,9 +32,11 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
     ("study", &[GROUND, BELOW_STUDY]),
-    ("report", &[GROUND, BELOW_STUDY, &["study"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "report", "rig", "cli"]]),
+    // Many fits to what model or rig measure.
+    ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
+    ("report", &[GROUND, BELOW_STUDY, &["study", "campaign"]]),
+    ("cli", &[GROUND, BELOW_STUDY, &["study", "campaign", "report", "rig"]]),
+    ("main", &[GROUND, BELOW_STUDY, &["study", "campaign", "report", "rig", "cli"]]),
 ];
 const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
 
