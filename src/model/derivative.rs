@@ -101,6 +101,11 @@ impl Linearised {
                 Slot::Joint { .. } | Slot::Beam { .. } => own.push((column, k)),
             }
         }
+        // In the order of the arm: a chunk costs less the further out its first parameter is, for all before it is constant.
+        own.sort_by_key(|&(_, k)| match model.parameters[k].slot {
+            Slot::Joint { joint, .. } | Slot::Beam { joint, .. } => joint,
+            Slot::Base { .. } | Slot::Target { .. } => usize::MAX,
+        });
         let inner = if arm.is_elastic() {
             let chunks = own.chunks(CHUNK).map(|part| Chunk {
                 arm: model.arm(|k| seeded(x[k], part.iter().position(|&(_, seeded)| seeded == k))),
