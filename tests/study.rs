@@ -325,7 +325,11 @@ fn bad_studies_are_named_and_leave_nothing_behind() {
         ("problem.toml", "other.toml", &["STUDY.toml:3", "other.toml"]),
         ("name = \"small-study\"", "name = \"a/b\"", &["STUDY.toml:2", "folder"]),
         ("q3_deg = [-120, -10]", "", &["poses.q3", "missing"]),
-        ("q3_deg = [-120, -10]", "q3_deg = [-120, -10]\nidentification = 8", &["poses.identification", "the study says"]),
+        (
+            "q3_deg = [-120, -10]",
+            "q3_deg = [-120, -10]\nidentification = 8",
+            &["poses.identification", "the study says"],
+        ),
         ("[poses]", "truth = \"TRUTH.toml\"\n[poses]", &["STUDY.toml:11", "TRUTH.toml"]),
     ];
     for &(from, to, expected) in cases {

@@ -43,7 +43,8 @@ impl Campaign {
         for (row, seen) in rows.iter_mut().zip(seen) {
             row.position += seen;
         }
-        let split = Split { held_out: (0..self.held_out).collect(), identification: (self.held_out..rows.len()).collect() };
+        let split =
+            Split { held_out: (0..self.held_out).collect(), identification: (self.held_out..rows.len()).collect() };
         Some(Data { measurements: table(&rows), split, truth: true_x })
     }
 

@@ -65,19 +65,7 @@ fn campaign(mut root: Section<'_, '_>, file: &Path) -> Result<Campaign, InputErr
         }
     }
     let parameters = model.parameters;
-    Ok(Campaign {
-        name,
-        title,
-        problem,
-        parameters,
-        truth,
-        source,
-        seed,
-        repetitions,
-        held_out,
-        cells,
-        problem_text,
-    })
+    Ok(Campaign { name, title, problem, parameters, truth, source, seed, repetitions, held_out, cells, problem_text })
 }
 
 fn problem(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem, String), InputError> {

@@ -16,7 +16,10 @@ use super::tally::Tally;
 pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),
-    #[error("{missing} of {parts} parts of the study are missing in {}; run the study or the shards that lack", list(folders))]
+    #[error(
+        "{missing} of {parts} parts of the study are missing in {}; run the study or the shards that lack",
+        list(folders)
+    )]
     Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
 }
 
@@ -39,12 +42,7 @@ pub fn pending(campaign: &Campaign, store: &Store, shard: Shard) -> Result<Vec<P
 ///
 /// # Errors
 /// A part cannot be kept.
-pub fn run(
-    campaign: &Campaign,
-    store: &Store,
-    parts: &[Part],
-    fitted: impl Fn() + Sync,
-) -> Result<(), StoreError> {
+pub fn run(campaign: &Campaign, store: &Store, parts: &[Part], fitted: impl Fn() + Sync) -> Result<(), StoreError> {
     let run_part = |part: &Part| {
         let cell = &campaign.cells[part.cell];
         let problem = campaign.problem_of(cell);
@@ -70,7 +68,8 @@ pub fn run(
 /// # Errors
 /// A part is missing or cannot be read.
 pub fn collect(campaign: &Campaign, stores: &[Store]) -> Result<Results, RunError> {
-    let empty = |cell: &_| CellResult { cell: *cell, tally: Tally::new(campaign.parameters.len()), seconds: Vec::new() };
+    let empty =
+        |cell: &_| CellResult { cell: *cell, tally: Tally::new(campaign.parameters.len()), seconds: Vec::new() };
     let mut cells: Vec<CellResult> = campaign.cells.iter().map(empty).collect();
     let parts = campaign.parts();
     let mut missing = 0;

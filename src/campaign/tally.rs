@@ -180,7 +180,8 @@ mod tests {
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / 6.0).sqrt();
         for moments in [joined, whole] {
             assert_eq!((moments.count, moments.largest()), (6, Some(9.25)));
-            for (found, expected) in [(moments.mean(), mean), (moments.deviation(), variance.sqrt()), (moments.rms(), rms)]
+            for (found, expected) in
+                [(moments.mean(), mean), (moments.deviation(), variance.sqrt()), (moments.rms(), rms)]
             {
                 assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-14);
             }

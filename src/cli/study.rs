@@ -74,7 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let campaign = Campaign::read(&common.study)?;
         let folder = common.folder(&campaign);
-        let stores = if from.is_empty() { vec![Store::new(&folder)] } else { from.iter().map(|f| Store::new(f)).collect() };
+        let stores =
+            if from.is_empty() { vec![Store::new(&folder)] } else { from.iter().map(|f| Store::new(f)).collect() };
         return finish(common, &campaign, &folder, &stores);
     }
     // Without a subcommand clap asks for these.
