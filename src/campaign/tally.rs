@@ -170,7 +170,9 @@ mod tests {
         let values = [3.0, -1.0, 4.0, 1.5, -5.0, 9.25];
         let of = |values: &[f64]| {
             let mut moments = Moments::default();
-            values.iter().for_each(|&value| moments.push(value));
+            for &value in values {
+                moments.push(value);
+            }
             moments
         };
         let (mut joined, whole) = (of(&values[..2]), of(&values));

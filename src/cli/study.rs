@@ -84,16 +84,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let folder = common.folder(&campaign);
     let store = Store::new(&folder);
     fit(common, &campaign, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
-    match arguments.shard {
-        None => finish(common, &campaign, &folder, &[store]),
-        Some(_) => {
-            if common.talks() {
-                let (study, folder) = (common.study.display(), folder.display());
-                output::print(&format!("Share done. After the last: flexcal study merge {study} --out {folder}\n"))?;
-            }
-            Ok(Outcome::Done)
-        }
+    if arguments.shard.is_none() {
+        return finish(common, &campaign, &folder, &[store]);
     }
+    if common.talks() {
+        let (study, folder) = (common.study.display(), folder.display());
+        output::print(&format!("Share done. After the last: flexcal study merge {study} --out {folder}\n"))?;
+    }
+    Ok(Outcome::Done)
 }
 
 fn fit(common: &Common, campaign: &Campaign, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
