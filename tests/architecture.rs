@@ -33,9 +33,11 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
     ("study", &[GROUND, BELOW_STUDY]),
     ("diagnosis", &[GROUND, BELOW_STUDY, &["study"]]),
-    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "report", "rig", "cli"]]),
+    // Many fits to what model or rig measure.
+    ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
+    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "campaign"]]),
+    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "campaign", "report", "rig"]]),
+    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "campaign", "report", "rig", "cli"]]),
 ];
 const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
 

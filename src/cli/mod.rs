@@ -8,6 +8,7 @@ mod input;
 mod output;
 mod progress;
 mod simulate;
+mod study;
 
 use std::process::ExitCode;
 
@@ -31,6 +32,8 @@ enum Command {
     Compensate(compensate::Arguments),
     /// Make measurements of a known arm on the virtual test rig.
     Simulate(simulate::Arguments),
+    /// Compare strategies over many fits to simulated measurements whose truth is known.
+    Study(study::Arguments),
 }
 
 /// What a command says to the shell.
@@ -57,6 +60,7 @@ pub fn run() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -60,9 +60,16 @@ pub(super) fn best(
     generics: &[Generic],
     wanted: impl Fn(&Generic) -> bool,
 ) -> Option<Tried> {
-    let count = generics.len() as f64;
+    // Half of the chance for splines, half for single bumps and steps; an equal part for each place and quantity.
+    let mut places: Vec<(Slot, Quantity)> = Vec::new();
+    for generic in generics {
+        if !places.contains(&(generic.slot, generic.of)) {
+            places.push((generic.slot, generic.of));
+        }
+    }
     let tried = |generic: &Generic| {
         let gain = linear.gain(&linear.score(&generic.columns(library)))?;
+        let count = 2.0 * (places.len() * generic.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
         Some(Tried { generic: generic.clone(), gain, criterion, corrected })
     };
@@ -106,6 +113,7 @@ pub(super) fn withdraw(
                 if own + 1 == joint);
             coordinate && generic.of == Quantity::Command(from - 1)
         };
+        if let Some(t) = best(&linear, &library, &generics, here) { eprintln!("generic {:?} {} {:?} vs explained {} {:?}", t.generic, t.criterion, t.gain, explained, own.iter().map(search).collect::<Vec<_>>()); }
         if let Some(tried) = best(&linear, &library, &generics, here)
             && tried.criterion + BETTER < explained
         {
@@ -190,13 +198,14 @@ fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f6
             beyond += 1;
         }
     }
-    let splines = step.rows(step.len() - generic.splines(), generic.splines());
+    let count = generic.functions.len();
+    let functions = step.rows(step.len() - count, count);
     Correction {
         range: generic.range,
         beyond,
         cross_validated,
         held_out: ErrorSummary::of(&errors),
-        curve: generic.curve(splines.as_slice()),
+        curve: generic.curve(functions.as_slice()),
     }
 }
 

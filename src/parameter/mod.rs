@@ -9,7 +9,6 @@ mod name;
 mod resolve;
 
 pub use constraint::{LinearConstraint, constrain};
-pub(crate) use driver::cubic;
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
 pub use resolve::{EffectParameter, resolve};

@@ -9,7 +9,7 @@ pub(crate) mod effects;
 pub(crate) mod item;
 mod parameters;
 pub(crate) mod pattern;
-mod read;
+pub(crate) mod read;
 mod robust;
 pub(crate) mod section;
 
