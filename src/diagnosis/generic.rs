@@ -16,6 +16,9 @@ const POSES_PER_SPLINE: usize = 3;
 const CENTRES: u32 = 16;
 /// Their widths as parts of the range.
 const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
+/// First and last step of the search for a shape, as parts of its width.
+const FIRST_STEP: f64 = 0.4;
+const LAST_STEP: f64 = 0.02;
 /// Steps of a curve.
 const CURVE: u32 = 100;
 
@@ -30,6 +33,8 @@ pub(super) struct Generic {
     pub functions: Vec<Driver>,
     /// How many of its kind are tried at each place.
     pub tries: usize,
+    /// Parameters of the functions' shape that were fitted.
+    pub fitted: usize,
 }
 
 impl Generic {
@@ -50,12 +55,44 @@ impl Generic {
             for functions in [splines, shapes] {
                 let tries = functions.len();
                 for functions in functions {
-                    let at = |slot| Self { slot, of, range, functions: functions.clone(), tries };
+                    let at = |slot| Self { slot, of, range, functions: functions.clone(), tries, fitted: 0 };
                     all.extend(places(problem).map(at));
                 }
             }
         }
         all
+    }
+
+    /// A single bump or step with centre and width fitted: where `gain` is largest, by a search along both in turn.
+    pub fn refined(mut self, gain: impl Fn(&Self) -> f64) -> Self {
+        let (Some(first), 1) = (self.functions.first().copied(), self.functions.len()) else { return self };
+        let moved = |function: Driver, along: f64, wider: f64| match function {
+            Driver::Bump { of, centre, width } => {
+                Driver::Bump { of, centre: centre + along * width, width: width * wider }
+            }
+            Driver::Step { of, centre, width } => {
+                Driver::Step { of, centre: centre + along * width, width: width * wider }
+            }
+            other => other,
+        };
+        let (mut function, mut step) = (first, FIRST_STEP);
+        let mut best = gain(&self);
+        while step > LAST_STEP {
+            let moves = [(step, 1.0), (-step, 1.0), (0.0, 1.0 + step), (0.0, (1.0 + step).recip())];
+            let tried = moves.map(|(along, wider)| {
+                let function = moved(function, along, wider);
+                (function, gain(&Self { functions: vec![function], ..self.clone() }))
+            });
+            let (next, found) = tried.into_iter().fold((function, best), |a, b| if b.1 > a.1 { b } else { a });
+            if found > best {
+                (function, best) = (next, found);
+            } else {
+                step /= 2.0;
+            }
+        }
+        // What was fitted is counted as fitted, not as tried.
+        (self.functions, self.tries, self.fitted) = (vec![function], 2, 2);
+        self
     }
 
     /// Whether it corrects a pose: nothing is said beyond the range that the identification poses cover.

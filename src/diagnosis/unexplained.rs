@@ -15,6 +15,9 @@ use crate::study::ErrorSummary;
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
 const BETTER: f64 = 6.0;
 
+/// Bumps and steps whose shape is fitted.
+const REFINED: usize = 4;
+
 /// Structure that is left.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
@@ -67,14 +70,22 @@ pub(super) fn best(
             places.push((generic.slot, generic.of));
         }
     }
-    let tried = |generic: &Generic| {
-        let gain = linear.gain(&linear.score(&generic.columns(library)))?;
+    let score = |generic: &Generic| linear.score(&generic.columns(library));
+    let tried = |generic: Generic| {
+        let gain = linear.gain(&score(&generic))?;
+        let (squares, freedom) = (gain.squares, gain.freedom + generic.fitted);
+        let gain = linear.gain_of(squares, freedom)?;
         let count = 2.0 * (places.len() * generic.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
-        Some(Tried { generic: generic.clone(), gain, criterion, corrected })
+        Some(Tried { generic, gain, criterion, corrected })
     };
-    let all = generics.iter().filter(|generic| wanted(generic)).filter_map(tried);
-    all.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    let mut all: Vec<Tried> =
+        generics.iter().filter(|generic| wanted(generic)).filter_map(|generic| tried(generic.clone())).collect();
+    all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
+    let shapes: Vec<Generic> = all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
+    let squares = |generic: &Generic| linear.gain(&score(generic)).map_or(0.0, |gain| gain.squares);
+    all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
+    all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
 /// Added effects that are functions of one joint's command at one joint, where a smooth function is the better explanation:
@@ -87,7 +98,7 @@ pub(super) fn withdraw(
 ) -> Option<(Generic, Vec<Effect>)> {
     let generics = Generic::all(&fitted.problem, data);
     let library = fitted.library(data, &[], &generics);
-    let everything: Vec<Effect> = candidates.iter().chain(added).cloned().collect();
+    let everything: Vec<Effect> = candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
     let (all_tries, families) = tries(&everything);
     let search = |effect: &Effect| {
         let parts = super::candidates::parts(effect).into_iter();
@@ -113,7 +124,6 @@ pub(super) fn withdraw(
                 if own + 1 == joint);
             coordinate && generic.of == Quantity::Command(from - 1)
         };
-        if let Some(t) = best(&linear, &library, &generics, here) { eprintln!("generic {:?} {} {:?} vs explained {} {:?}", t.generic, t.criterion, t.gain, explained, own.iter().map(search).collect::<Vec<_>>()); }
         if let Some(tried) = best(&linear, &library, &generics, here)
             && tried.criterion + BETTER < explained
         {
