@@ -89,8 +89,13 @@ pub fn place(effect: &Effect) -> String {
 
 /// What an error of a joint, counted from 1, adds to: d where it slides, else θ.
 pub(super) fn coordinate(problem: &Problem, joint: usize) -> Slot {
-    let slides = problem.joints[joint - 1].kind == JointKind::Prismatic;
-    Slot::Joint { joint: joint - 1, field: if slides { JointField::D } else { JointField::Theta } }
+    let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
+    Slot::Joint { joint: joint - 1, field }
+}
+
+/// Whether a joint, counted from 1, slides.
+pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
+    problem.joints[joint - 1].kind == JointKind::Prismatic
 }
 
 /// Numbers, from 1, of the joints that take a command.
