@@ -67,12 +67,12 @@ pub struct Term {
 
 impl Term {
     /// A parameter that acts the same in every pose.
-    fn constant(name: &str, slot: Slot, size: f64) -> Self {
+    pub fn constant(name: &str, slot: Slot, size: f64) -> Self {
         Self::driven(name, slot, Driver::Constant, size)
     }
 
     /// A parameter that is multiplied by what is known of a pose.
-    fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
+    pub fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
         Self { name: name.to_owned(), slot, driver, nominal: 0.0, size }
     }
 }
@@ -134,20 +134,22 @@ pub fn describe(effect: &Effect) -> String {
     family.map_or_else(String::new, |family| (family.describe)(effect))
 }
 
+/// The parameters of an effect by that name at a `place`, empty for the whole: `name[place].term`.
+pub fn named(name: &str, place: &str, terms: Vec<Term>) -> Vec<EffectParameter> {
+    let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
+    let parameter = |term: Term| EffectParameter {
+        name: format!("{name}{bracket}.{}", term.name),
+        plain: format!("{name}.{}", term.name),
+        slot: term.slot,
+        driver: term.driver,
+        nominal: term.nominal,
+        sigma: term.size,
+    };
+    terms.into_iter().map(parameter).collect()
+}
+
 /// Parameters of every effect that `problem` declares, in order.
 pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
-    let of = |effect: &Effect| {
-        let (name, place) = (name(effect), place(effect));
-        let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
-        let parameter = move |term: Term| EffectParameter {
-            name: format!("{name}{bracket}.{}", term.name),
-            plain: format!("{name}.{}", term.name),
-            slot: term.slot,
-            driver: term.driver,
-            nominal: term.nominal,
-            sigma: term.size,
-        };
-        terms(effect, problem).into_iter().map(parameter).collect::<Vec<_>>()
-    };
+    let of = |effect: &Effect| named(name(effect), &place(effect), terms(effect, problem));
     problem.effects.iter().flat_map(|declared| of(&declared.effect)).collect()
 }

@@ -92,7 +92,10 @@ fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), I
 }
 
 /// As [`identify`], with a model of the problem that the caller has changed.
-pub(super) fn identify_model(
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify_model(
     model: &Model,
     problem: &Problem,
     measurements: &Measurements,

@@ -28,7 +28,7 @@ pub fn lunar() -> (Problem, Vec<Strong>) {
         (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
         (Effect::GearRatio { joint: 3 }, vec![4e-4]),
         (Effect::Backlash { joint: 3 }, vec![5e-4]),
-        (Effect::JointNonlinearStiffness { joint: 2 }, vec![1e-10]),
+        (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),
         (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
         (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
         (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),

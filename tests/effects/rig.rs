@@ -1,7 +1,7 @@
 //! The model's effects do what those of the rig do, which shares no physics with it; and nothing at zero.
 
 use flexcal::measurement::Measurements;
-use flexcal::problem::{Effect, Problem};
+use flexcal::problem::{Effect, JointKind, Problem};
 use flexcal::rig::Rig;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
@@ -42,8 +42,14 @@ fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
         (change, difference) = (change.max(expected.norm()), difference.max(off));
     }
     println!("{:8.4} mm, off by {:.5} mm  {:?}", change * 1e3, difference * 1e3, effect.0);
-    let is_change = effect.0 != Effect::DeflectedEquilibrium;
-    assert!(!is_change || change > 1e-5, "{:?} changes nothing", effect.0);
+    // No moment moves a joint along its slide: without a direction of approach its play does nothing.
+    let slides = |joint: usize| arm.joints[joint - 1].kind == JointKind::Prismatic;
+    let silent = match effect.0 {
+        Effect::DeflectedEquilibrium => true,
+        Effect::Backlash { joint } => slides(joint) && rows.approach.is_none(),
+        _ => false,
+    };
+    assert!(silent || change > 1e-5, "{:?} changes nothing", effect.0);
 }
 
 fn check_all((mut arm, all): (Problem, Vec<Strong>), seed: u64) {
