@@ -251,14 +251,23 @@ fn effects() {
         ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
         ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
         ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
-        ("joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
-         &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"]),
-        ("gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"]),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
+        ),
         ("backlash = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].backlash.joint: joint 2 is fixed"]),
-        ("joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
-         &[":4: effect[1].joint-coupling.from: joint 2 is fixed"]),
-        ("joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
-         &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"]),
+        (
+            "joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-coupling.from: joint 2 is fixed"],
+        ),
+        (
+            "joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"],
+        ),
         ("hoist-force = {}\n[[effect]]\nhoist-force = {}", &[":6: effect[2].hoist-force: declared already on line 4"]),
     ];
     for (effect, words) in effects {

@@ -292,6 +292,9 @@ fn bench_with_effects() -> Bench {
     let effects = "[[effect]]\ngear-ratio = { joint = 3 }\n\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n\n\
                    [parameters]\n";
     bench.edit("problem.toml", "[parameters]\n", effects);
+    let few = "\"*\" = { fixed = true }\n\"joint*.theta\" = { sigma_deg = 1 }\n\"joint*.stiffness\" = { free = true }\n\
+               \"gear-ratio.*\" = { free = true }\n\"joint-harmonic.*\" = { sigma_deg = 0.3 }\n\n[data]";
+    bench.edit("problem.toml", "\n[data]", few);
     bench
 }
 

@@ -80,7 +80,10 @@ fn what_the_model_has_no_room_for_is_refused() {
     let refused = |term: Term| model(&problem, &rows, vec![term]).unwrap_err();
     let theta = joint(2, JointField::Theta);
     assert!(matches!(refused(Term::constant("x", theta, 1.0)), TermsError::Occupied { .. }));
-    assert!(matches!(refused(Term::driven("x", joint(7, JointField::Theta), Driver::Elapsed, 1.0)), TermsError::Nowhere { .. }));
+    assert!(matches!(
+        refused(Term::driven("x", joint(7, JointField::Theta), Driver::Elapsed, 1.0)),
+        TermsError::Nowhere { .. }
+    ));
     assert!(matches!(refused(Term::driven("x", theta, Driver::Command(9), 1.0)), TermsError::Nowhere { .. }));
     let length = joint(2, JointField::A);
     assert!(matches!(refused(Term::driven("x", length, Driver::Elapsed, 1.0)), TermsError::NotDrivable { .. }));

@@ -153,10 +153,7 @@ impl JointField {
 impl BeamField {
     /// Whether it says how a beam gives way to loads.
     pub fn is_rigidity(self) -> bool {
-        matches!(
-            self,
-            Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist | Self::Flexibility
-        )
+        matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist | Self::Flexibility)
     }
 
     /// Name after the dot.

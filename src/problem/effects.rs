@@ -103,9 +103,7 @@ pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Resul
     let mut arguments = Arguments { section, joints };
     let effect = match name {
         "joint-compliance" => Effect::JointCompliance { joint: arguments.joint("joint")? },
-        "joint-harmonic" => {
-            Effect::JointHarmonic { joint: arguments.commanded("joint")?, orders: arguments.orders()? }
-        }
+        "joint-harmonic" => Effect::JointHarmonic { joint: arguments.commanded("joint")?, orders: arguments.orders()? },
         "gear-ratio" => Effect::GearRatio { joint: arguments.commanded("joint")? },
         "backlash" => Effect::Backlash { joint: arguments.commanded("joint")? },
         "joint-nonlinear-stiffness" => Effect::JointNonlinearStiffness { joint: arguments.joint("joint")? },

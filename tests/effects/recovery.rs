@@ -39,7 +39,8 @@ fn every_effect_is_found_beside_the_arm_s_own_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(100 + number as u64);
         let mut rows = poses(&problem, 36, true, &mut rng);
         let model = model_of(&problem, &rows);
-        let mut truth = draw(&model, |_| 0.0, &mut rng);
+        // Errors as large as those of a real arm; the priors of the problem are wider.
+        let mut truth = 0.3 * draw(&model, |_| 0.0, &mut rng);
         let strong = strengths(&model, values);
         of_effects(&model).into_iter().for_each(|k| truth[k] = strong[k]);
         measure(&problem, &mut rows, &truth, NOISE, &mut rng);
@@ -83,7 +84,8 @@ fn several_effects_of_the_rig_are_found_at_once() {
 fn sessions_are_registered_with_the_effects_at_work() {
     let mut arm = Problem::read(&path("problems/ur10-ipa")).unwrap();
     arm.data.position_sigma = Some(NOISE);
-    let problem = declared(&arm, &[Effect::GearRatio { joint: 3 }, Effect::JointHarmonic { joint: 2, orders: vec![1] }]);
+    let problem =
+        declared(&arm, &[Effect::GearRatio { joint: 3 }, Effect::JointHarmonic { joint: 2, orders: vec![1] }]);
     let mut rng = ChaCha8Rng::seed_from_u64(10);
     let mut rows = poses(&problem, 50, false, &mut rng);
     rows.session = labels((0..50).map(|k| ["A", "B", "C"][(k / 20).min(2)]));

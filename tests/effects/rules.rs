@@ -74,7 +74,8 @@ fn rules_name_effects_with_or_without_their_place() {
     let parameters = resolved("\"gear-ratio.*\" = { fixed = true }\n\"backlash[5].*\" = { fixed = true }").unwrap();
     assert!(find(&parameters, "gear-ratio[3].error").is_none() && find(&parameters, "gear-ratio[5].error").is_none());
     assert!(find(&parameters, "backlash[5].width").is_none() && find(&parameters, "backlash[4].width").is_some());
-    let parameters = resolved("\"gear-ratio.*\" = { fixed = true }\n\"gear-ratio[3].error\" = { free = true }").unwrap();
+    let parameters =
+        resolved("\"gear-ratio.*\" = { fixed = true }\n\"gear-ratio[3].error\" = { free = true }").unwrap();
     assert_eq!(find(&parameters, "gear-ratio[3].error").unwrap().sigma, None);
     assert!(find(&parameters, "gear-ratio[5].error").is_none());
 }
