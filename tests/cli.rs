@@ -286,15 +286,17 @@ fn the_readme_shows_what_is_printed() {
     assert_eq!(timeless(shown), timeless(&printed));
 }
 
-/// A bench whose problem declares effects.
+/// A bench whose problem declares effects, with few other parameters.
 fn bench_with_effects() -> Bench {
     let bench = Bench::new();
-    let effects = "[[effect]]\ngear-ratio = { joint = 3 }\n\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n\n\
-                   [parameters]\n";
-    bench.edit("problem.toml", "[parameters]\n", effects);
-    let few = "\"*\" = { fixed = true }\n\"joint*.theta\" = { sigma_deg = 1 }\n\"joint*.stiffness\" = { free = true }\n\
-               \"gear-ratio.*\" = { free = true }\n\"joint-harmonic.*\" = { sigma_deg = 0.3 }\n\n[data]";
-    bench.edit("problem.toml", "\n[data]", few);
+    let text = fs::read_to_string(bench.path("problem.toml")).unwrap();
+    let (arm, rest) = text.split_once("[parameters]\n").unwrap();
+    let (_, data) = rest.split_once("[data]\n").unwrap();
+    let effects =
+        "[[effect]]\ngear-ratio = { joint = 3 }\n\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n";
+    let rules = "[parameters]\n\"joint*.theta\" = { sigma_deg = 1 }\n\"joint*.stiffness\" = { sigma_relative = 0.5 }\n\
+                 \"joint-harmonic.*\" = { sigma_deg = 0.3 }\n";
+    fs::write(bench.path("problem.toml"), format!("{arm}{effects}\n{rules}\n[data]\n{data}")).unwrap();
     bench
 }
 

@@ -1,8 +1,6 @@
 //! An effect that no catalogue holds, added by a user of the library without touching it: the walk-through of
 //! docs/effects.md.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
-
 mod common;
 
 use common::arms::golden_problem;

@@ -79,7 +79,9 @@ impl Model {
     ) -> Result<Self, InputError> {
         let parameters = resolve(problem, bases, targets, effects)?;
         let mut nominal = Arm::nominal(problem);
-        effects.iter().for_each(|effect| enter::prepare(&mut nominal, effect.slot, effect.nominal));
+        for effect in effects {
+            enter::prepare(&mut nominal, effect.slot, effect.nominal);
+        }
         Ok(Self {
             constraints: constrain(problem, bases, targets, effects, &parameters)?,
             nominal,

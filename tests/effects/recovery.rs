@@ -42,7 +42,9 @@ fn every_effect_is_found_beside_the_arm_s_own_errors() {
         // Errors as large as those of a real arm; the priors of the problem are wider.
         let mut truth = 0.3 * draw(&model, |_| 0.0, &mut rng);
         let strong = strengths(&model, values);
-        of_effects(&model).into_iter().for_each(|k| truth[k] = strong[k]);
+        for k in of_effects(&model) {
+            truth[k] = strong[k];
+        }
         measure(&problem, &mut rows, &truth, NOISE, &mut rng);
         let found = identify(&problem, &rows, &split_at(28, &rows), &Options::default()).unwrap();
         check(&problem, &rows, &truth, &found);
@@ -92,7 +94,9 @@ fn sessions_are_registered_with_the_effects_at_work() {
     let model = model_of(&problem, &rows);
     let mut truth = draw(&model, |_| 0.3, &mut rng);
     let strong = strengths(&model, &[4e-3, 1e-3, 2e-3]);
-    of_effects(&model).into_iter().for_each(|k| truth[k] = strong[k]);
+    for k in of_effects(&model) {
+        truth[k] = strong[k];
+    }
     measure(&problem, &mut rows, &truth, NOISE, &mut rng);
     let split = Split { identification: (0..40).collect(), held_out: (40..50).collect() };
     let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
