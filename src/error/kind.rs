@@ -102,6 +102,18 @@ pub enum InputErrorKind {
     RepeatedOrder { order: u32 },
     #[error("declared already on line {line}")]
     RepeatedEffect { line: usize },
+    #[error("order {order} of this joint is declared already on line {line}")]
+    RepeatedHarmonic { order: u32, line: usize },
+    #[error("joint {joint} is fixed and takes no command; leave the effect out, or free the joint's own parameters")]
+    NoCommand { joint: usize },
+    #[error("joint {joint} has no link that could bend: its a is 0")]
+    NoLink { joint: usize },
+    #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
+    NoHoist,
+    #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]
+    InEquilibriumAlready,
+    #[error("the measurements cannot show this effect; they need {write}")]
+    NeedsColumn { write: &'static str },
 
     // Rules of [parameters].
     #[error("a name with dots stands in quotes: \"{name}\" = {{ … }}")]

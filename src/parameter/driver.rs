@@ -108,6 +108,15 @@ impl Driver {
         }
     }
 
+    /// Whether it depends on what the joints are told.
+    pub fn follows_commands(self) -> bool {
+        match self {
+            Self::Command(_) | Self::Sine(..) | Self::Cosine(..) => true,
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => matches!(of, Quantity::Command(_)),
+            Self::Constant | Self::Unit | Self::Warming { .. } | Self::Elapsed | Self::Since(_) => false,
+        }
+    }
+
     /// Whether the parameter acts the same in every pose.
     pub fn is_constant(self) -> bool {
         self == Self::Constant

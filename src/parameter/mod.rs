@@ -65,8 +65,10 @@ pub enum Unit {
     PerLength,
     /// [m/s]
     Speed,
-    /// A number, or rad/rad, m/m, rad/m, m/rad
+    /// A small part: rad/rad, m/m, rad/m, m/rad
     Ratio,
+    /// A number of order 1
+    Number,
 }
 
 impl Unit {
@@ -88,7 +90,7 @@ impl Unit {
             Self::Mass => "kg",
             Self::PerLength => "1/m",
             Self::Speed => "m/s",
-            Self::Ratio => "1",
+            Self::Ratio | Self::Number => "1",
         }
     }
 

@@ -267,6 +267,16 @@ pub enum Effect {
     StationShift { at_time: f64 },
 }
 
+impl Effect {
+    /// Whether it follows the temperature.
+    pub fn is_thermal(&self) -> bool {
+        matches!(
+            self,
+            Self::JointThermalDrift { .. } | Self::LinkThermalBending { .. } | Self::LinkThermalExpansion { .. }
+        )
+    }
+}
+
 /// One line of `[parameters]`.
 #[derive(Debug, Clone)]
 pub struct ParameterRule {

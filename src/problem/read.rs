@@ -50,6 +50,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let data = data(&mut root)?;
     let robust = robust::read(&mut root)?;
     root.finish()?;
+    effects::check(&effects, statics, &joints, &data)?;
     Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, constraints, data, robust })
 }
 
