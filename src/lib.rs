@@ -8,6 +8,7 @@
 //! - [`parameter`], [`model`]: free parameters, and positions with their derivatives as a function of them.
 //! - [`fit`], [`solver`]: least squares over many small items, which know no arms.
 //! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`report`] writes it down.
+//! - [`design`]: which poses to measure, and what they will tell.
 //! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
 //!   the model.
 //!
@@ -29,6 +30,7 @@
 //! ```
 
 pub mod arm;
+pub mod design;
 pub mod error;
 pub mod fit;
 pub mod measurement;
