@@ -32,9 +32,10 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
     ("study", &[GROUND, BELOW_STUDY]),
-    ("report", &[GROUND, BELOW_STUDY, &["study"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "report", "rig", "cli"]]),
+    ("design", &[GROUND, BELOW_STUDY, &["study"]]),
+    ("report", &[GROUND, BELOW_STUDY, &["study", "design"]]),
+    ("cli", &[GROUND, BELOW_STUDY, &["study", "design", "report", "rig"]]),
+    ("main", &[GROUND, BELOW_STUDY, &["study", "design", "report", "rig", "cli"]]),
 ];
 const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
 

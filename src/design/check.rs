@@ -3,8 +3,9 @@
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
 use crate::error::InputErrorKind;
-use crate::measurement::Measurements;
+use crate::measurement::{Measurements, Split};
 use crate::problem::Problem;
+use crate::study::Placement;
 
 /// Poses in which predictions are judged.
 const WORKSPACE: usize = 500;
@@ -116,6 +117,21 @@ impl Check {
     pub fn suffices(&self) -> bool {
         self.coordinates >= self.without_prior && self.forecast.open == self.growth.open
     }
+}
+
+/// `count` rows of a table, drawn at random; the same for the same seed.
+pub fn some_of(table: &Measurements, count: usize, seed: u64) -> Measurements {
+    table.select(&choose(table.len(), count, seed, ORDER))
+}
+
+/// The held-out rows of sessions and targets that identification rows use as well: those in which predictions can be judged.
+pub fn with_known_words(measurements: &Measurements, split: &Split) -> Vec<usize> {
+    let placement = Placement::of(measurements);
+    let known = |of: fn(&Placement, usize) -> usize, row: usize| {
+        split.identification.iter().any(|&own| of(&placement, own) == of(&placement, row))
+    };
+    let judges = |&row: &usize| known(Placement::base_of, row) && known(Placement::target_of, row);
+    split.held_out.iter().copied().filter(judges).collect()
 }
 
 fn finite(all: &Sensitivity) -> Sensitivity {

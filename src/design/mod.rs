@@ -17,7 +17,7 @@ mod sensitivity;
 mod site;
 
 pub use candidates::{Extremes, Ranges};
-pub use check::{Check, Elsewhere, Judged, check};
+pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
 pub use criterion::Criterion;
 pub use error::DesignError;
 pub use exchange::{Exchange, Exchanged};

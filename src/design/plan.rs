@@ -74,6 +74,8 @@ pub struct Plan {
     pub planned: Forecast,
     /// Of the poses given and as many others, drawn at random again and again.
     pub random: Vec<Forecast>,
+    /// Whether the plan decides every parameter as far as all candidates together can.
+    pub suffices: bool,
 }
 
 /// Chooses poses by exchange from several starts; the same for the same seed, however many threads there are.
@@ -117,6 +119,7 @@ pub fn plan(
     if tried < poses {
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });
     }
+    let attainable = Forecast::new(parameters, &all).open;
     let exchange = Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
     let (mut best, starts) = best_of_starts(&exchange, options);
     let mut chosen = table.select(&best.chosen);
@@ -144,7 +147,9 @@ pub fn plan(
         .map(|draw| forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64))))
         .collect();
     let planned = forecast(&all.select(&best.chosen));
-    Ok(Plan { poses: chosen, candidates: tried, starts, value: best.value(), planned, random })
+    let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
+    let suffices = planned.open <= attainable && 3 * planned.poses >= without_prior;
+    Ok(Plan { poses: chosen, candidates: tried, starts, value: best.value(), planned, random, suffices })
 }
 
 impl PlanOptions<'_> {

@@ -26,17 +26,17 @@ impl<'a> Site<'a> {
     pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
         let file = || problem.data.location.file.clone();
         let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
-        let add = |all: &mut Vec<String>, own: &[String]| {
-            own.iter().for_each(|word| {
-                if !all.contains(word) {
-                    all.push(word.clone());
-                }
-            });
+        let add = |all: &mut Vec<String>, word: &String| {
+            if !all.contains(word) {
+                all.push(word.clone());
+            }
         };
         for table in tables {
             let placement = Placement::of(table);
-            add(&mut bases, &placement.bases);
-            add(&mut targets, &placement.targets);
+            for row in 0..table.len() {
+                add(&mut bases, &placement.bases[placement.base_of(row)]);
+                add(&mut targets, &placement.targets[placement.target_of(row)]);
+            }
             if problem.data.position_sigma.is_none() && table.sigma.is_none() {
                 return Err(DesignError::NoSigma { file: file() });
             }
