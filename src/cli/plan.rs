@@ -32,7 +32,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=10_000))]
     poses: u32,
     /// What to make small
-    #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::A)]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
     criterion: CriterionArgument,
     #[command(flatten)]
     source: Source,
@@ -40,6 +40,9 @@ pub struct Arguments {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum CriterionArgument {
+    /// The geometric mean of the standard errors
+    #[value(name = "S")]
+    S,
     /// The mean variance, each parameter's in units of what average poses leave of it
     #[value(name = "A")]
     A,
@@ -54,6 +57,7 @@ enum CriterionArgument {
 impl From<CriterionArgument> for Criterion {
     fn from(argument: CriterionArgument) -> Self {
         match argument {
+            CriterionArgument::S => Self::S,
             CriterionArgument::A => Self::A,
             CriterionArgument::D => Self::D,
             CriterionArgument::E => Self::E,

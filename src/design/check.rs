@@ -1,4 +1,7 @@
 //! What measurements in given poses will tell, before anyone makes them.
+//!
+//! Rank, blind combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
+//! drawn from the priors.
 
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
@@ -11,10 +14,14 @@ use crate::study::Placement;
 const WORKSPACE: usize = 500;
 /// Length of the series that shows what more poses would bring.
 const SERIES: usize = 384;
+/// Arms drawn from the priors, least and most; as many poses together as these, if that lies between.
+const ARMS: (usize, usize) = (16, 200);
+const ARM_POSES: usize = 20_000;
 /// Streams of random numbers of one seed.
 const POSES: u64 = 0;
 const ELSEWHERE: u64 = 10;
 const ORDER: u64 = 11;
+const ARM: u64 = 12;
 
 /// Which poses are to be judged.
 #[derive(Debug, Clone)]
@@ -62,7 +69,7 @@ pub struct Check {
     pub without_prior: usize,
 }
 
-/// Judges poses; linear about the nominal arm.
+/// Judges poses.
 ///
 /// # Errors
 /// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of a table.
@@ -85,25 +92,27 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
     };
     let site = Site::new(problem, &[&series])?;
     let parameters = &site.model.parameters;
-    let told = match judged {
-        Judged::Drawn(..) => site.at_rest(&series).1,
+    let (series, told) = match judged {
+        Judged::Drawn(..) => site.at_rest(&series),
         Judged::Table { .. } => {
             let all = site.sensitivity(&series, None);
             if let Some(row) = (0..all.len()).find(|&row| !all.is_finite(row)) {
                 return Err(series.location(row).error(InputErrorKind::NoEquilibrium).into());
             }
-            all
+            (series, all)
         }
     };
     if told.len() < count {
         return Err(DesignError::NoEquilibrium);
     }
+    let poses = series.select(&(0..count).collect::<Vec<_>>());
     let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
     let noise = noise(problem, &series);
     let forecast = Forecast::new(parameters, &told.select(&(0..count).collect::<Vec<_>>()));
+    let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));
     Ok(Check {
         prediction: forecast.prediction(&workspace),
-        forecast,
+        forecast: forecast.over(parameters, &arms),
         elsewhere,
         noise,
         growth: Growth::new(parameters, &told, &workspace, noise, count),

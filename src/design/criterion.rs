@@ -9,12 +9,14 @@ const MOSTLY_PRIOR: f64 = 0.5;
 
 /// What a plan makes small: a size of the covariance C that a set of poses leaves, priors included.
 ///
-/// D, A and E are about the arm's parameters. Bases and targets are estimated along with them and are in C, but their own
+/// S, D, A and E are about the arm's parameters. Bases and targets are estimated along with them and are in C, but their own
 /// errors do not count.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Criterion {
     /// det C: the volume of the confidence ellipsoid. Does not depend on units.
     D,
+    /// Π C_kk: the geometric mean of the standard errors. Does not depend on units.
+    S,
     /// Σ C_kk / C̄_kk: the mean variance, each parameter's in units of what as many average candidates leave of it, C̄.
     A,
     /// The largest variance of any combination, in units of what as many average candidates leave of it; of the
@@ -39,6 +41,8 @@ pub(super) struct Yardstick {
 pub(super) enum Size {
     /// det C_ss = det M_rr / det M, r the rest.
     Determinant,
+    /// Π C_kk over the wanted unknowns.
+    Product,
     /// Σ weight · C_kk over all unknowns, weight 0 for those not wanted.
     Trace(DVector<f64>),
     /// The largest eigenvalue of F C Fᵀ; F, shape = (combinations, unknowns).
@@ -52,6 +56,7 @@ impl Criterion {
             Self::D => "D",
             Self::A => "A",
             Self::E => "E",
+            Self::S => "S",
             Self::Subset(_) => "subset",
         }
     }
@@ -79,6 +84,7 @@ impl Criterion {
                 wanted.iter().for_each(|&k| weights[k] = (wanted.len() as f64 * usual[(k, k)]).recip());
                 Size::Trace(weights)
             }
+            Self::S => Size::Product,
             Self::E => Size::Eigenvalue(decided(average, prior, &wanted)?),
         };
         Some(Yardstick { wanted, rest, size })
@@ -86,7 +92,7 @@ impl Criterion {
 }
 
 impl Yardstick {
-    /// ln of the size that information M leaves, per parameter where it is a determinant; infinite where M is singular.
+    /// ln of the size that information M leaves, per parameter where it is a determinant or a product; infinite where M is singular.
     pub fn value(&self, information: &DMatrix<f64>) -> f64 {
         let Some(cholesky) = information.clone().cholesky() else { return f64::INFINITY };
         match &self.size {
@@ -94,6 +100,10 @@ impl Yardstick {
                 let Some(rest) = part(information, &self.rest).cholesky() else { return f64::INFINITY };
                 let log = |l: &DMatrix<f64>| 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
                 (log(rest.l_dirty()) - log(cholesky.l_dirty())) / self.wanted.len() as f64
+            }
+            Size::Product => {
+                let variances = cholesky.inverse().diagonal();
+                self.wanted.iter().map(|&k| variances[k].ln()).sum::<f64>() / self.wanted.len() as f64
             }
             Size::Trace(weights) => cholesky.inverse().diagonal().dot(weights).ln(),
             Size::Eigenvalue(combinations) => {

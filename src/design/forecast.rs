@@ -1,6 +1,7 @@
 //! What identification from given poses will tell.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::Sensitivity;
 use crate::fit::{Identifiability, Uncertainty};
@@ -22,7 +23,7 @@ pub struct Expected {
     pub nominal: f64,
     /// 1 σ of the prior at the nominal value, SI.
     pub prior: Option<f64>,
-    /// 1 σ of the estimate at the nominal value, SI; `None` where nothing will be learned.
+    /// 1 σ of the estimate, SI (that of a logarithm times the nominal value); `None` where nothing will be learned.
     pub std_error: Option<f64>,
     /// Part of the value that the data will give, 0…1.
     pub identified: f64,
@@ -62,35 +63,50 @@ impl Forecast {
 
     /// Of measurements in the poses of `sensitivity`, with the priors of `parameters`.
     pub fn new(parameters: &[Parameter], sensitivity: &Sensitivity) -> Self {
-        let n = parameters.len();
         let triangle = sensitivity.triangle();
         let identifiability = Identifiability::of(&triangle);
-        let sigmas: Vec<Option<f64>> = parameters.iter().map(|parameter| parameter.sigma).collect();
-        let seen = Identifiability::of(&with_priors(&triangle, &sigmas));
-        let uncertainty = Uncertainty::of(&triangle, &sigmas, &seen.gauge, &vec![false; n], 1.0);
-        let errors = uncertainty.standard_errors();
+        let Known { covariance, variances, gauge, visible } = Known::of(&triangle, parameters);
         let expected = parameters
             .iter()
             .enumerate()
             .map(|(k, parameter)| {
-                let identified = match parameter.sigma {
-                    Some(sigma) => (1.0 - (errors[k] / sigma).powi(2)).clamp(0.0, 1.0),
-                    None => identifiability.visible[k],
-                };
-                let known = seen.visible[k] > 1.0 - PARTLY_OPEN && identified > NOTHING_LEARNED;
-                Expected {
+                let mut expected = Expected {
                     name: parameter.name.clone(),
                     unit: parameter.unit(),
                     nominal: parameter.nominal,
                     prior: parameter.sigma.map(|sigma| parameter.value_error(0.0, sigma)),
-                    std_error: known.then(|| parameter.value_error(0.0, errors[k])),
-                    identified,
+                    std_error: None,
+                    identified: identifiability.visible[k],
                     is_placement: parameter.slot.is_placement(),
+                };
+                if visible[k] > 1.0 - PARTLY_OPEN {
+                    expected.learn(parameter, variances[k]);
                 }
+                expected
             })
             .collect();
-        let open = seen.gauge.nrows();
-        Self { poses: sensitivity.len(), identifiability, expected, covariance: uncertainty.covariance, open }
+        Self { poses: sensitivity.len(), identifiability, expected, covariance, open: gauge.nrows() }
+    }
+
+    /// The same, with the errors to expect of arms that differ from the nominal one: root mean squares over what the poses
+    /// tell about each of them, in `arms`.
+    ///
+    /// Where a combination is blind at the nominal arm and its prior is wide, other parameters go with it at other arms: their
+    /// errors are larger than the nominal arm's linearisation says.
+    #[must_use]
+    pub fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
+        if arms.is_empty() {
+            return self;
+        }
+        let variances: Vec<Vec<f64>> =
+            arms.par_iter().map(|arm| Known::of(&arm.triangle(), parameters).variances).collect();
+        for (k, (expected, parameter)) in self.expected.iter_mut().zip(parameters).enumerate() {
+            if expected.std_error.is_some() {
+                let mean = variances.iter().map(|own| own[k]).sum::<f64>() / arms.len() as f64;
+                expected.learn(parameter, mean);
+            }
+        }
+        self
     }
 
     /// How well the identified arm predicts positions elsewhere; `poses` in metres (σ = 1 m).
@@ -116,14 +132,46 @@ impl Forecast {
 }
 
 impl Expected {
+    /// Enters a variance of x.
+    fn learn(&mut self, parameter: &Parameter, variance: f64) {
+        if let Some(sigma) = parameter.sigma {
+            self.identified = (1.0 - variance / (sigma * sigma)).clamp(0.0, 1.0);
+        }
+        let learned = self.identified > NOTHING_LEARNED;
+        self.std_error = learned.then(|| parameter.value_error(0.0, variance.sqrt()));
+    }
+
     /// Whether the data will give 90 % of the value or more.
     pub fn is_well_identified(&self) -> bool {
         self.identified >= Forecast::WELL && self.std_error.is_some()
     }
 }
 
+/// What data and priors leave of the unknowns.
+struct Known {
+    /// Of x, open combinations held.
+    covariance: DMatrix<f64>,
+    /// Its diagonal.
+    variances: Vec<f64>,
+    /// Rows that span the combinations that stay open.
+    gauge: DMatrix<f64>,
+    /// Part of each unknown outside of them.
+    visible: Vec<f64>,
+}
+
+impl Known {
+    fn of(triangle: &DMatrix<f64>, parameters: &[Parameter]) -> Self {
+        let n = parameters.len();
+        let sigmas: Vec<Option<f64>> = parameters.iter().map(|parameter| parameter.sigma).collect();
+        let Identifiability { gauge, visible, .. } = Identifiability::of(&with_priors(triangle, &sigmas));
+        let covariance = Uncertainty::of(triangle, &sigmas, &gauge, &vec![false; n], 1.0).covariance;
+        let variances = covariance.diagonal().iter().map(|variance| variance.max(0.0)).collect();
+        Self { covariance, variances, gauge, visible }
+    }
+}
+
 /// Triangular factor of data and priors together.
-pub(super) fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> {
+fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stacked = DMatrix::zeros(2 * n, n);
     stacked.rows_mut(0, n).copy_from(triangle);

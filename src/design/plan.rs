@@ -10,15 +10,15 @@ use crate::measurement::Measurements;
 use crate::problem::Problem;
 
 /// Candidates drawn from ranges, evenly and with a liking for the ends.
-const DRAWN: [usize; 2] = [500, 1500];
+const DRAWN: [usize; 2] = [500, 2000];
 /// Exchanges, each from poses drawn at random.
 const STARTS: usize = 8;
 /// Rounds of candidates drawn about the best poses, by how far they lie apart, as a part of the ranges.
 const ROUNDS: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Candidates of a round.
-const ABOUT: usize = 2000;
+const ABOUT: usize = 2500;
 /// Draws of random poses that a plan is compared with; odd, so that there is a median.
-const DRAWS: usize = 25;
+const DRAWS: usize = 75;
 /// Streams of random numbers of one seed.
 const EVENLY: u64 = 0;
 const AT_ENDS: u64 = 1;

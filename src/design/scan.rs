@@ -1,6 +1,9 @@
 //! Every candidate tried as one more pose, by rank-three updates.
 
-use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::criterion::{Size, Yardstick, part};
 
@@ -23,6 +26,7 @@ pub(super) struct Scan<'a> {
 enum State<'a> {
     /// Inverse of the rest's part of the information.
     Determinant(DMatrix<f64>),
+    Product,
     Trace {
         weights: &'a DVector<f64>,
         before: f64,
@@ -42,6 +46,7 @@ impl<'a> Scan<'a> {
             Size::Determinant => {
                 State::Determinant(part(information, &yardstick.rest).cholesky()?.inverse())
             }
+            Size::Product => State::Product,
             Size::Trace(weights) => State::Trace { weights, before: covariance.diagonal().dot(weights) },
             Size::Eigenvalue(combinations) => {
                 let eigen = (combinations * &covariance * combinations.transpose()).symmetric_eigen();
@@ -54,50 +59,82 @@ impl<'a> Scan<'a> {
 
     /// The candidate (Jᵀ of all, shape = (unknowns, 3 · candidates)) with the lowest value below `least`, of those that
     /// `may` be taken; the first of equals.
-    pub fn best(&self, candidates: &DMatrix<f64>, may: impl Fn(usize) -> bool, mut least: f64) -> Option<(usize, f64)> {
-        let mut best = None;
+    pub fn best(
+        &self,
+        candidates: &DMatrix<f64>,
+        may: impl Fn(usize) -> bool + Sync,
+        least: f64,
+    ) -> Option<(usize, f64)> {
         let count = candidates.ncols() / 3;
-        for start in (0..count).step_by(TOGETHER) {
-            let size = TOGETHER.min(count - start);
-            let rows = candidates.columns(3 * start, 3 * size);
-            let moved = &self.covariance * rows;
-            // What each state needs of all candidates besides.
-            let other = match &self.state {
-                State::Determinant(inverse) => inverse * rows.select_rows(&self.yardstick.rest),
-                State::Trace { weights, .. } => DMatrix::from_fn(moved.nrows(), moved.ncols(), |i, k| weights[i] * moved[(i, k)]),
-                State::Eigenvalue { turned, .. } => turned * &moved,
-            };
-            for k in (0..size).filter(|&k| may(start + k)) {
-                let (j, w) = (rows.columns(3 * k, 3), moved.columns(3 * k, 3));
-                let s = plus_identity(&j, &w);
-                let value = match &self.state {
-                    State::Determinant(_) => {
-                        let rest_s = self.rest_s(&j, &other, k);
-                        self.value - (s.determinant() / rest_s.determinant()).ln() / self.yardstick.wanted.len() as f64
-                    }
-                    State::Trace { before, .. } => (before - trace(&w, &s, &other.columns(3 * k, 3))).ln(),
-                    State::Eigenvalue { values, .. } => largest(values, &other.columns(3 * k, 3), &s, least),
-                };
-                if value < least {
-                    least = value;
-                    best = Some((start + k, value));
+        let starts: Vec<usize> = (0..count).step_by(TOGETHER).collect();
+        let best: Vec<_> = starts
+            .into_par_iter()
+            .map(|start| self.best_of(candidates, start..(start + TOGETHER).min(count), &may, least))
+            .collect();
+        best.into_iter().flatten().reduce(|best, next| if next.1 < best.1 { next } else { best })
+    }
+
+    /// The same among some of the candidates.
+    fn best_of(
+        &self,
+        candidates: &DMatrix<f64>,
+        range: Range<usize>,
+        may: impl Fn(usize) -> bool,
+        mut least: f64,
+    ) -> Option<(usize, f64)> {
+        let mut best = None;
+        let rows = candidates.columns(3 * range.start, 3 * range.len());
+        let moved = &self.covariance * rows;
+        // What each state needs of all candidates besides.
+        let other = match &self.state {
+            State::Determinant(inverse) => inverse * rows.select_rows(&self.yardstick.rest),
+            State::Product => DMatrix::zeros(0, moved.ncols()),
+            State::Trace { weights, .. } => {
+                DMatrix::from_fn(moved.nrows(), moved.ncols(), |i, k| weights[i] * moved[(i, k)])
+            }
+            State::Eigenvalue { turned, .. } => turned * &moved,
+        };
+        for k in (0..range.len()).filter(|&k| may(range.start + k)) {
+            let (j, w, other) = (rows.columns(3 * k, 3), moved.columns(3 * k, 3), other.columns(3 * k, 3));
+            let s = plus_identity(&j, &w);
+            let value = match &self.state {
+                State::Determinant(_) => {
+                    let part = s.determinant() / self.rest_s(&j, &other).determinant();
+                    self.value - part.ln() / self.yardstick.wanted.len() as f64
                 }
+                State::Product => self.product(&w, &s),
+                State::Trace { before, .. } => (before - trace(&w, &s, &other)).ln(),
+                State::Eigenvalue { values, .. } => largest(values, &other, &s, least),
+            };
+            if value < least {
+                least = value;
+                best = Some((range.start + k, value));
             }
         }
         best
     }
 
-    /// S of the rest's part alone.
-    fn rest_s(&self, j: &DMatrixView<f64>, moved: &DMatrix<f64>, k: usize) -> Matrix3<f64> {
-        let mut s = Matrix3::identity();
-        for a in 0..3 {
-            for b in 0..3 {
-                let column = moved.column(3 * k + b);
-                let own = self.yardstick.rest.iter().zip(column.iter());
-                s[(a, b)] += own.map(|(&row, w)| j[(row, a)] * w).sum::<f64>();
+    /// Mean of ln of the wanted variances.
+    fn product(&self, w: &DMatrixView<f64>, s: &Matrix3<f64>) -> f64 {
+        let Some(inverse) = s.try_inverse() else { return f64::INFINITY };
+        let (mut logarithm, mut product) = (0.0, 1.0);
+        for &k in &self.yardstick.wanted {
+            let row = Vector3::new(w[(k, 0)], w[(k, 1)], w[(k, 2)]);
+            product *= 1.0 - row.dot(&(inverse * row)) / self.covariance[(k, k)];
+            if product < 1e-200 {
+                logarithm += product.ln();
+                product = 1.0;
             }
         }
-        s
+        self.value + (logarithm + product.ln()) / self.yardstick.wanted.len() as f64
+    }
+
+    /// S of the rest's part alone; `moved` is W of that.
+    fn rest_s(&self, j: &DMatrixView<f64>, moved: &DMatrixView<f64>) -> Matrix3<f64> {
+        let entry = |a: usize, b: usize| -> f64 {
+            self.yardstick.rest.iter().zip(moved.column(b).iter()).map(|(&row, w)| j[(row, a)] * w).sum()
+        };
+        Matrix3::from_fn(|a, b| f64::from(u8::from(a == b)) + entry(a, b))
     }
 }
 
