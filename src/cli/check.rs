@@ -15,13 +15,15 @@ use super::{Outcome, diagnostic, output};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
-#[command(after_help = "Which poses: --candidates names a table (with --poses: N of its rows, drawn at random); --poses alone draws \
+#[command(
+    after_help = "Which poses: --candidates names a table (with --poses: N of its rows, drawn at random); --poses alone draws \
 within the limits of the joints or the ranges of a TRUTH.toml; without both they are those of the measurements.
 
 Examples:
   flexcal check problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
   flexcal check my-arm --candidates out/my-arm/plan.csv
-  flexcal check problems/lunar-sampler --json")]
+  flexcal check problems/lunar-sampler --json"
+)]
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
@@ -79,7 +81,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
                 Some(poses) => design::some_of(&table, poses, source.seed),
                 None => table,
             };
-            Ok(Judged::Table { poses, within: source.known_ranges(problem)?, held_out: None })
+            Ok(Judged::Table { poses: Box::new(poses), within: source.known_ranges(problem)?, held_out: None })
         }
         (None, Some(poses)) => Ok(Judged::Drawn(source.ranges(problem)?, poses)),
         (None, None) => {
@@ -94,9 +96,9 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             let split = Split::new(problem, &measured)?;
             let held_out = design::with_known_words(&measured, &split);
             Ok(Judged::Table {
-                poses: measured.select(&split.identification),
+                poses: Box::new(measured.select(&split.identification)),
                 within: source.known_ranges(problem)?,
-                held_out: (!held_out.is_empty()).then(|| measured.select(&held_out)),
+                held_out: (!held_out.is_empty()).then(|| Box::new(measured.select(&held_out))),
             })
         }
     }

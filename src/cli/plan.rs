@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let problem = Problem::read(&common.problem)?;
     let candidates = match source.table(&problem, common.quiet)? {
-        Some(rows) => Candidates::Rows(rows),
+        Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
     };
     let given = if common.data.is_empty() {
@@ -90,8 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             line.say(|| format!("{what}, sweep {sweep}: ln of the criterion {value:.4}"));
         }
     };
-    let options =
-        PlanOptions { poses: arguments.poses as usize, criterion: &criterion, seed: source.seed, progress: Some(&show) };
+    let options = PlanOptions {
+        poses: arguments.poses as usize,
+        criterion: &criterion,
+        seed: source.seed,
+        progress: Some(&show),
+    };
     let result = design::plan(&problem, &candidates, given.as_ref(), &options);
     if let Some(line) = &line {
         line.clear();

@@ -28,7 +28,9 @@ impl Line {
     }
 
     fn show(&self, Progress { iteration, unknowns, poses, cost }: Progress) {
-        self.say(|| format!("{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}"));
+        self.say(|| {
+            format!("{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")
+        });
     }
 
     /// Shows a message, once it is time to show anything.

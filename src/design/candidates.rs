@@ -145,11 +145,13 @@ impl Draft {
     /// A row that was drawn from these ranges.
     fn of(ranges: &Ranges, poses: &Measurements, row: usize) -> Self {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let place = at(&poses.payload).and_then(|mass| ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits()));
+        let place = at(&poses.payload)
+            .and_then(|mass| ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits()));
         let n = poses.joints;
-        let sides = poses.approach.as_ref().map_or_else(|| vec![false; n], |sides| {
-            sides[row * n..(row + 1) * n].iter().map(|&side| side > 0.0).collect()
-        });
+        let sides = poses.approach.as_ref().map_or_else(
+            || vec![false; n],
+            |sides| sides[row * n..(row + 1) * n].iter().map(|&side| side > 0.0).collect(),
+        );
         Self {
             joints: poses.configuration(row).to_vec(),
             choice: (place.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,

@@ -31,11 +31,11 @@ pub enum Judged {
     /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in the rows themselves.
     Table {
         /// The poses.
-        poses: Measurements,
+        poses: Box<Measurements>,
         /// Ranges in which predictions count.
         within: Option<Ranges>,
         /// Rows in which predictions count, where no ranges are known.
-        held_out: Option<Measurements>,
+        held_out: Option<Box<Measurements>>,
     },
 }
 
@@ -84,8 +84,8 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
             let series = poses.select(&choose(poses.len(), poses.len(), seed, ORDER));
             let (workspace, elsewhere) = match (within, held_out) {
                 (Some(ranges), _) => (draw(ranges, WORKSPACE, ELSEWHERE), Elsewhere::Ranges),
-                (None, Some(rows)) => (rows.clone(), Elsewhere::HeldOut),
-                (None, None) => (poses.clone(), Elsewhere::Same),
+                (None, Some(rows)) => (rows.as_ref().clone(), Elsewhere::HeldOut),
+                (None, None) => (poses.as_ref().clone(), Elsewhere::Same),
             };
             (series, poses.len(), workspace, elsewhere)
         }

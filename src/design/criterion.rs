@@ -81,7 +81,9 @@ impl Criterion {
             Self::A => {
                 let usual = average.clone().cholesky()?.inverse();
                 let mut weights = DVector::zeros(n);
-                wanted.iter().for_each(|&k| weights[k] = (wanted.len() as f64 * usual[(k, k)]).recip());
+                for &k in &wanted {
+                    weights[k] = (wanted.len() as f64 * usual[(k, k)]).recip();
+                }
                 Size::Trace(weights)
             }
             Self::S => Size::Product,

@@ -32,7 +32,7 @@ pub enum Candidates {
     /// Anywhere within ranges.
     Within(Ranges),
     /// Rows of a table.
-    Rows(Measurements),
+    Rows(Box<Measurements>),
 }
 
 /// How to plan.
@@ -98,7 +98,7 @@ pub fn plan(
             let ends = draw(ranges, DRAWN[1].max(2 * poses), Extremes::Often, AT_ENDS);
             (draw(ranges, DRAWN[0].max(2 * poses), Extremes::No, EVENLY), Some(ends))
         }
-        Candidates::Rows(rows) => (rows.clone(), None),
+        Candidates::Rows(rows) => (rows.as_ref().clone(), None),
     };
     let mut tables = vec![&usual];
     tables.extend(given);
@@ -120,7 +120,8 @@ pub fn plan(
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });
     }
     let attainable = Forecast::new(parameters, &all).open;
-    let exchange = Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
+    let exchange =
+        Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
     let (mut best, starts) = best_of_starts(&exchange, options);
     let mut chosen = table.select(&best.chosen);
     if let Candidates::Within(ranges) = candidates {
@@ -130,8 +131,8 @@ pub fn plan(
             let about_sensitivity = site.sensitivity(&about, None);
             // The poses themselves come first, each before those about it.
             let rest: Vec<usize> =
-                (0..about.len()).filter(|&k| k % (each + 1) == 0 || about_sensitivity.is_finite(k)).collect();
-            let own = (0..rest.len()).filter(|&k| rest[k] % (each + 1) == 0).collect();
+                (0..about.len()).filter(|&k| k.is_multiple_of(each + 1) || about_sensitivity.is_finite(k)).collect();
+            let own = (0..rest.len()).filter(|&k| rest[k].is_multiple_of(each + 1)).collect();
             all = about_sensitivity.select(&rest);
             tried += all.len() - poses;
             best = exchange.with_candidates(&all).improve(own, |sweep, value| options.tell(None, sweep, value));

@@ -43,9 +43,7 @@ impl<'a> Scan<'a> {
     pub fn new(yardstick: &'a Yardstick, information: &DMatrix<f64>) -> Option<Self> {
         let covariance = information.clone().cholesky()?.inverse();
         let state = match &yardstick.size {
-            Size::Determinant => {
-                State::Determinant(part(information, &yardstick.rest).cholesky()?.inverse())
-            }
+            Size::Determinant => State::Determinant(part(information, &yardstick.rest).cholesky()?.inverse()),
             Size::Product => State::Product,
             Size::Trace(weights) => State::Trace { weights, before: covariance.diagonal().dot(weights) },
             Size::Eigenvalue(combinations) => {

@@ -28,11 +28,7 @@ impl Measurements {
         Self::read_table(files, problem, false)
     }
 
-    fn read_table(
-        files: &[PathBuf],
-        problem: &Problem,
-        measured: bool,
-    ) -> Result<(Self, Vec<Warning>), InputError> {
+    fn read_table(files: &[PathBuf], problem: &Problem, measured: bool) -> Result<(Self, Vec<Warning>), InputError> {
         let mut warnings = Vec::new();
         let mut builder: Option<Builder> = None;
         for (index, file) in files.iter().enumerate() {

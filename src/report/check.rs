@@ -39,11 +39,15 @@ struct PredictionEntry {
     held_out_rms_mm: f64,
 }
 
+/// [mm]
 #[derive(Debug, Serialize)]
 struct Lengths {
-    median_mm: f64,
-    most_mm: f64,
-    rms_mm: f64,
+    #[serde(rename = "median_mm")]
+    median: f64,
+    #[serde(rename = "most_mm")]
+    most: f64,
+    #[serde(rename = "rms_mm")]
+    rms: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -58,7 +62,7 @@ struct StepEntry {
 
 impl From<&Prediction> for Lengths {
     fn from(own: &Prediction) -> Self {
-        Self { median_mm: own.median * 1e3, most_mm: own.most * 1e3, rms_mm: own.rms * 1e3 }
+        Self { median: own.median * 1e3, most: own.most * 1e3, rms: own.rms * 1e3 }
     }
 }
 

@@ -16,8 +16,6 @@ pub(super) struct ExpectedEntry<'a> {
     nominal: f64,
     prior_sigma: Option<f64>,
     std_error: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    random_std_error: Option<Option<f64>>,
     identified: f64,
 }
 
@@ -29,14 +27,8 @@ impl<'a> ExpectedEntry<'a> {
             nominal: expected.nominal,
             prior_sigma: expected.prior,
             std_error: expected.std_error,
-            random_std_error: None,
             identified: expected.identified,
         }
-    }
-
-    /// With 1 σ after random poses.
-    pub fn beside(self, random: Option<f64>) -> Self {
-        Self { random_std_error: Some(random), ..self }
     }
 }
 

@@ -30,8 +30,16 @@ struct Document<'a> {
     rank: usize,
     condition_number: f64,
     observability: Observability,
-    parameters: Vec<ExpectedEntry<'a>>,
+    parameters: Vec<PlannedEntry<'a>>,
     unidentified: Vec<Unidentified<'a>>,
+}
+
+/// A parameter after planned poses, and after random ones.
+#[derive(Debug, Serialize)]
+struct PlannedEntry<'a> {
+    #[serde(flatten)]
+    planned: ExpectedEntry<'a>,
+    random_std_error: Option<f64>,
 }
 
 /// A plan as JSON text.
@@ -39,6 +47,7 @@ pub fn plan_json(problem: &Problem, criterion: &Criterion, seed: u64, plan: &Pla
     let (planned, meaningful) = (&plan.planned, plan.meaningful());
     let name = |k: usize| planned.expected[k].name.as_str();
     let parameters = planned.expected.iter().enumerate();
+    let entry = |(k, own)| PlannedEntry { planned: ExpectedEntry::of(own), random_std_error: plan.random_error(k) };
     let document = Document {
         problem: &problem.name,
         criterion: criterion.as_str(),
@@ -54,7 +63,7 @@ pub fn plan_json(problem: &Problem, criterion: &Criterion, seed: u64, plan: &Pla
         rank: planned.identifiability.rank,
         condition_number: planned.identifiability.condition_number(),
         observability: Observability::of(&planned.identifiability, 3 * planned.poses),
-        parameters: parameters.map(|(k, own)| ExpectedEntry::of(own).beside(plan.random_error(k))).collect(),
+        parameters: parameters.map(entry).collect(),
         unidentified: Unidentified::all(&planned.identifiability, name),
     };
     to_text(&document)

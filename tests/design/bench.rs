@@ -40,7 +40,8 @@ pub fn true_arm(problem: &Problem, truth: &Truth, rows: &Measurements, seed: u64
     let simulation = simulate(problem, truth, 1, seed).unwrap();
     let value = |name: &str| {
         // One EI in the model is an EIy and an EIz on the rig; the first stands for both.
-        let known = simulation.parameters.iter().find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
+        let known =
+            simulation.parameters.iter().find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
         known.map(|parameter| parameter.value)
     };
     let x = model_of(problem, rows).vector_of(value).unwrap();

@@ -158,7 +158,8 @@ fn quiet_is_quiet_and_progress_keeps_to_standard_error() {
     let table = bench.write("some.csv", &drawn(30));
     let (out, err) = bench.run(0, "plan problems/lunar-sampler --poses 20 --quiet --candidates", &[&table]);
     assert!(out.is_empty() && err.is_empty(), "{out}{err}");
-    let (out, err) = bench.run(0, "plan problems/lunar-sampler --poses 20 --json --criterion d --candidates", &[&table]);
+    let (out, err) =
+        bench.run(0, "plan problems/lunar-sampler --poses 20 --json --criterion d --candidates", &[&table]);
     let json: Value = serde_json::from_str(&out).unwrap();
     assert!(json["criterion"] == "D" && err.is_empty(), "{err}");
 }

@@ -13,9 +13,10 @@ fn errors(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<DVec
     let within = ranges(truth);
     [true, false].map(|planned| {
         let of = |arm: u64| {
-            let mut rows = match planned {
-                true => plan.poses.clone(),
-                false => within.draw(problem, plan.poses.len(), Extremes::No, 1000 + arm, 0),
+            let mut rows = if planned {
+                plan.poses.clone()
+            } else {
+                within.draw(problem, plan.poses.len(), Extremes::No, 1000 + arm, 0)
             };
             let (rig, x) = true_arm(problem, truth, &rows, arm);
             measure(&rig, &mut rows, truth.noise_sigma, 5000 + arm);
@@ -46,12 +47,12 @@ fn planned_poses_give_smaller_errors_than_random_ones() {
 
 /// The figures of docs/plan.md.
 #[test]
-#[ignore = "two minutes: cargo test --release --test design -- --ignored --nocapture planned"]
+#[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture planned"]
 fn planned_poses_halve_the_errors() {
     let (problem, truth) = lunar();
     let mut halved = Vec::new();
     for criterion in [Criterion::S, Criterion::A, Criterion::D, Criterion::E] {
-        for seed in 1..=2 {
+        for seed in [1, 2] {
             let options = PlanOptions { poses: 28, criterion: &criterion, seed, progress: None };
             let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
             let (meaningful, all) = (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());

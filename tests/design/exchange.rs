@@ -1,6 +1,8 @@
 //! The exchange: it never worsens, ends where no single exchange helps, and counts what its criterion says.
 
-use flexcal::design::{Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity, Site, plan};
+use flexcal::design::{
+    Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity, Site, plan,
+};
 use flexcal::parameter::Parameter;
 use rayon::ThreadPoolBuilder;
 
@@ -40,7 +42,11 @@ fn it_never_worsens_and_ends_where_no_exchange_of_one_pose_helps() {
                 let mut swapped = found.chosen.clone();
                 swapped[place] = other;
                 let value = exchange.value(&swapped);
-                assert!(value > found.value() - 1e-5, "{name}: {other} for {place} gives {value}, not {}", found.value());
+                assert!(
+                    value > found.value() - 1e-5,
+                    "{name}: {other} for {place} gives {value}, not {}",
+                    found.value()
+                );
             }
         }
     }
@@ -76,7 +82,7 @@ fn poses_that_are_given_count() {
 #[test]
 fn a_plan_is_the_same_for_any_number_of_threads() {
     let (problem, truth) = lunar();
-    let rows = Candidates::Rows(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0));
+    let rows = Candidates::Rows(Box::new(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0)));
     let options = PlanOptions { poses: 12, criterion: &Criterion::S, seed: 4, progress: None };
     let run = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
