@@ -13,6 +13,8 @@ use crate::problem::Problem;
 const DRAWN: [usize; 2] = [500, 2000];
 /// Exchanges, each from poses drawn at random.
 const STARTS: usize = 8;
+/// The best exchanges that are refined.
+const REFINED: usize = 4;
 /// Rounds of candidates drawn about the best poses, by how far they lie apart, as a part of the ranges.
 const ROUNDS: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Candidates of a round.
@@ -51,7 +53,7 @@ pub struct PlanOptions<'a> {
 /// How far a plan has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanProgress {
-    /// Which start, from 1; `None` once the best of them is refined.
+    /// Which start, from 1; `None` once the best of them are refined.
     pub start: Option<usize>,
     /// Sweeps of the exchange at hand.
     pub sweep: usize,
@@ -66,7 +68,7 @@ pub struct Plan {
     pub poses: Measurements,
     /// Number of candidates that were tried.
     pub candidates: usize,
-    /// ln of the criterion: of each start, of the best once it was refined.
+    /// ln of the criterion that each start ended with, before the best of them were refined.
     pub starts: Vec<f64>,
     /// ln of the criterion that was reached.
     pub value: f64,
@@ -112,7 +114,7 @@ pub fn plan(
         table = table.and(&ends);
         all = all.and(&sensitivity);
     }
-    let mut tried = all.len();
+    let tried = all.len();
     if all.is_empty() {
         return Err(DesignError::NoEquilibrium);
     }
@@ -122,23 +124,25 @@ pub fn plan(
     let attainable = Forecast::new(parameters, &all).open;
     let exchange =
         Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
-    let (mut best, starts) = best_of_starts(&exchange, options);
-    let mut chosen = table.select(&best.chosen);
-    if let Candidates::Within(ranges) = candidates {
-        for (round, reach) in (0..).zip(ROUNDS) {
-            let each = (ABOUT / poses).max(1);
-            let about = ranges.vary(problem, &chosen, each, reach, (seed, FIRST_ROUND + round));
-            let about_sensitivity = site.sensitivity(&about, None);
-            // The poses themselves come first, each before those about it.
-            let rest: Vec<usize> =
-                (0..about.len()).filter(|&k| k.is_multiple_of(each + 1) || about_sensitivity.is_finite(k)).collect();
-            let own = (0..rest.len()).filter(|&k| rest[k].is_multiple_of(each + 1)).collect();
-            all = about_sensitivity.select(&rest);
-            tried += all.len() - poses;
-            best = exchange.with_candidates(&all).improve(own, |sweep, value| options.tell(None, sweep, value));
-            chosen = about.select(&best.chosen.iter().map(|&k| rest[k]).collect::<Vec<_>>());
-        }
-    }
+    let (ends, starts) = starts(&exchange, options);
+    let begun = |end: &Exchanged| Found {
+        poses: table.select(&end.chosen),
+        told: all.select(&end.chosen),
+        value: end.value(),
+        tried: 0,
+    };
+    let found: Vec<Found> = match candidates {
+        Candidates::Within(ranges) => ends[..REFINED.min(ends.len())]
+            .par_iter()
+            .enumerate()
+            .map(|(number, end)| begun(end).refined(problem, &site, ranges, &exchange, (options, number as u64)))
+            .collect(),
+        Candidates::Rows(_) => ends.iter().take(1).map(begun).collect(),
+    };
+    let tried = tried + found.iter().map(|found| found.tried).sum::<usize>();
+    // Of equals the first.
+    let best = found.into_iter().reduce(|best, next| if next.value < best.value { next } else { best });
+    let Found { poses: chosen, told, value, .. } = best.ok_or(DesignError::NoEquilibrium)?;
     let forecast = |own: &Sensitivity| match &given {
         Some(given) => Forecast::new(parameters, &given.and(own)),
         None => Forecast::new(parameters, own),
@@ -147,10 +151,10 @@ pub fn plan(
         .into_par_iter()
         .map(|draw| forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64))))
         .collect();
-    let planned = forecast(&all.select(&best.chosen));
+    let planned = forecast(&told);
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
     let suffices = planned.open <= attainable && 3 * planned.poses >= without_prior;
-    Ok(Plan { poses: chosen, candidates: tried, starts, value: best.value(), planned, random, suffices })
+    Ok(Plan { poses: chosen, candidates: tried, starts, value, planned, random, suffices })
 }
 
 impl PlanOptions<'_> {
@@ -161,9 +165,9 @@ impl PlanOptions<'_> {
     }
 }
 
-/// The best exchange and the value of each.
-fn best_of_starts(exchange: &Exchange, options: &PlanOptions) -> (Exchanged, Vec<f64>) {
-    let ends: Vec<Exchanged> = (0..STARTS)
+/// Every exchange, the best first, and the values in the order of the starts.
+fn starts(exchange: &Exchange, options: &PlanOptions) -> (Vec<Exchanged>, Vec<f64>) {
+    let mut ends: Vec<Exchanged> = (0..STARTS)
         .into_par_iter()
         .map(|start| {
             let chosen = choose(exchange.candidates(), options.poses, options.seed, FIRST_START + start as u64);
@@ -171,9 +175,48 @@ fn best_of_starts(exchange: &Exchange, options: &PlanOptions) -> (Exchanged, Vec
         })
         .collect();
     let values = ends.iter().map(Exchanged::value).collect();
-    // Of equals the first.
-    let best = ends.into_iter().reduce(|best, next| if next.value() < best.value() { next } else { best });
-    (best.unwrap_or_default(), values)
+    ends.sort_by(|a, b| a.value().total_cmp(&b.value()));
+    (ends, values)
+}
+
+/// Poses that an exchange has found.
+struct Found {
+    poses: Measurements,
+    told: Sensitivity,
+    /// ln of the criterion.
+    value: f64,
+    /// Candidates tried beyond those of the exchange.
+    tried: usize,
+}
+
+impl Found {
+    /// The same, exchanged for candidates drawn ever closer about them.
+    fn refined(
+        mut self,
+        problem: &Problem,
+        site: &Site,
+        ranges: &Ranges,
+        exchange: &Exchange,
+        (options, number): (&PlanOptions, u64),
+    ) -> Self {
+        let each = (ABOUT / options.poses).max(1);
+        for (round, reach) in (0..).zip(ROUNDS) {
+            let stream = FIRST_ROUND + number * ROUNDS.len() as u64 + round;
+            let about = ranges.vary(problem, &self.poses, each, reach, (options.seed, stream));
+            let told = site.sensitivity(&about, None);
+            // The poses themselves come first, each before those about it.
+            let is_own = |k: usize| k.is_multiple_of(each + 1);
+            let kept: Vec<usize> = (0..about.len()).filter(|&k| is_own(k) || told.is_finite(k)).collect();
+            let own = (0..kept.len()).filter(|&k| is_own(kept[k])).collect();
+            let told = told.select(&kept);
+            let end = exchange.with_candidates(&told).improve(own, |sweep, value| options.tell(None, sweep, value));
+            self.tried += kept.len() - options.poses;
+            self.value = end.value();
+            self.poses = about.select(&end.chosen.iter().map(|&k| kept[k]).collect::<Vec<_>>());
+            self.told = told.select(&end.chosen);
+        }
+        self
+    }
 }
 
 impl Plan {
