@@ -10,6 +10,7 @@
 //! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`diagnosis`]: what structure
 //!   the residual still has, and the loop that adds what it points to; [`campaign`]: many fits where the truth is known;
 //!   [`report`] writes it down.
+//! - [`design`]: which poses to measure, and what they will tell.
 //! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
 //!   the model.
 //!
@@ -32,6 +33,7 @@
 
 pub mod arm;
 pub mod campaign;
+pub mod design;
 pub mod diagnosis;
 pub mod effect;
 pub mod error;

@@ -28,10 +28,15 @@ impl Line {
     }
 
     fn show(&self, Progress { iteration, unknowns, poses, cost }: Progress) {
+        self.say(|| {
+            format!("{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")
+        });
+    }
+
+    /// Shows a message, once it is time to show anything.
+    pub fn say(&self, message: impl FnOnce() -> String) {
         if self.begun.elapsed() > PATIENCE {
-            self.bar.set_message(format!(
-                "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}"
-            ));
+            self.bar.set_message(message());
             self.bar.tick();
         }
     }

@@ -46,9 +46,8 @@ impl Generic {
             if range.1 <= range.0 || distinct < 4 {
                 continue;
             }
-            let few = |intervals: usize| {
-                (intervals + 3) * POSES_PER_SPLINE <= data.rows().len() && intervals + 3 <= distinct
-            };
+            let few =
+                |intervals: usize| (intervals + 3) * POSES_PER_SPLINE <= data.rows().len() && intervals + 3 <= distinct;
             let splines: Vec<Vec<Driver>> =
                 INTERVALS.into_iter().filter(|&n| few(n)).map(|n| splines(of, range, n)).collect();
             let shapes = if distinct > CENTRES as usize { shapes(of, range) } else { Vec::new() };
@@ -118,7 +117,8 @@ impl Generic {
 
     /// The function that these coefficients make, at a hundred values over the range.
     pub fn curve(&self, coefficients: &[f64]) -> Vec<(f64, f64)> {
-        let at = |value: f64| coefficients.iter().zip(&self.functions).map(|(c, function)| c * function.at(value)).sum();
+        let at =
+            |value: f64| coefficients.iter().zip(&self.functions).map(|(c, function)| c * function.at(value)).sum();
         let value = |k| self.range.0 + (self.range.1 - self.range.0) * f64::from(k) / f64::from(CURVE);
         (0..=CURVE).map(value).map(|value| (value, at(value))).collect()
     }

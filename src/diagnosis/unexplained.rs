@@ -82,7 +82,8 @@ pub(super) fn best(
     let mut all: Vec<Tried> =
         generics.iter().filter(|generic| wanted(generic)).filter_map(|generic| tried(generic.clone())).collect();
     all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
-    let shapes: Vec<Generic> = all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
+    let shapes: Vec<Generic> =
+        all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
     let squares = |generic: &Generic| linear.gain(&score(generic)).map_or(0.0, |gain| gain.squares);
     all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
     all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
@@ -98,7 +99,8 @@ pub(super) fn withdraw(
 ) -> Option<(Generic, Vec<Effect>)> {
     let generics = Generic::all(&fitted.problem, data);
     let library = fitted.library(data, &[], &generics);
-    let everything: Vec<Effect> = candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
+    let everything: Vec<Effect> =
+        candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
     let (all_tries, families) = tries(&everything);
     let search = |effect: &Effect| {
         let parts = super::candidates::parts(effect).into_iter();

@@ -20,9 +20,7 @@ use nalgebra::Vector3;
 use crate::arm::Arm;
 use crate::effect;
 use crate::error::InputError;
-use crate::parameter::{
-    Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve,
-};
+use crate::parameter::{Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;

@@ -112,7 +112,9 @@ impl Driver {
     pub fn follows_commands(self) -> bool {
         match self {
             Self::Command(_) | Self::Sine(..) | Self::Cosine(..) => true,
-            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => matches!(of, Quantity::Command(_)),
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
+                matches!(of, Quantity::Command(_))
+            }
             Self::Constant | Self::Unit | Self::Warming { .. } | Self::Elapsed | Self::Since(_) => false,
         }
     }

@@ -1,20 +1,27 @@
 //! Results as people and programs read them.
 
+mod check;
 mod commands;
 mod compare_json;
 mod compare_text;
+mod expected;
 mod json;
 mod parameters;
+mod plan;
+mod poses;
 mod quantity;
 mod study_json;
 mod study_tables;
 mod study_text;
 mod text;
 
+pub use check::{check_json, check_text};
 pub use commands::{commands_csv, commands_json, commands_text};
 pub use compare_json::compare_json;
 pub use compare_text::compare_text;
 pub use json::estimate_json;
+pub use plan::{plan_json, plan_text};
+pub use poses::poses_csv;
 pub use study_json::study_json;
 pub use study_tables::{study_csv, study_parameters_csv, study_timing_csv};
 pub use study_text::study_text;
