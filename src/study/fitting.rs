@@ -32,6 +32,8 @@ pub(super) struct Fitting<'a> {
     /// How the residual of a pose counts in the strategy's fits.
     pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
+    /// Steps after which a stage of the strategy is stopped.
+    pub max_steps: Option<u64>,
     /// 1 σ of a coordinate in rows without one of their own [m].
     pub sigma: f64,
 }
@@ -86,7 +88,8 @@ impl<'a> Fitting<'a> {
 
     /// A stage of the strategy: on the identification rows, with the problem's loss.
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
-        Stage { loss: self.loss, ..self.stage(&self.split.identification, unknowns) }
+        let stage = self.stage(&self.split.identification, unknowns);
+        Stage { loss: self.loss, max_steps: self.max_steps.unwrap_or(stage.max_steps), ..stage }
     }
 
     /// Everything that the strategy varies, as one stage on the identification rows.

@@ -36,6 +36,8 @@ pub struct Options {
     pub progress: Option<ProgressSink>,
     /// Values [SI] by name from which the fit starts; the registered nominal arm gives the others.
     pub start: Vec<(String, f64)>,
+    /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
+    pub max_steps: Option<u64>,
 }
 
 /// Why an identification could not be made.
@@ -123,6 +125,7 @@ pub fn identify_model(
         solver,
         loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
+        max_steps: options.max_steps,
         sigma: declared.unwrap_or(1e-3),
     };
     if let Some(row) = fitting.without_equilibrium() {

@@ -98,6 +98,7 @@ pub fn close(
         rounds.note(&without);
         fitted = rounds.run(without)?;
     }
+    let fitted = rounds.settled(fitted)?;
     let findings = check_fit(&fitted, &data);
     let unexplained = match rounds.generics.first() {
         Some(known) => unexplained::localise(&fitted, &data, Some(known), LEVEL),

@@ -25,21 +25,21 @@ pub(super) struct Pick {
 /// and better at predicting poses that were left out.
 pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
     let mut picks: Vec<Pick> = Vec::new();
-    let mut left_out = scan.linear.cross_validate(&data.block);
+    let without = scan.linear.cross_validate(&data.block);
     while picks.len() < MOST {
         let ranking = scan.ranking();
-        let mut found = None;
-        for tried in ranking.iter().take_while(|tried| tried.criterion < 0.0).filter(|tried| tried.corrected < LEVEL) {
+        let mut standing = ranking.iter().filter(|tried| tried.corrected < LEVEL && tried.criterion < 0.0);
+        // The first alone must predict poses that were left out; overwhelming ones after it are judged together.
+        let Some(best) = standing.find(|tried| {
+            if !picks.is_empty() {
+                return true;
+            }
             let mut with = scan.linear.clone();
             with.add(&scan.columns(tried.index));
-            let with = with.cross_validate(&data.block);
-            if left_out.zip(with).is_none_or(|(without, with)| with < without) {
-                found = Some((tried, with));
-                break;
-            }
-        }
-        let Some((best, with)) = found else { break };
-        left_out = with;
+            improves(without, with.cross_validate(&data.block))
+        }) else {
+            break;
+        };
         let rivals: Vec<Effect> = ranking
             .iter()
             .filter(|tried| tried.index != best.index && tried.criterion < best.criterion + RIVAL)
@@ -58,5 +58,13 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
         }
         scan.take(index);
     }
+    if picks.len() > 1 && !improves(without, scan.linear.cross_validate(&data.block)) {
+        picks.truncate(1);
+    }
     picks
+}
+
+/// Whether poses that are left out are predicted better with what was added.
+fn improves(without: Option<f64>, with: Option<f64>) -> bool {
+    without.zip(with).is_none_or(|(without, with)| with < without)
 }

@@ -14,6 +14,8 @@ use crate::study::{ErrorSummary, IdentifyError, Options};
 const MOST_ROUNDS: usize = 24;
 /// Poses beyond which rivals are not fitted one by one: the linear neighbourhood of so many decides as well.
 const MOST_REFITTED: usize = 1000;
+/// Steps of a fit to so many poses before the last: what curved valleys still hide decides nothing.
+const FEW_STEPS: u64 = 12;
 /// Rivals that are fitted to decide between them.
 const MOST_RIVALS: usize = 5;
 
@@ -44,7 +46,9 @@ pub(super) struct Rounds<'a> {
 impl Rounds<'_> {
     /// Effects that the loop added.
     pub fn added(&self, fitted: &Fitted) -> Vec<Effect> {
-        fitted.effects().into_iter().filter(|effect| !self.declared.contains(effect)).collect()
+        let declared: Vec<Effect> = self.declared.iter().flat_map(parts).collect();
+        let own = fitted.effects().iter().flat_map(parts).filter(|part| !declared.contains(part)).collect::<Vec<_>>();
+        own.iter().fold(Vec::new(), |all, part| joined(&all, part))
     }
 
     /// Adds effects until none stands out.
@@ -66,6 +70,14 @@ impl Rounds<'_> {
             fitted = next;
         }
         Ok(fitted)
+    }
+
+    /// Fits on until it converges, if the rounds stopped before that.
+    pub fn settled(&self, fitted: Fitted) -> Result<Fitted, IdentifyError> {
+        if fitted.found.termination.converged() {
+            return Ok(fitted);
+        }
+        Fitted::new(fitted.problem.clone(), self.data, &fitted.onwards(self.options))
     }
 
     /// Enters a fit into the story.
@@ -92,7 +104,9 @@ impl Rounds<'_> {
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        Fitted::new(fitted.with_effects(&effects), self.data, &fitted.onwards(self.options))
+        let many = self.data.rows().len() > MOST_REFITTED;
+        let options = Options { max_steps: many.then_some(FEW_STEPS), ..fitted.onwards(self.options) };
+        Fitted::new(fitted.with_effects(&effects), self.data, &options)
     }
 
     /// The problem fitted with what was picked; among rivals the one that fits best.
