@@ -1,5 +1,6 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+mod closing;
 mod compare;
 mod compensate;
 mod diagnostic;
@@ -8,6 +9,7 @@ mod input;
 mod output;
 mod progress;
 mod simulate;
+mod trace;
 
 use std::process::ExitCode;
 
@@ -27,6 +29,10 @@ enum Command {
     Identify(identify::Arguments),
     /// Put every strategy and solver, and every part of the elasticity left out, side by side.
     Compare(compare::Arguments),
+    /// Rank the effects that the residual points to; changes nothing.
+    Trace(trace::Arguments),
+    /// Find the effects that a problem lacks and add them, until nothing is left to find.
+    Loop(closing::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Make measurements of a known arm on the virtual test rig.
@@ -55,6 +61,8 @@ pub fn run() -> ExitCode {
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
+        Command::Loop(arguments) => closing::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
     };
