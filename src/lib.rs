@@ -8,7 +8,9 @@
 //! - [`parameter`], [`model`]: free parameters, and positions with their derivatives as a function of them.
 //! - [`fit`], [`solver`]: least squares over many small items, which know no arms.
 //! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`diagnosis`]: what structure
-//!   the residual still has; [`report`] writes it down.
+//!   the residual still has, and the loop that adds what it points to; [`campaign`]: many fits where the truth is known;
+//!   [`report`] writes it down.
+//! - [`design`]: which poses to measure, and what they will tell.
 //! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
 //!   the model.
 //!
@@ -30,6 +32,8 @@
 //! ```
 
 pub mod arm;
+pub mod campaign;
+pub mod design;
 pub mod diagnosis;
 pub mod effect;
 pub mod error;

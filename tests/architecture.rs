@@ -33,9 +33,13 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
     ("study", &[GROUND, BELOW_STUDY]),
     ("diagnosis", &[GROUND, BELOW_STUDY, &["study"]]),
-    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "report", "rig", "cli"]]),
+    // Which poses to measure, and what they will tell.
+    ("design", &[GROUND, BELOW_STUDY, &["study"]]),
+    // Many fits to what model or rig measure.
+    ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
+    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign"]]),
+    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "report", "rig"]]),
+    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "report", "rig", "cli"]]),
 ];
 const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
 

@@ -230,7 +230,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 17] = [
+    let effects: [(&str, &[&str]); 26] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect", "backlash"]),
@@ -247,6 +247,27 @@ fn effects() {
         ("joint-harmonic = { joint = 1, order = 1 }", &[":4: effect[1].joint-harmonic.orders: missing"]),
         ("joint-coupling = { joint = 1, from = 1 }", &[":4: effect[1].joint-coupling: ", "gear-ratio"]),
         ("station-shift = { at_time = 3 }", &[":4: effect[1].station-shift.at_time: a time needs a unit"]),
+        ("link-bending = { joint = 1 }", &[":4: effect[1].link-bending: joint 1 has no link", "its a is 0"]),
+        ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
+        ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
+        ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
+        ),
+        ("backlash = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].backlash.joint: joint 2 is fixed"]),
+        (
+            "joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-coupling.from: joint 2 is fixed"],
+        ),
+        (
+            "joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"],
+        ),
         ("hoist-force = {}\n[[effect]]\nhoist-force = {}", &[":6: effect[2].hoist-force: declared already on line 4"]),
     ];
     for (effect, words) in effects {

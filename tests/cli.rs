@@ -285,3 +285,47 @@ fn the_readme_shows_what_is_printed() {
     };
     assert_eq!(timeless(shown), timeless(&printed));
 }
+
+/// A bench whose problem declares effects, with few other parameters.
+fn bench_with_effects() -> Bench {
+    let bench = Bench::new();
+    let text = fs::read_to_string(bench.path("problem.toml")).unwrap();
+    let (arm, rest) = text.split_once("[parameters]\n").unwrap();
+    let (_, data) = rest.split_once("[data]\n").unwrap();
+    let effects =
+        "[[effect]]\ngear-ratio = { joint = 3 }\n\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n";
+    let rules = "[parameters]\n\"joint*.theta\" = { sigma_deg = 1 }\n\"joint*.stiffness\" = { sigma_relative = 0.5 }\n\
+                 \"joint-harmonic.*\" = { sigma_deg = 0.3 }\n";
+    fs::write(bench.path("problem.toml"), format!("{arm}{effects}\n{rules}\n[data]\n{data}")).unwrap();
+    bench
+}
+
+#[test]
+fn declared_effects_are_in_the_results() {
+    let bench = bench_with_effects();
+    let told = text(&bench.identify(&[]).success().get_output().stdout);
+    let line = |name: &str| told.lines().find(|line| line.contains(name)).unwrap().to_owned();
+    assert!(line("gear-ratio[3].error").contains('‰') && line("joint-harmonic[2].cos1").contains('°'), "{told}");
+    let json = text(&bench.identify(&["--json"]).success().get_output().stdout);
+    let result: Value = serde_json::from_str(&json).unwrap();
+    let entries = result["parameters"].as_array().unwrap();
+    let unit = |name: &str| entries.iter().find(|entry| entry["name"] == name).unwrap()["unit"].clone();
+    assert_eq!((unit("gear-ratio[3].error"), unit("joint-harmonic[2].sin1")), ("1".into(), "rad".into()));
+    let out = |arguments: &[&str]| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let done = command.current_dir(bench.folder.path()).args(arguments).assert().success();
+        text(&done.get_output().stdout)
+    };
+    let compared = out(&["compare", "."]);
+    assert!(compared.contains("paper: its own closed forms, without the declared effects"), "{compared}");
+    let file = format!("out/{}/estimate.json", result["problem"].as_str().unwrap());
+    out(&["compensate", ".", "--estimate", &file, "--data", "a-none.csv"]);
+}
+
+#[test]
+fn effects_that_cannot_act_are_bad_input() {
+    let bench = bench_with_effects();
+    bench.edit("problem.toml", "gear-ratio = { joint = 3 }", "deflected-equilibrium = true");
+    let error = text(&bench.identify(&[]).code(2).get_output().stderr);
+    assert!(error.contains("effect[1].deflected-equilibrium") && error.contains("[statics]"), "{error}");
+}

@@ -163,7 +163,11 @@ fn every_effect_has_its_arguments() {
         ("station-shift = { at_time_s = 60 }", Effect::StationShift { at_time: 60.0 }),
     ];
     let tables: Vec<_> = effects.iter().map(|(line, _)| format!("[[effect]]\n{line}\n")).collect();
-    let text = format!("name = 'arm'\n[[joint]]\na_m = 1\nbeam.name = 'A'\n[[joint]]\n{}", tables.concat());
+    let text = format!(
+        "name = 'arm'\nstatics.equilibrium = 'undeflected'\ndata.reference_temperature_C = 20\n[[joint]]\na_m = 1\n\
+         beam.name = 'A'\nbeam.hoist.at_m = [0.5, 0, 0]\n[[joint]]\n{}",
+        tables.concat()
+    );
     let declared: Vec<_> = parse(&text).effects.into_iter().map(|declaration| declaration.effect).collect();
     assert_eq!(declared, effects.map(|(_, effect)| effect));
 }

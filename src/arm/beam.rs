@@ -85,6 +85,7 @@ impl<S: Scalar> Cantilever<'_, S> {
     pub fn at(&self, x: S) -> Deflection<S> {
         let l = self.length;
         let (x2, l2) = (x * x, l * l);
+        let k = self.signed_flexibility();
         let mut out = Deflection::zero();
         for (station, wrench) in self.points {
             let s = *station;
@@ -104,10 +105,11 @@ impl<S: Scalar> Cantilever<'_, S> {
                     slope_of_moment: s,
                 }
             };
-            self.superpose(&mut out, &shape, wrench);
+            superpose(&mut out, &k, &shape, wrench);
         }
         self.superpose_spread(
             &mut out,
+            &k,
             x2 * (l2 * 0.25 - l * x / 6.0 + x2 / 24.0),
             x * (l2 * 0.5 - l * x * 0.5 + x2 / 6.0),
             x * (l - x * 0.5),
@@ -124,6 +126,7 @@ impl<S: Scalar> Cantilever<'_, S> {
     /// Mean displacement along the beam [m]: that of its own centre of mass.
     pub fn mean_displacement(&self) -> Vector3<S> {
         let l = self.length;
+        let k = self.signed_flexibility();
         let mut out = Deflection::zero();
         for (station, wrench) in self.points {
             let s = *station;
@@ -141,10 +144,10 @@ impl<S: Scalar> Cantilever<'_, S> {
                 deflection_of_moment: mean(s * half / 3.0, end.deflection_of_moment, s),
                 slope_of_moment: (half + s * beyond) / l,
             };
-            self.superpose(&mut out, &shape, wrench);
+            superpose(&mut out, &k, &shape, wrench);
         }
         let l2 = l * l;
-        self.superpose_spread(&mut out, l2 * l2 * 0.05, l2 * l / 6.0, l2 / 3.0);
+        self.superpose_spread(&mut out, &k, l2 * l2 * 0.05, l2 * l / 6.0, l2 / 3.0);
         self.superpose_strain(&mut out, l * 0.5, l2 / 6.0);
         out.displacement
     }
@@ -158,20 +161,7 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
     }
 
-    /// Rotation about z is +slope in y; rotation about y is −slope in z.
-    fn superpose(&self, out: &mut Deflection<S>, shape: &Shape<S>, wrench: &Wrench<S>) {
-        let k = self.signed_flexibility();
-        let (f, m) = (&wrench.force, &wrench.moment);
-        out.displacement.x += k.axial * f.x * shape.slope_of_moment;
-        out.displacement.y += k.about_z * (f.y * shape.deflection_of_force + m.z * shape.deflection_of_moment);
-        out.displacement.z += k.about_y * (f.z * shape.deflection_of_force - m.y * shape.deflection_of_moment);
-        out.rotation.x += k.twist * m.x * shape.slope_of_moment;
-        out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
-        out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
-    }
-
-    fn superpose_spread(&self, out: &mut Deflection<S>, deflection: S, slope: S, stretch: S) {
-        let k = self.signed_flexibility();
+    fn superpose_spread(&self, out: &mut Deflection<S>, k: &Flexibility<S>, deflection: S, slope: S, stretch: S) {
         let q = &self.spread;
         out.displacement.x += k.axial * q.x * stretch;
         out.displacement.y += k.about_z * q.y * deflection;
@@ -189,4 +179,15 @@ impl<S: Scalar> Cantilever<'_, S> {
         out.rotation.y += about_y * x;
         out.rotation.z += about_z * x;
     }
+}
+
+/// Rotation about z is +slope in y; rotation about y is −slope in z.
+fn superpose<S: Scalar>(out: &mut Deflection<S>, k: &Flexibility<S>, shape: &Shape<S>, wrench: &Wrench<S>) {
+    let (f, m) = (&wrench.force, &wrench.moment);
+    out.displacement.x += k.axial * f.x * shape.slope_of_moment;
+    out.displacement.y += k.about_z * (f.y * shape.deflection_of_force + m.z * shape.deflection_of_moment);
+    out.displacement.z += k.about_y * (f.z * shape.deflection_of_force - m.y * shape.deflection_of_moment);
+    out.rotation.x += k.twist * m.x * shape.slope_of_moment;
+    out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
+    out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
 }

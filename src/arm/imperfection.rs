@@ -13,7 +13,8 @@ const PLAY_MOMENT: f64 = 1.0;
 pub struct Nonlinear<S> {
     /// Angle per cube of the moment [rad/(N·m)³].
     pub cubic: S,
-    /// Play [rad], [m] where the joint slides: taken up by the direction of approach, by the moment where that is not known.
+    /// Play [rad], [m] where the joint slides: taken up by the direction of approach; where that is not known by the
+    /// moment, which moves no joint along its slide.
     pub play: S,
 }
 
@@ -47,10 +48,10 @@ pub struct Rope<S> {
 }
 
 impl<S: Scalar> Nonlinear<S> {
-    /// Angle under a moment [N·m]; play counts where no direction of approach takes it up.
-    pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
+    /// Angle under a moment [N·m]; its play counts where the moment `takes_up_play`.
+    pub(super) fn twist(&self, moment: S, takes_up_play: bool) -> S {
         let cubic = self.cubic * moment * moment * moment;
-        if approach.is_some() { cubic } else { cubic + self.play * (moment / PLAY_MOMENT).tanh() * 0.5 }
+        if takes_up_play { cubic + self.play * (moment / PLAY_MOMENT).tanh() * 0.5 } else { cubic }
     }
 }
 

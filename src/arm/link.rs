@@ -283,7 +283,8 @@ impl<S: Scalar> Joint<S> {
     /// Angle about the axis under a moment [N·m] about it.
     pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
         let linear = self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
-        self.nonlinear.as_ref().map_or(linear, |nonlinear| linear + nonlinear.twist(moment, approach))
+        let takes_up_play = approach.is_none() && self.kind != JointKind::Prismatic;
+        self.nonlinear.as_ref().map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
     }
 
     /// What play adds to the joint's coordinate when it came from a known direction [rad] or [m].

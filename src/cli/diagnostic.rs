@@ -4,6 +4,7 @@ use std::error::Error;
 use std::io::Write as _;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use flexcal::design::DesignError;
 use flexcal::error::{InputError, Location, Warning};
 use flexcal::study::IdentifyError;
 
@@ -12,10 +13,16 @@ const WIDTH: usize = 1000;
 
 /// Prints an error to standard error.
 pub fn print(error: &(dyn Error + 'static)) {
-    let input = error.downcast_ref::<InputError>().or(match error.downcast_ref::<IdentifyError>() {
-        Some(IdentifyError::Input(input)) => Some(input),
-        _ => None,
-    });
+    let input = error
+        .downcast_ref::<InputError>()
+        .or(match error.downcast_ref::<IdentifyError>() {
+            Some(IdentifyError::Input(input)) => Some(input),
+            _ => None,
+        })
+        .or(match error.downcast_ref::<DesignError>() {
+            Some(DesignError::Input(input)) => Some(input),
+            _ => None,
+        });
     match input {
         Some(input) => show(Level::ERROR, &input.to_string(), Some(&input.location)),
         None => show(Level::ERROR, &with_causes(error), None),

@@ -1,14 +1,20 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+mod check;
 mod closing;
 mod compare;
 mod compensate;
+mod completions;
 mod diagnostic;
 mod identify;
 mod input;
+mod man;
 mod output;
+mod plan;
+mod poses;
 mod progress;
 mod simulate;
+mod study;
 mod trace;
 
 use std::process::ExitCode;
@@ -17,7 +23,17 @@ use clap::{Parser, Subcommand};
 
 /// Identify the geometric and elastic parameters of robot arms from measured end-point positions.
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(
+    version,
+    about,
+    max_term_width = 100,
+    after_help = "Examples:
+  flexcal check problems/lunar-sampler
+  flexcal identify problems/lunar-sampler
+  flexcal help identify
+
+Exit status: 0 done; 1 the result is not to be trusted; 2 bad input."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -35,8 +51,18 @@ enum Command {
     Loop(closing::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
+    /// Say what measurements in some poses will tell, before anyone makes them.
+    Check(check::Arguments),
+    /// Choose the poses that identify best.
+    Plan(plan::Arguments),
     /// Make measurements of a known arm on the virtual test rig.
     Simulate(simulate::Arguments),
+    /// Compare strategies over many fits to simulated measurements whose truth is known.
+    Study(study::Arguments),
+    /// Print a script that completes arguments in a shell.
+    Completions(completions::Arguments),
+    /// Print the manual page, or write those of all commands.
+    Man(man::Arguments),
 }
 
 /// What a command says to the shell.
@@ -64,7 +90,12 @@ pub fn run() -> ExitCode {
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Loop(arguments) => closing::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+        Command::Man(arguments) => man::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

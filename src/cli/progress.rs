@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use flexcal::study::{Progress, ProgressSink};
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// A fit faster than this shows nothing.
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -28,10 +28,15 @@ impl Line {
     }
 
     fn show(&self, Progress { iteration, unknowns, poses, cost }: Progress) {
+        self.say(|| {
+            format!("{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")
+        });
+    }
+
+    /// Shows a message, once it is time to show anything.
+    pub fn say(&self, message: impl FnOnce() -> String) {
         if self.begun.elapsed() > PATIENCE {
-            self.bar.set_message(format!(
-                "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}"
-            ));
+            self.bar.set_message(message());
             self.bar.tick();
         }
     }
@@ -39,5 +44,30 @@ impl Line {
     /// Takes the line away.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// A bar of how many fits of a study are done, with the time left.
+pub struct FitBar(ProgressBar);
+
+impl FitBar {
+    /// A bar of which `kept` of `fits` fits have been done before.
+    pub fn new(fits: u64, kept: u64) -> Self {
+        let bar = ProgressBar::new(fits);
+        let shown = "{wide_bar} {human_pos} of {human_len} fits, {eta} left";
+        bar.set_style(ProgressStyle::with_template(shown).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_position(kept);
+        bar.reset_eta();
+        Self(bar)
+    }
+
+    /// One more fit is done.
+    pub fn advance(&self) {
+        self.0.inc(1);
+    }
+
+    /// Takes the bar away.
+    pub fn clear(&self) {
+        self.0.finish_and_clear();
     }
 }

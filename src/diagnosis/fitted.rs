@@ -147,12 +147,6 @@ impl Fitted {
         library.fitted().select_columns(&places)
     }
 
-    /// Sum of squares of data and priors.
-    pub fn squares(&self, library: &Library) -> f64 {
-        let prior = |&k: &usize| self.model.parameters[k].sigma.map_or(0.0, |sigma| (self.found.x[k] / sigma).powi(2));
-        library.residual().norm_squared() + self.unknowns.iter().map(prior).sum::<f64>()
-    }
-
     /// Full parameter vector.
     pub fn x(&self) -> &DVector<f64> {
         &self.found.x

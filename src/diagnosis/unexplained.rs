@@ -15,6 +15,9 @@ use crate::study::ErrorSummary;
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
 const BETTER: f64 = 6.0;
 
+/// Bumps and steps whose shape is fitted.
+const REFINED: usize = 4;
+
 /// Structure that is left.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
@@ -60,14 +63,30 @@ pub(super) fn best(
     generics: &[Generic],
     wanted: impl Fn(&Generic) -> bool,
 ) -> Option<Tried> {
-    let count = generics.len() as f64;
-    let tried = |generic: &Generic| {
-        let gain = linear.gain(&linear.score(&generic.columns(library)))?;
+    // Half of the chance for splines, half for single bumps and steps; an equal part for each place and quantity.
+    let mut places: Vec<(Slot, Quantity)> = Vec::new();
+    for generic in generics {
+        if !places.contains(&(generic.slot, generic.of)) {
+            places.push((generic.slot, generic.of));
+        }
+    }
+    let score = |generic: &Generic| linear.score(&generic.columns(library));
+    let tried = |generic: Generic| {
+        let gain = linear.gain(&score(&generic))?;
+        let (squares, freedom) = (gain.squares, gain.freedom + generic.fitted);
+        let gain = linear.gain_of(squares, freedom)?;
+        let count = 2.0 * (places.len() * generic.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
-        Some(Tried { generic: generic.clone(), gain, criterion, corrected })
+        Some(Tried { generic, gain, criterion, corrected })
     };
-    let all = generics.iter().filter(|generic| wanted(generic)).filter_map(tried);
-    all.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    let mut all: Vec<Tried> =
+        generics.iter().filter(|generic| wanted(generic)).filter_map(|generic| tried(generic.clone())).collect();
+    all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
+    let shapes: Vec<Generic> =
+        all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
+    let squares = |generic: &Generic| linear.gain(&score(generic)).map_or(0.0, |gain| gain.squares);
+    all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
+    all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
 /// Added effects that are functions of one joint's command at one joint, where a smooth function is the better explanation:
@@ -80,7 +99,8 @@ pub(super) fn withdraw(
 ) -> Option<(Generic, Vec<Effect>)> {
     let generics = Generic::all(&fitted.problem, data);
     let library = fitted.library(data, &[], &generics);
-    let everything: Vec<Effect> = candidates.iter().chain(added).cloned().collect();
+    let everything: Vec<Effect> =
+        candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
     let (all_tries, families) = tries(&everything);
     let search = |effect: &Effect| {
         let parts = super::candidates::parts(effect).into_iter();
@@ -190,13 +210,14 @@ fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f6
             beyond += 1;
         }
     }
-    let splines = step.rows(step.len() - generic.splines(), generic.splines());
+    let count = generic.functions.len();
+    let functions = step.rows(step.len() - count, count);
     Correction {
         range: generic.range,
         beyond,
         cross_validated,
         held_out: ErrorSummary::of(&errors),
-        curve: generic.curve(splines.as_slice()),
+        curve: generic.curve(functions.as_slice()),
     }
 }
 

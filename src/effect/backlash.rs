@@ -1,7 +1,7 @@
 //! `backlash`: play, Δθ = (b/2)·approach; without directions of approach the moment M_z decides.
 
 use super::conditions::NO_LOADS;
-use super::place::commanded;
+use super::place::{commanded, slides};
 use super::{Candidate, Family, Term};
 use crate::parameter::{JointField, Slot};
 use crate::problem::Effect;
@@ -9,9 +9,11 @@ use crate::problem::Effect;
 /// The family.
 pub(super) const FAMILY: Family = Family {
     name: "backlash",
-    terms: |effect, _| match effect {
+    terms: |effect, problem| match effect {
         Effect::Backlash { joint } => {
-            let slot = Slot::Joint { joint: joint - 1, field: JointField::Play };
+            let slides = slides(problem, *joint);
+            let field = if slides { JointField::SlidingPlay } else { JointField::Play };
+            let slot = Slot::Joint { joint: joint - 1, field };
             vec![Term::constant("width", slot, 0.01)]
         }
         _ => Vec::new(),
@@ -22,6 +24,8 @@ pub(super) const FAMILY: Family = Family {
             if conditions.approach {
                 let both = conditions.both_sides.get(joint - 1).copied().unwrap_or(false);
                 Candidate::needing(effect, both, "the joint was not approached from both sides")
+            } else if slides(problem, joint) {
+                Candidate::needing(effect, false, "no directions of approach, and moments move nothing along a slide")
             } else {
                 Candidate::needing(effect, conditions.weighs(), NO_LOADS)
             }

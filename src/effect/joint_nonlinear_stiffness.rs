@@ -1,17 +1,23 @@
 //! `joint-nonlinear-stiffness`: Δθ = c₃ M_z³ beyond the linear torsion.
 
 use super::conditions::NO_LOADS;
+use super::place::greatest_moment;
 use super::{Candidate, Family, Term};
 use crate::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
+/// More than any joint turns under the greatest conceivable moment [rad].
+const MOST: f64 = 0.1;
+/// Moment below which arms are not told apart [N·m].
+const LEAST_MOMENT: f64 = 10.0;
+
 /// The family.
 pub(super) const FAMILY: Family = Family {
     name: "joint-nonlinear-stiffness",
-    terms: |effect, _| match effect {
+    terms: |effect, problem| match effect {
         Effect::JointNonlinearStiffness { joint } => {
             let slot = Slot::Joint { joint: joint - 1, field: JointField::Cubic };
-            vec![Term::constant("cubic", slot, 1e-6)]
+            vec![Term::constant("cubic", slot, MOST / greatest_moment(problem).max(LEAST_MOMENT).powi(3))]
         }
         _ => Vec::new(),
     },

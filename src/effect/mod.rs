@@ -85,12 +85,12 @@ pub struct Term {
 
 impl Term {
     /// A parameter that acts the same in every pose.
-    fn constant(name: &str, slot: Slot, size: f64) -> Self {
+    pub fn constant(name: &str, slot: Slot, size: f64) -> Self {
         Self::driven(name, slot, Driver::Constant, size)
     }
 
     /// A parameter that is multiplied by what is known of a pose.
-    fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
+    pub fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
         Self { name: name.to_owned(), slot, driver, nominal: 0.0, size }
     }
 }
@@ -152,14 +152,8 @@ pub fn describe(effect: &Effect) -> String {
     family.map_or_else(String::new, |family| (family.describe)(effect))
 }
 
-/// Parameters of every effect that `problem` declares, in order.
-pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
-    problem.effects.iter().flat_map(|declared| parameters_of(&declared.effect, problem)).collect()
-}
-
-/// Parameters of one effect, with their full names: `gear-ratio[3].error`.
-pub fn parameters_of(effect: &Effect, problem: &Problem) -> Vec<EffectParameter> {
-    let (name, place) = (name(effect), place(effect));
+/// The parameters of an effect by that name at a `place`, empty for the whole: `name[place].term`.
+pub fn named(name: &str, place: &str, terms: Vec<Term>) -> Vec<EffectParameter> {
     let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
     let parameter = |term: Term| EffectParameter {
         name: format!("{name}{bracket}.{}", term.name),
@@ -169,5 +163,15 @@ pub fn parameters_of(effect: &Effect, problem: &Problem) -> Vec<EffectParameter>
         nominal: term.nominal,
         sigma: term.size,
     };
-    terms(effect, problem).into_iter().map(parameter).collect()
+    terms.into_iter().map(parameter).collect()
+}
+
+/// Parameters of every effect that `problem` declares, in order.
+pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
+    problem.effects.iter().flat_map(|declared| parameters_of(&declared.effect, problem)).collect()
+}
+
+/// Parameters of one effect, with their full names: `gear-ratio[3].error`.
+pub fn parameters_of(effect: &Effect, problem: &Problem) -> Vec<EffectParameter> {
+    named(name(effect), &place(effect), terms(effect, problem))
 }

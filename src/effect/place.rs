@@ -2,7 +2,7 @@
 
 use crate::parameter::{JointField, Slot};
 use crate::problem::effects::NAMES;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Body, Effect, Joint, JointKind, Problem};
 
 /// An argument of an effect as the files write it.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,14 +89,28 @@ pub fn place(effect: &Effect) -> String {
 
 /// What an error of a joint, counted from 1, adds to: d where it slides, else θ.
 pub(super) fn coordinate(problem: &Problem, joint: usize) -> Slot {
-    let slides = problem.joints[joint - 1].kind == JointKind::Prismatic;
-    Slot::Joint { joint: joint - 1, field: if slides { JointField::D } else { JointField::Theta } }
+    let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
+    Slot::Joint { joint: joint - 1, field }
+}
+
+/// Whether a joint, counted from 1, slides.
+pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
+    problem.joints[joint - 1].kind == JointKind::Prismatic
 }
 
 /// Numbers, from 1, of the joints that take a command.
 pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
     let takes = |&(_, joint): &(usize, &crate::problem::Joint)| joint.kind != JointKind::Fixed;
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
+}
+
+/// The weight of everything that is declared, at the length of the whole arm [N·m].
+pub(super) fn greatest_moment(problem: &Problem) -> f64 {
+    let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
+    let beam = |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
+    let mass: f64 = problem.joints.iter().map(|joint| all(&joint.bodies) + beam(joint)).sum();
+    let reach: f64 = problem.joints.iter().map(|joint| joint.a.hypot(joint.d)).sum();
+    problem.gravity.norm() * (mass + problem.tool.payload_mass) * (reach + problem.tool.target.norm())
 }
 
 /// Index of the joint whose beam has that name.

@@ -18,6 +18,10 @@ pub enum InputErrorKind {
     ProblemMissing,
     #[error("no such file; give the TRUTH.toml that describes the simulation")]
     TruthMissing,
+    #[error("no such file; give a STUDY.toml or the folder that holds one")]
+    StudyMissing,
+    #[error("no such file: {}; paths are relative to the study's folder", path.display())]
+    StudyFileMissing { path: PathBuf },
     #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]
@@ -98,6 +102,18 @@ pub enum InputErrorKind {
     RepeatedOrder { order: u32 },
     #[error("declared already on line {line}")]
     RepeatedEffect { line: usize },
+    #[error("order {order} of this joint is declared already on line {line}")]
+    RepeatedHarmonic { order: u32, line: usize },
+    #[error("joint {joint} is fixed and takes no command; leave the effect out, or free the joint's own parameters")]
+    NoCommand { joint: usize },
+    #[error("joint {joint} has no link that could bend: its a is 0")]
+    NoLink { joint: usize },
+    #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
+    NoHoist,
+    #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]
+    InEquilibriumAlready,
+    #[error("the measurements cannot show this effect; they need {write}")]
+    NeedsColumn { write: &'static str },
 
     // Rules of [parameters].
     #[error("a name with dots stands in quotes: \"{name}\" = {{ … }}")]
@@ -152,6 +168,20 @@ pub enum InputErrorKind {
     NeedsTemperature { write: &'static str },
     #[error("the problem holds out session \"{session}\", and a simulation has no sessions; use column or fraction")]
     NoSessions { session: String },
+
+    // Studies.
+    #[error("stands in the list already")]
+    Repeated,
+    #[error("the list is empty; write at least one value")]
+    EmptyList,
+    #[error("the study says how many poses there are; leave it out")]
+    PosesOfStudy,
+    #[error("the model makes no measurements with effects; write data = \"rig\"")]
+    NeedsRig,
+    #[error("{solver} does not keep the bounds and constraints of the problem; write bounded or auto")]
+    SolverIgnoresBounds { solver: &'static str },
+    #[error("no parameter of the kind that {strategy} varies is free in the problem; leave it out")]
+    NothingToVary { strategy: &'static str },
 
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]

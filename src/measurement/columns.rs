@@ -45,8 +45,14 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Finds the columns in a header; what nobody knows is a warning.
-    pub fn find(table: &Table, problem: &Problem, warnings: &mut Vec<Warning>) -> Result<Self, InputError> {
+    /// Finds the columns in a header; what nobody knows is a warning. Positions and the column of held-out rows need not be
+    /// there unless the poses are `measured`.
+    pub fn find(
+        table: &Table,
+        problem: &Problem,
+        measured: bool,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self, InputError> {
         let marked_name = match &problem.data.held_out {
             Some(HeldOut::Column(name)) => Some(name.as_str()),
             None => Some("split"),
@@ -77,12 +83,18 @@ impl Columns {
             }
         }
         columns.read.sort_by_key(|column| column.role);
-        columns.require(table, problem, &numbering)?;
+        columns.require(table, problem, measured, &numbering)?;
         Ok(columns)
     }
 
     /// Whether every column is there that has to be.
-    fn require(&self, table: &Table, problem: &Problem, numbering: &Numbering) -> Result<(), InputError> {
+    fn require(
+        &self,
+        table: &Table,
+        problem: &Problem,
+        measured: bool,
+        numbering: &Numbering,
+    ) -> Result<(), InputError> {
         let missing = |base: &str, kind: &Kind| {
             let write = kind.spelled(base);
             Err(table.column(base).error(InputErrorKind::MissingColumn { write }))
@@ -93,6 +105,9 @@ impl Columns {
             {
                 return missing(&format!("q{}", numbering.number(index)), kind);
             }
+        }
+        if !measured {
+            return Ok(());
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             if !self.has(Role::Position(axis)) {

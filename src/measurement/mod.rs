@@ -79,4 +79,53 @@ impl Measurements {
     pub fn configuration(&self, row: usize) -> &[f64] {
         &self.configurations[row * self.joints..(row + 1) * self.joints]
     }
+
+    /// The rows with these numbers, in this order; words that none of them uses are kept.
+    #[must_use]
+    pub fn select(&self, rows: &[usize]) -> Self {
+        let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
+        let each = |column: &[f64]| {
+            rows.iter().flat_map(|&row| &column[row * self.joints..(row + 1) * self.joints]).copied().collect()
+        };
+        let words = |labels: &Labels| Labels {
+            names: labels.names.clone(),
+            of_row: rows.iter().map(|&row| labels.of_row[row]).collect(),
+        };
+        Self {
+            files: self.files.clone(),
+            origin: rows.iter().map(|&row| self.origin[row]).collect(),
+            joints: self.joints,
+            configurations: each(&self.configurations),
+            positions: rows.iter().map(|&row| self.positions[row]).collect(),
+            sigma: self.sigma.as_deref().map(one),
+            payload: self.payload.as_deref().map(one),
+            hoist: self.hoist.as_deref().map(one),
+            temperature: self.temperature.as_deref().map(one),
+            time: one(&self.time),
+            time_measured: self.time_measured,
+            approach: self.approach.as_deref().map(each),
+            session: words(&self.session),
+            target: self.target.as_ref().map(words),
+            marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+        }
+    }
+
+    /// These rows, then those of a table with the same columns and words.
+    #[must_use]
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        let joined = |own: &[f64], other: &[f64]| [own, other].concat();
+        let both = |own: &Option<Vec<f64>>, other: &Option<Vec<f64>>| Some(joined(own.as_ref()?, other.as_ref()?));
+        let mut all = self.clone();
+        all.origin.extend(&other.origin);
+        all.configurations.extend(&other.configurations);
+        all.positions.extend(&other.positions);
+        all.sigma = both(&self.sigma, &other.sigma);
+        all.payload = both(&self.payload, &other.payload);
+        all.hoist = both(&self.hoist, &other.hoist);
+        all.temperature = both(&self.temperature, &other.temperature);
+        all.time.extend(&other.time);
+        all.approach = both(&self.approach, &other.approach);
+        all.session.of_row.extend(&other.session.of_row);
+        all
+    }
 }

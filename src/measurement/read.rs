@@ -17,6 +17,18 @@ impl Measurements {
     /// # Errors
     /// The first mistake found, a file that cannot be read among them.
     pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_table(files, problem, true)
+    }
+
+    /// Reads poses that may still be to measure: as [`Measurements::read`], with positions zero where there are none.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read_poses(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_table(files, problem, false)
+    }
+
+    fn read_table(files: &[PathBuf], problem: &Problem, measured: bool) -> Result<(Self, Vec<Warning>), InputError> {
         let mut warnings = Vec::new();
         let mut builder: Option<Builder> = None;
         for (index, file) in files.iter().enumerate() {
@@ -24,7 +36,7 @@ impl Measurements {
                 return Err(Location::file(file).error(InputErrorKind::RepeatedFile));
             }
             let mut table = Table::open(file, || missing(file, problem))?;
-            let columns = Columns::find(&table, problem, &mut warnings)?;
+            let columns = Columns::find(&table, problem, measured, &mut warnings)?;
             let rows = builder.get_or_insert_with(|| Builder::new(files, &table, &columns, problem));
             rows.same_columns(&table, &columns)?;
             let before = rows.measurements.len();

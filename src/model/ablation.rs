@@ -1,14 +1,15 @@
 //! Models that leave a part of the elasticity out.
 
 use super::Model;
-use crate::parameter::{BeamField, Slot};
+use crate::arm::Flexibility;
+use crate::parameter::{ArmField, BeamField, Slot};
 
-/// What an ablated model keeps of the elasticity.
+/// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the arm stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ablation {
     /// Nothing: geometry alone.
     Rigid,
-    /// Torsion of the joints.
+    /// Whatever turns joints, and the base.
     JointsOnly,
     /// Stretch, bending and twist of the links.
     LinksOnly,
@@ -37,8 +38,9 @@ impl Ablation {
         match (self, slot) {
             (Self::Rigid, slot) => !slot.is_elastic(),
             (Self::LinksOnly | Self::BendingOnly, Slot::Joint { .. }) => !slot.is_elastic(),
-            (Self::JointsOnly, Slot::Beam { .. })
+            (Self::LinksOnly | Self::BendingOnly, Slot::Arm(ArmField::MountingX | ArmField::MountingY))
             | (Self::BendingOnly, Slot::Beam { field: BeamField::Axial | BeamField::Twist, .. }) => false,
+            (Self::JointsOnly, Slot::Beam { field, .. }) => !field.is_rigidity(),
             _ => true,
         }
     }
@@ -55,18 +57,27 @@ impl Model {
         model.constraints = self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
-                (joint.flexibility, joint.nonlinear, joint.lateral) = (None, None, None);
+                (joint.flexibility, joint.lateral) = (None, None);
             }
-            if ablation == Ablation::Rigid {
+            // A rigid link that changes with temperature is still walked along.
+            if ablation == Ablation::Rigid && joint.beam.as_ref().is_some_and(|beam| beam.thermal.is_none()) {
                 joint.beam = None;
             }
             let Some(beam) = &mut joint.beam else { continue };
             let all = &mut beam.flexibility;
             match ablation {
-                Ablation::JointsOnly => (all.axial, all.about_y, all.about_z, all.twist) = (0.0, 0.0, 0.0, 0.0),
+                Ablation::Rigid | Ablation::JointsOnly => {
+                    *all = Flexibility { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0 };
+                }
                 Ablation::BendingOnly => (all.axial, all.twist) = (0.0, 0.0),
-                Ablation::Rigid | Ablation::LinksOnly | Ablation::All => {}
+                Ablation::LinksOnly | Ablation::All => {}
             }
+        }
+        if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
+            model.nominal.mounting = None;
+        }
+        if ablation == Ablation::Rigid {
+            model.nominal.mixing = None;
         }
         model
     }

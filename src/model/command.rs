@@ -60,6 +60,11 @@ impl Model {
         entries.collect::<Result<Vec<f64>, String>>().map(DVector::from_vec)
     }
 
+    /// Whether something that is not free follows the joints' commands.
+    pub fn follows_commands(&self) -> bool {
+        self.driven.iter().any(|driven| driven.driver.follows_commands())
+    }
+
     /// Joints that the parameters of a commanded model move, in their order.
     pub fn moving_joints(&self) -> Vec<usize> {
         let joint = |parameter: &Parameter| match parameter.slot {

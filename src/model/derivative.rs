@@ -112,7 +112,12 @@ impl Linearised {
                 Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
             }
         }
-        let inputs = inputs(model, unknowns);
+        let mut inputs = inputs(model, unknowns);
+        // In the order of the arm: a chunk costs less the further out its first input is, for all before it is constant.
+        inputs.sort_by_key(|input| match input.slot {
+            Slot::Joint { joint, .. } | Slot::Beam { joint, .. } => joint + 1,
+            _ => 0,
+        });
         let inner = if arm.is_elastic() {
             let chunks =
                 inputs.chunks(CHUNK).map(|part| Chunk { arm: seed_arm(model, x, part), inputs: part.to_vec() });

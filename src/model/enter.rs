@@ -13,7 +13,7 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
             let joint = &mut arm.joints[joint];
             match field {
                 JointField::Compliance => _ = joint.flexibility.get_or_insert(0.0),
-                JointField::Cubic | JointField::Play => {
+                JointField::Cubic | JointField::Play | JointField::SlidingPlay => {
                     joint.nonlinear.get_or_insert(Nonlinear { cubic: 0.0, play: 0.0 });
                 }
                 JointField::LateralX | JointField::LateralY => _ = joint.lateral.get_or_insert([0.0; 2]),
@@ -80,10 +80,11 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::Stiffness, ..) => joint.flexibility = Some((-x).exp() / nominal),
                 (JointField::Compliance, ..) => joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x)),
                 (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic = x,
-                (JointField::Play, Some(nonlinear), _) => nonlinear.play = x,
+                (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play = x,
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] = x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] = x,
-                (JointField::Cubic | JointField::Play | JointField::LateralX | JointField::LateralY, ..) => {}
+                (JointField::Cubic | JointField::Play | JointField::SlidingPlay, None, _)
+                | (JointField::LateralX | JointField::LateralY, _, None) => {}
             }
         }
         Slot::Beam { joint, field } => {

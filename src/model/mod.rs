@@ -9,16 +9,18 @@ mod enter;
 mod inputs;
 mod observation;
 mod poses;
+mod terms;
 
 pub use ablation::Ablation;
 pub use poses::{Pose, PoseResiduals};
+pub use terms::TermsError;
 
 use nalgebra::Vector3;
 
 use crate::arm::Arm;
 use crate::effect;
 use crate::error::InputError;
-use crate::parameter::{Driver, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::parameter::{Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -46,12 +48,42 @@ impl Model {
     /// # Errors
     /// A rule of `[parameters]` or a constraint does not fit the parameters there are.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
-        let effects = effect::parameters(problem);
-        let parameters = resolve(problem, bases, targets, &effects)?;
+        Self::of(problem, bases, targets, &effect::parameters(problem))
+    }
+
+    /// The same with the parameters `more` of effects that no catalogue holds, behind those of the declared ones.
+    ///
+    /// They are free with their own σ as prior, and `[parameters]` may speak of them by their names.
+    ///
+    /// # Errors
+    /// A parameter enters where the model has no room for it; or as for [`Model::new`].
+    pub fn with_terms(
+        problem: &Problem,
+        bases: &[String],
+        targets: &[String],
+        more: &[EffectParameter],
+    ) -> Result<Self, TermsError> {
+        let mut effects = effect::parameters(problem);
+        for parameter in more {
+            terms::check(problem, bases.len(), targets.len(), &effects, parameter)?;
+            effects.push(parameter.clone());
+        }
+        Ok(Self::of(problem, bases, targets, &effects)?)
+    }
+
+    fn of(
+        problem: &Problem,
+        bases: &[String],
+        targets: &[String],
+        effects: &[EffectParameter],
+    ) -> Result<Self, InputError> {
+        let parameters = resolve(problem, bases, targets, effects)?;
         let mut nominal = Arm::nominal(problem);
-        effects.iter().for_each(|effect| enter::prepare(&mut nominal, effect.slot, effect.nominal));
+        for effect in effects {
+            enter::prepare(&mut nominal, effect.slot, effect.nominal);
+        }
         Ok(Self {
-            constraints: constrain(problem, bases, targets, &effects, &parameters)?,
+            constraints: constrain(problem, bases, targets, effects, &parameters)?,
             nominal,
             driven: Vec::new(),
             observation: Observation::default(),

@@ -95,6 +95,23 @@ impl<'a> PoseResiduals<'a> {
     }
 }
 
+impl Model {
+    /// Target positions in the arm's base frame [m] at the full parameter vector `x`; `None` without equilibrium.
+    ///
+    /// What effects do to the measurement is not in them.
+    pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {
+        let arm = self.arm(|k| x[k]);
+        let targets = self.target_positions(x);
+        let mut commands = Commands::new(self, x);
+        let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+        let point = |pose: &Pose| {
+            arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest).ok()?;
+            Some(rest.frame.point(&targets[pose.target]))
+        };
+        poses.iter().map(point).collect()
+    }
+}
+
 impl LeastSquares for PoseResiduals<'_> {
     fn parameters(&self) -> usize {
         self.unknowns.len()

@@ -35,6 +35,24 @@ pub enum Driver {
         /// Length of an interval.
         step: f64,
     },
+    /// exp(−u²/2) with u = (quantity − centre) / width.
+    Bump {
+        /// The quantity.
+        of: Quantity,
+        /// Where it is highest, in the quantity's unit.
+        centre: f64,
+        /// Its width, in the quantity's unit.
+        width: f64,
+    },
+    /// tanh u with u = (quantity − centre) / width.
+    Step {
+        /// The quantity.
+        of: Quantity,
+        /// Where it is steepest, in the quantity's unit.
+        centre: f64,
+        /// Its width, in the quantity's unit.
+        width: f64,
+    },
 }
 
 /// A quantity that is known of every pose.
@@ -76,7 +94,28 @@ impl Driver {
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
-            Self::Spline { of, begin, step } => cubic((of.value(setup) - begin) / step),
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
+        }
+    }
+
+    /// The value of a function of one quantity at a value of that quantity; 0 for other drivers.
+    pub fn at(self, quantity: f64) -> f64 {
+        match self {
+            Self::Spline { begin, step, .. } => cubic((quantity - begin) / step),
+            Self::Bump { centre, width, .. } => (-0.5 * ((quantity - centre) / width).powi(2)).exp(),
+            Self::Step { centre, width, .. } => ((quantity - centre) / width).tanh(),
+            _ => 0.0,
+        }
+    }
+
+    /// Whether it depends on what the joints are told.
+    pub fn follows_commands(self) -> bool {
+        match self {
+            Self::Command(_) | Self::Sine(..) | Self::Cosine(..) => true,
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
+                matches!(of, Quantity::Command(_))
+            }
+            Self::Constant | Self::Unit | Self::Warming { .. } | Self::Elapsed | Self::Since(_) => false,
         }
     }
 
@@ -87,7 +126,7 @@ impl Driver {
 }
 
 /// The uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
-pub(crate) fn cubic(u: f64) -> f64 {
+fn cubic(u: f64) -> f64 {
     let v = 2.0 - (u - 2.0).abs();
     match v {
         v if v <= 0.0 => 0.0,

@@ -9,7 +9,6 @@ mod name;
 mod resolve;
 
 pub use constraint::{LinearConstraint, constrain};
-pub(crate) use driver::cubic;
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
 pub use resolve::{EffectParameter, resolve};
@@ -66,8 +65,10 @@ pub enum Unit {
     PerLength,
     /// [m/s]
     Speed,
-    /// A number, or rad/rad, m/m, rad/m, m/rad
+    /// A small part: rad/rad, m/m, rad/m, m/rad
     Ratio,
+    /// A number of order 1
+    Number,
 }
 
 impl Unit {
@@ -89,7 +90,7 @@ impl Unit {
             Self::Mass => "kg",
             Self::PerLength => "1/m",
             Self::Speed => "m/s",
-            Self::Ratio => "1",
+            Self::Ratio | Self::Number => "1",
         }
     }
 

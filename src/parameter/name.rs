@@ -58,8 +58,10 @@ pub enum JointField {
     Compliance,
     /// Angle per cube of the moment [rad/(N·m)³].
     Cubic,
-    /// Play that the moment takes up [rad].
+    /// Play: half of it each way, as the direction of approach says, or the moment where that is not known [rad].
     Play,
+    /// Play of a joint that slides, which only a direction of approach takes up [m].
+    SlidingPlay,
     /// Flexibility about x before the joint turns [rad/(N·m)].
     LateralX,
     /// Flexibility about y before the joint turns [rad/(N·m)].
@@ -143,6 +145,7 @@ impl JointField {
             Self::Compliance => "compliance",
             Self::Cubic => "cubic",
             Self::Play => "play",
+            Self::SlidingPlay => "sliding_play",
             Self::LateralX => "lateral_x",
             Self::LateralY => "lateral_y",
         }
@@ -150,6 +153,11 @@ impl JointField {
 }
 
 impl BeamField {
+    /// Whether it says how a beam gives way to loads.
+    pub fn is_rigidity(self) -> bool {
+        matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist | Self::Flexibility)
+    }
+
     /// Name after the dot.
     pub fn name(self) -> &'static str {
         match self {
@@ -175,7 +183,7 @@ impl Slot {
         match self {
             Self::Joint { field, .. } => match field {
                 JointField::Alpha | JointField::Theta | JointField::Beta | JointField::Play => Unit::Angle,
-                JointField::A | JointField::D => Unit::Length,
+                JointField::A | JointField::D | JointField::SlidingPlay => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
                 JointField::Cubic => Unit::CubicCompliance,
@@ -194,7 +202,8 @@ impl Slot {
             },
             Self::Arm(field) => match field {
                 ArmField::Payload => Unit::Mass,
-                ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::Mixing => Unit::Ratio,
+                ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY => Unit::Ratio,
+                ArmField::Mixing => Unit::Number,
                 ArmField::HoistTrolley => Unit::PerLength,
                 ArmField::MountingX | ArmField::MountingY => Unit::Compliance,
                 ArmField::GravityX | ArmField::GravityY => Unit::Angle,
@@ -208,7 +217,9 @@ impl Slot {
     /// Whether the slot describes elasticity or loads rather than geometry.
     pub fn is_elastic(self) -> bool {
         match self {
-            Self::Joint { field, .. } => !JointField::GEOMETRY.contains(&field) && field != JointField::Play,
+            Self::Joint { field, .. } => {
+                !JointField::GEOMETRY.contains(&field) && !matches!(field, JointField::Play | JointField::SlidingPlay)
+            }
             Self::Beam { field, .. } => {
                 !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)
             }

@@ -4,7 +4,7 @@ use toml::de::DeTable;
 
 use super::item::Item;
 use super::section::Section;
-use super::{Effect, EffectDeclaration, Joint};
+use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Statics};
 use crate::error::{InputError, InputErrorKind};
 use crate::units::TIME;
 
@@ -46,9 +46,50 @@ pub(super) fn read(root: &mut Section<'_, '_>, joints: &[Joint]) -> Result<Vec<E
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedEffect { line }));
         }
+        if let Some((order, line)) = effects.iter().find_map(|known| shared_order(known, &effect)) {
+            return Err(item.error(InputErrorKind::RepeatedHarmonic { order, line }));
+        }
         effects.push(EffectDeclaration { effect, location: item.location() });
     }
     Ok(effects)
+}
+
+/// An order that two declared harmonics of one joint share, and the line of the first.
+fn shared_order(known: &EffectDeclaration, effect: &Effect) -> Option<(u32, usize)> {
+    match (&known.effect, effect) {
+        (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: other, orders: more })
+            if joint == other =>
+        {
+            let order = more.iter().find(|order| orders.contains(order))?;
+            Some((*order, known.location.line.unwrap_or(0)))
+        }
+        _ => None,
+    }
+}
+
+/// Refuses what could never act on this arm: the declared model has it already, or has nothing for it to act on.
+pub(super) fn check(
+    effects: &[EffectDeclaration],
+    statics: Statics,
+    joints: &[Joint],
+    data: &Data,
+) -> Result<(), InputError> {
+    let hoisted = || joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
+    for EffectDeclaration { effect, location } in effects {
+        let kind = match effect {
+            Effect::LinkBending { joint } if joints[joint - 1].a == 0.0 => InputErrorKind::NoLink { joint: *joint },
+            Effect::DeflectedEquilibrium if statics.equilibrium == Equilibrium::Deflected => {
+                InputErrorKind::InEquilibriumAlready
+            }
+            Effect::HoistForce | Effect::HoistDirection if !hoisted() => InputErrorKind::NoHoist,
+            effect if effect.is_thermal() && data.reference_temperature.is_none() => {
+                InputErrorKind::NeedsTemperature { write: "reference_temperature_C in [data]" }
+            }
+            _ => continue,
+        };
+        return Err(location.clone().error(kind));
+    }
+    Ok(())
 }
 
 /// One effect; `true` stands for no arguments.
@@ -62,12 +103,12 @@ pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Resul
     let mut arguments = Arguments { section, joints };
     let effect = match name {
         "joint-compliance" => Effect::JointCompliance { joint: arguments.joint("joint")? },
-        "joint-harmonic" => Effect::JointHarmonic { joint: arguments.joint("joint")?, orders: arguments.orders()? },
-        "gear-ratio" => Effect::GearRatio { joint: arguments.joint("joint")? },
-        "backlash" => Effect::Backlash { joint: arguments.joint("joint")? },
+        "joint-harmonic" => Effect::JointHarmonic { joint: arguments.commanded("joint")?, orders: arguments.orders()? },
+        "gear-ratio" => Effect::GearRatio { joint: arguments.commanded("joint")? },
+        "backlash" => Effect::Backlash { joint: arguments.commanded("joint")? },
         "joint-nonlinear-stiffness" => Effect::JointNonlinearStiffness { joint: arguments.joint("joint")? },
         "joint-lateral-compliance" => Effect::JointLateralCompliance { joint: arguments.joint("joint")? },
-        "joint-thermal-drift" => Effect::JointThermalDrift { joint: arguments.joint("joint")? },
+        "joint-thermal-drift" => Effect::JointThermalDrift { joint: arguments.commanded("joint")? },
         "joint-coupling" => arguments.coupling()?,
         "link-bending" => Effect::LinkBending { joint: arguments.joint("joint")? },
         "link-thermal-bending" => Effect::LinkThermalBending { link: arguments.link()? },
@@ -105,8 +146,17 @@ impl Arguments<'_, '_, '_> {
         }
     }
 
+    /// The number of a joint that takes a command.
+    fn commanded(&mut self, key: &str) -> Result<usize, InputError> {
+        let joint = self.joint(key)?;
+        match (self.joints[joint - 1].kind, self.section.peek(key)) {
+            (JointKind::Fixed, Some(item)) => Err(item.error(InputErrorKind::NoCommand { joint })),
+            _ => Ok(joint),
+        }
+    }
+
     fn coupling(&mut self) -> Result<Effect, InputError> {
-        let (joint, from) = (self.joint("joint")?, self.joint("from")?);
+        let (joint, from) = (self.commanded("joint")?, self.commanded("from")?);
         if joint == from {
             return Err(self.section.error(InputErrorKind::CoupledToItself { joint }));
         }

@@ -9,7 +9,7 @@ pub(crate) mod effects;
 pub(crate) mod item;
 mod parameters;
 pub(crate) mod pattern;
-mod read;
+pub(crate) mod read;
 mod robust;
 pub(crate) mod section;
 
@@ -265,6 +265,16 @@ pub enum Effect {
     TrackerScale,
     TrackerDrift,
     StationShift { at_time: f64 },
+}
+
+impl Effect {
+    /// Whether it follows the temperature.
+    pub fn is_thermal(&self) -> bool {
+        matches!(
+            self,
+            Self::JointThermalDrift { .. } | Self::LinkThermalBending { .. } | Self::LinkThermalExpansion { .. }
+        )
+    }
 }
 
 /// One line of `[parameters]`.

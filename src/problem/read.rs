@@ -50,10 +50,12 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let data = data(&mut root)?;
     let robust = robust::read(&mut root)?;
     root.finish()?;
+    effects::check(&effects, statics, &joints, &data)?;
     Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, constraints, data, robust })
 }
 
-fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
+/// A name that is fit to name a folder.
+pub(crate) fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
     let item = root.require("name", "name = \"…\"")?;
     let name = item.text()?;
     let barred = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);

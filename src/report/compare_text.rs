@@ -25,9 +25,21 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         geometry(problem, joint),
         errors(joint, rigid, paper.iter().any(|_| ablations.len() > 1)),
         rows("strategy", strategies.chain(paper.iter().map(paper_line)).collect()),
+        paper_ignores_effects(problem, paper),
         rows("elasticity", ablations.iter().map(|(ablation, result)| line(ablation.as_str(), result)).collect()),
     ]
+    .into_iter()
+    .filter(|part| !part.is_empty())
+    .collect::<Vec<String>>()
     .join("\n")
+}
+
+/// What the paper's procedure leaves out of the declared model.
+fn paper_ignores_effects(problem: &Problem, paper: &[Baseline]) -> String {
+    if paper.is_empty() || problem.effects.is_empty() {
+        return String::new();
+    }
+    "  paper: its own closed forms, without the declared effects\n".to_owned()
 }
 
 /// Table 2: nominal, identified, error of each joint's geometry.

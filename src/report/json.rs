@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::fit::{BlindCombination, Identifiability};
 use crate::problem::Problem;
 use crate::solver::AtBound;
 use crate::study::{ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise, Outlier};
@@ -60,7 +61,7 @@ struct Document<'a> {
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
-struct Observability {
+pub(super) struct Observability {
     o1: f64,
     o2: f64,
     o3: f64,
@@ -81,7 +82,7 @@ struct ParameterEntry<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Unidentified<'a> {
+pub(super) struct Unidentified<'a> {
     combination: BTreeMap<&'a str, f64>,
     singular_value: f64,
 }
@@ -97,6 +98,24 @@ struct ActiveEntry<'a> {
     constraint: &'a str,
     side: &'a str,
     line: Option<usize>,
+}
+
+impl Observability {
+    pub(super) fn of(found: &Identifiability, coordinates: usize) -> Self {
+        let [o1, o2, o3, o4, o5] = found.observability(coordinates);
+        Self { o1, o2, o3, o4, o5 }
+    }
+}
+
+impl<'a> Unidentified<'a> {
+    /// Every blind combination, by the names of the unknowns.
+    pub(super) fn all(found: &Identifiability, name: impl Fn(usize) -> &'a str) -> Vec<Self> {
+        let entry = |blind: &BlindCombination| Unidentified {
+            combination: blind.weights.iter().map(|&(k, weight)| (name(k), weight)).collect(),
+            singular_value: blind.singular_value,
+        };
+        found.blind.iter().map(entry).collect()
+    }
 }
 
 impl<'a> From<&'a ActiveConstraint> for ActiveEntry<'a> {
@@ -173,7 +192,6 @@ impl<'a> From<&'a Estimate> for ParameterEntry<'a> {
 /// The result of an identification as JSON text, ending in a line break; SI units except where a key says otherwise.
 pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
     let identifiability = &result.identifiability;
-    let [o1, o2, o3, o4, o5] = identifiability.observability(result.coordinates);
     let document = Document {
         problem: &problem.name,
         strategy: result.strategy.as_str(),
@@ -192,16 +210,9 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
         noise_factor: result.noise_factor,
         rank: identifiability.rank,
         condition_number: identifiability.condition_number(),
-        observability: Observability { o1, o2, o3, o4, o5 },
+        observability: Observability::of(identifiability, result.coordinates),
         parameters: result.estimates.iter().map(ParameterEntry::from).collect(),
-        unidentified: identifiability
-            .blind
-            .iter()
-            .map(|blind| Unidentified {
-                combination: blind.weights.iter().map(|&(k, w)| (result.unknowns[k].as_str(), w)).collect(),
-                singular_value: blind.singular_value,
-            })
-            .collect(),
+        unidentified: Unidentified::all(identifiability, |k| result.unknowns[k].as_str()),
         correlations: result
             .correlations
             .iter()

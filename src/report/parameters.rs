@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::quantity::{Display, decimals, number, table};
-use crate::fit::BlindCombination;
+use crate::fit::{BlindCombination, Identifiability};
 use crate::parameter::Unit;
 use crate::solver::AtBound;
 use crate::study::{Estimate, Identification};
@@ -79,8 +79,8 @@ fn is_vague(estimate: &Estimate) -> bool {
 }
 
 /// The combinations that no measurement sees, in words.
-pub(super) fn blind_text(result: &Identification) -> String {
-    let blind = &result.identifiability.blind;
+pub(super) fn blind_text(found: &Identifiability, unknowns: &[String]) -> String {
+    let blind = &found.blind;
     if blind.is_empty() {
         return "The data see every combination of the parameters there.\n".to_owned();
     }
@@ -88,16 +88,16 @@ pub(super) fn blind_text(result: &Identification) -> String {
         "{} of {} combinations cannot be seen there (their parameters can change together in these\n\
          proportions, each scaled by its effect, and no predicted position moves):\n",
         blind.len(),
-        result.unknowns.len()
+        unknowns.len()
     );
     for combination in blind {
-        let _ = writeln!(text, "  {}", words(combination, result));
+        let _ = writeln!(text, "  {}", words(combination, unknowns));
     }
     text
 }
 
-fn words(combination: &BlindCombination, result: &Identification) -> String {
-    let name = |k: usize| result.unknowns[k].as_str();
+fn words(combination: &BlindCombination, unknowns: &[String]) -> String {
+    let name = |k: usize| unknowns[k].as_str();
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));
     }

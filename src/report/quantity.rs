@@ -24,7 +24,7 @@ impl Display {
             Unit::CurvaturePerDegree => Self { factor: 1e6, symbol: "µrad/(m·K)".to_owned() },
             Unit::PerDegree => Self { factor: 1e6, symbol: "10⁻⁶/K".to_owned() },
             Unit::Ratio => Self { factor: 1e3, symbol: "‰".to_owned() },
-            Unit::Mass | Unit::PerLength => Self { factor: 1.0, symbol: unit.symbol().to_owned() },
+            Unit::Mass | Unit::PerLength | Unit::Number => Self { factor: 1.0, symbol: unit.symbol().to_owned() },
             Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
                 let (factor, prefix) = match magnitude.abs() {
                     m if m >= 1e9 => (1e-9, "G"),

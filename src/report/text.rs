@@ -4,6 +4,7 @@ use super::parameters::{blind_text, correlation_text, parameter_table};
 use std::fmt::Write as _;
 
 use super::quantity::{number, table};
+use crate::fit::Identifiability;
 use crate::problem::Problem;
 use crate::study::{ErrorSummary, Identification, Noise};
 
@@ -19,8 +20,8 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
         outliers(problem, result),
         parameter_table(result),
         active_constraints(result),
-        conditioning(result),
-        blind_text(result),
+        conditioning(&result.identifiability, result.unknowns.len(), result.coordinates),
+        blind_text(&result.identifiability, &result.unknowns),
         correlation_text(result),
     ]
     .into_iter()
@@ -135,13 +136,12 @@ fn outliers(problem: &Problem, result: &Identification) -> String {
     text
 }
 
-fn conditioning(result: &Identification) -> String {
-    let found = &result.identifiability;
-    let [o1, o2, o3, o4, o5] = found.observability(result.coordinates);
+/// Rank, condition number and observability indices, in one line.
+pub(super) fn conditioning(found: &Identifiability, unknowns: usize, coordinates: usize) -> String {
+    let [o1, o2, o3, o4, o5] = found.observability(coordinates);
     format!(
-        "At the nominal arm: rank {} of {}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}\n",
+        "At the nominal arm: rank {} of {unknowns}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}\n",
         found.rank,
-        result.unknowns.len(),
         found.condition_number(),
     )
 }

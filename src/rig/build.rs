@@ -83,7 +83,10 @@ impl Rig {
                 (Effect::JointLateralCompliance { joint }, [x, y]) if *joint == number => {
                     before.compliance += Vector3::new(*x, *y, 0.0);
                 }
-                (Effect::Backlash { joint }, [width]) if *joint == number && conditions.approach.is_empty() => {
+                // A moment about its axis moves no joint along its slide.
+                (Effect::Backlash { joint: place }, [width])
+                    if *place == number && conditions.approach.is_empty() && joint.kind != JointKind::Prismatic =>
+                {
                     about.play += width;
                 }
                 _ => {}

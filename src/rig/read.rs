@@ -25,6 +25,18 @@ pub(super) fn text(text: &str, file: &Path, problem: &Problem) -> Result<Truth, 
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
+    let noise_sigma = root.section("noise")?.map_or(Ok(0.0), noise)?;
+    let truth = sections(&mut root, problem)?;
+    root.finish()?;
+    if let Some(HeldOut::Session(session)) = &problem.data.held_out {
+        let location = problem.data.held_out_location.clone();
+        return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
+    }
+    Ok(Truth { noise_sigma, ..truth })
+}
+
+/// The sections that say what is true, without noise.
+pub(super) fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
     let known = parameters::nominal(problem);
     let parameters = match root.section("parameters")? {
         Some(section) => section.entries().iter().map(|(name, item)| deviation(name, item, &known)).collect(),
@@ -34,17 +46,11 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         Some(section) => section.entries().iter().map(|(pattern, item)| random(pattern, item, &known)).collect(),
         None => Ok(Vec::new()),
     }?;
-    let noise_sigma = root.section("noise")?.map_or(Ok(0.0), noise)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", "[poses], the ranges of the joints"))?;
     let poses = ranges::read(section, &problem.joints)?;
-    let effects = strengths::read(&mut root, problem, &poses)?;
-    root.finish()?;
-    if let Some(HeldOut::Session(session)) = &problem.data.held_out {
-        let location = problem.data.held_out_location.clone();
-        return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
-    }
-    Ok(Truth { parameters, random, effects, noise_sigma, poses, segments })
+    let effects = strengths::read(root, problem, &poses)?;
+    Ok(Truth { parameters, random, effects, noise_sigma: 0.0, poses, segments })
 }
 
 fn noise(mut section: Section<'_, '_>) -> Result<f64, InputError> {

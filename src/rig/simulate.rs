@@ -65,19 +65,38 @@ pub enum SimulationError {
     },
 }
 
+/// What chance decides, before anything is measured.
+#[derive(Debug, Clone)]
+pub struct Draw {
+    /// The problem with true values instead of nominal ones.
+    pub arm: Problem,
+    /// Every parameter with its true value.
+    pub parameters: Vec<TrueParameter>,
+    /// The poses in order of time, no row held out; `position` is the noise alone [m].
+    pub rows: Vec<Row>,
+}
+
+/// Draws the true arm, `poses` poses and their noise.
+///
+/// More poses leave the arm and the first poses as they are; another σ of the noise scales it and changes nothing else.
+pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
+    let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
+    let mut rows = draw_poses(problem, &truth.poses, poses, stream(seed, POSES));
+    let mut noise = stream(seed, NOISE);
+    for row in &mut rows {
+        row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
+    }
+    Draw { arm, parameters, rows }
+}
+
 /// Measures the true arm in `poses` poses; the same for the same `seed`, however many threads there are.
 ///
 /// # Errors
 /// The arm is too soft for its loads.
 pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Result<Simulation, SimulationError> {
-    let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
+    let Draw { arm, parameters, mut rows } = draw(problem, truth, poses, seed);
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
-    let mut rows = draw(problem, &truth.poses, poses, stream(seed, POSES));
     hold_out(&mut rows, truth.poses.held_out.count(poses), &mut stream(seed, SPLIT));
-    let mut noise = stream(seed, NOISE);
-    for row in &mut rows {
-        row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
-    }
     let seen: Vec<_> = rows.par_iter().map(|row| rig.position(&row.conditions)).collect();
     for (index, (row, seen)) in rows.iter_mut().zip(seen).enumerate() {
         row.position += seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
@@ -135,7 +154,7 @@ fn true_arm(problem: &Problem, truth: &Truth, mut random: ChaCha8Rng) -> (Proble
 }
 
 /// Draws poses; every number is rounded to what the file of measurements will hold.
-fn draw(problem: &Problem, ranges: &PoseRanges, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
+fn draw_poses(problem: &Problem, ranges: &PoseRanges, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
     let mut rows: Vec<Row> = Vec::with_capacity(poses);
     let mut time = 0.0;
     for _ in 0..poses {

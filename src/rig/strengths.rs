@@ -92,12 +92,7 @@ fn check_temperature(
     problem: &Problem,
     poses: &PoseRanges,
 ) -> Result<(), InputError> {
-    let thermal = matches!(
-        cause,
-        Cause::Catalogued(
-            Effect::JointThermalDrift { .. } | Effect::LinkThermalBending { .. } | Effect::LinkThermalExpansion { .. }
-        )
-    );
+    let thermal = matches!(cause, Cause::Catalogued(effect) if effect.is_thermal());
     let write = if poses.temperature.is_none() {
         "temperature_C = [from, to] in [poses]"
     } else if problem.data.reference_temperature.is_none() {

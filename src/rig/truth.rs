@@ -7,6 +7,7 @@ use super::parameters::ParameterKind;
 use super::read;
 use crate::error::InputError;
 use crate::problem::Problem;
+use crate::problem::section::Section;
 
 /// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
 #[derive(Debug, Clone)]
@@ -90,6 +91,11 @@ impl Truth {
     /// The first mistake found.
     pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
         read::text(text, file, problem)
+    }
+
+    /// Reads its sections but `[noise]` where they stand in another document; no noise.
+    pub(crate) fn of_sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Self, InputError> {
+        read::sections(root, problem)
     }
 }
 

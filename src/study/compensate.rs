@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::Placement;
+use crate::arm::Setup;
 use crate::fit::{Fit, LinearRows};
 use crate::measurement::Measurements;
-use crate::model::{Model, PoseResiduals};
+use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 use crate::solver::{self, Bounds, Settings};
 
@@ -14,6 +15,10 @@ use super::stage::StageError;
 /// 1 σ of the target position against 1 σ = 1 (rad or m) of the way from the seed: the position decides, the seed breaks
 /// ties [m].
 const POSITION_WEIGHT: f64 = 1e-6;
+/// A command has settled when a pass changes it by less [rad or m].
+const SETTLED: f64 = 1e-10;
+/// Passes after which a command that does not settle is taken as it is: its miss says how good it is.
+const MAX_PASSES: usize = 20;
 /// A target counts as reached within this distance [m].
 const REACHED: f64 = 1e-6;
 
@@ -41,7 +46,8 @@ impl Command {
 /// row's position, within the joint limits of `problem`.
 ///
 /// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖q − seed‖²: Newton's method on the position by dual numbers, with
-/// redundancy resolved towards the seed.
+/// redundancy resolved towards the seed. Where effects follow the command (a transmission ratio, harmonics), they are
+/// taken at the command found so far, until it settles.
 ///
 /// # Errors
 /// The limits of a joint exclude each other.
@@ -60,22 +66,33 @@ pub fn compensate(
     for (row, mut pose) in placement.poses(targets, &rows, POSITION_WEIGHT).into_iter().enumerate() {
         pose.sigma = POSITION_WEIGHT;
         let seed = targets.configuration(row);
-        let bound = |pick: fn((f64, f64)) -> f64| {
-            DVector::from_iterator(moving.len(), moving.iter().map(|&j| pick(problem.joints[j].limits) - seed[j]))
-        };
-        let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
         let n = moving.len();
-        let residuals = PoseResiduals::new(&arm, vec![pose], unknowns.clone(), DVector::zeros(n));
-        let near = LinearRows { matrix: DMatrix::identity(n, n), constant: DVector::zeros(n) };
-        let fit = Fit::new(&residuals).with_rows(near)?;
-        let solution = solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default());
-        let miss = residuals.position_errors(&solution.x)[0];
+        let at = |configuration: &[f64]| {
+            let pose = Pose { setup: Setup { configuration, ..pose.setup }, ..pose };
+            PoseResiduals::new(&arm, vec![pose], Vec::new(), DVector::zeros(n)).position_errors(&DVector::zeros(0))[0]
+        };
         let mut configuration = seed.to_vec();
-        for (&joint, step) in moving.iter().zip(solution.x.iter()) {
-            let (min, max) = problem.joints[joint].limits;
-            configuration[joint] = (configuration[joint] + step).clamp(min, max);
+        for _ in 0..MAX_PASSES {
+            let bound = |pick: fn((f64, f64)) -> f64| {
+                let room = moving.iter().map(|&j| pick(problem.joints[j].limits) - configuration[j]);
+                DVector::from_iterator(n, room)
+            };
+            let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
+            let away = DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
+            let pose = Pose { setup: Setup { configuration: &configuration, ..pose.setup }, ..pose };
+            let residuals = PoseResiduals::new(&arm, vec![pose], unknowns.clone(), DVector::zeros(n));
+            let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
+            let fit = Fit::new(&residuals).with_rows(near)?;
+            let step = solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default()).x;
+            for (&joint, step) in moving.iter().zip(step.iter()) {
+                let (min, max) = problem.joints[joint].limits;
+                configuration[joint] = (configuration[joint] + step).clamp(min, max);
+            }
+            if !arm.follows_commands() || step.amax() <= SETTLED {
+                break;
+            }
         }
-        let seed_miss = residuals.position_errors(&DVector::zeros(n))[0].norm();
+        let (miss, seed_miss) = (at(&configuration), at(seed).norm());
         commands.push(Command { row, configuration, miss, seed_miss });
     }
     Ok(commands)

@@ -16,7 +16,7 @@ use crate::fit::{Identifiability, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::parameter::Parameter;
-use crate::problem::{Problem, Robust, RobustLoss};
+use crate::problem::{Effect, EffectDeclaration, JointKind, Problem, Robust, RobustLoss};
 
 /// An undeclared σ has settled when it changes by less than this part.
 const NOISE_SETTLED: f64 = 1e-3;
@@ -77,8 +77,25 @@ pub fn identify(
     identify_model(&model, problem, measurements, split, options)
 }
 
+/// Declared effects of which the measurements hold nothing are mistakes.
+fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
+    let slides = |joint: &usize| problem.joints[joint - 1].kind == JointKind::Prismatic;
+    for EffectDeclaration { effect, location } in &problem.effects {
+        let write = match effect {
+            effect if effect.is_thermal() && measurements.temperature.is_none() => "a column temperature_C",
+            Effect::Backlash { joint } if slides(joint) && measurements.approach.is_none() => "columns approach1, …",
+            _ => continue,
+        };
+        return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
+    }
+    Ok(())
+}
+
 /// As [`identify`], with a model of the problem that the caller has changed.
-pub(super) fn identify_model(
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify_model(
     model: &Model,
     problem: &Problem,
     measurements: &Measurements,
@@ -86,6 +103,7 @@ pub(super) fn identify_model(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let clock = Instant::now();
+    check_columns(problem, measurements)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
     if solver != SolverChoice::Bounded && model.is_bounded() {

@@ -21,7 +21,7 @@ pub use baseline::Baseline;
 pub use compare::{Comparison, compare};
 pub use compensate::{Command, compensate};
 pub use errors::{AxisValues, ErrorSummary};
-pub use identification::{IdentifyError, Options, identify};
+pub use identification::{IdentifyError, Options, identify, identify_model};
 pub use outcome::{Errors, Estimate, Identification, Noise};
 pub use outliers::Outlier;
 pub use placement::Placement;

@@ -2,7 +2,6 @@
 
 use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
-use crate::arm::{Equilibrated, Workspace};
 use crate::model::{Model, Pose};
 use crate::parameter::Slot;
 use crate::spatial::rotate;
@@ -15,10 +14,8 @@ const ON_A_LINE: f64 = 1e-12;
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4 × 4 matrix  [Horn 1987].
 pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
-    let arm = model.arm(|k| x[k]);
-    let targets = model.target_positions(x.as_slice());
+    let points = model.points(poses, x.as_slice());
     let nominal = model.base_poses(DVector::zeros(x.len()).as_slice());
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     for (base, nominal) in nominal.iter().enumerate() {
         let columns: Vec<(usize, usize)> = model
             .parameters
@@ -30,12 +27,8 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
                 _ => None,
             })
             .collect();
-        let mut points = Vec::new();
-        for pose in poses.iter().filter(|pose| pose.base == base) {
-            if arm.equilibrate(&pose.setup, &mut ws, &mut rest).is_ok() {
-                points.push((rest.frame.point(&targets[pose.target]), pose.measured));
-            }
-        }
+        let pairs = poses.iter().zip(&points).filter(|(pose, _)| pose.base == base);
+        let points: Vec<_> = pairs.filter_map(|(pose, point)| Some(((*point)?, pose.measured))).collect();
         if columns.len() < 6 || points.is_empty() {
             continue;
         }

@@ -68,7 +68,11 @@ impl Statistics {
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
-        let visible = Identifiability::of(&stage.data_triangle(&end.x)).visible;
+        let visible = if priors.iter().all(Option::is_some) {
+            vec![1.0; errors.len()]
+        } else {
+            Identifiability::of(&stage.data_triangle(&end.x)).visible
+        };
         let identified = (0..errors.len())
             .map(|j| match priors[j] {
                 _ if held[j] => 0.0,

@@ -159,6 +159,11 @@ impl Linear {
     /// What the fit gains by columns with this score.
     pub fn gain(&self, score: &Score) -> Option<Gain> {
         let (squares, freedom) = score.reduction()?;
+        self.gain_of(squares, freedom)
+    }
+
+    /// What a reduction of the sum of squares by so many new directions means.
+    pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let (total, degrees) = (self.squares(), self.freedom());
         let left = degrees - freedom as f64;
         if left < 1.0 {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::super::json::{Both, Summary, to_text};
-use super::super::{checks, effect};
+use super::super::{effect, findings};
 use crate::diagnosis::{Closure, Correction, Found, Interval, Step, Unexplained, Verdict};
 use crate::problem::Problem;
 use crate::study::{Estimate, Identification};
@@ -21,8 +21,8 @@ struct Document<'a> {
     effects: Vec<FoundEntry<'a>>,
     unexplained: Option<UnexplainedEntry<'a>>,
     steps: Vec<StepEntry<'a>>,
-    checks_before: Vec<checks::Entry<'a>>,
-    checks_after: Vec<checks::Entry<'a>>,
+    checks_before: Vec<findings::Entry<'a>>,
+    checks_after: Vec<findings::Entry<'a>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -171,7 +171,7 @@ pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
         effects: closure.effects.iter().map(FoundEntry::from).collect(),
         unexplained: closure.unexplained.as_ref().map(UnexplainedEntry::from),
         steps: closure.steps.iter().map(StepEntry::from).collect(),
-        checks_before: checks::entries(&closure.before.findings),
-        checks_after: checks::entries(&closure.findings),
+        checks_before: findings::entries(&closure.before.findings),
+        checks_after: findings::entries(&closure.findings),
     })
 }

@@ -3,7 +3,7 @@
 use super::super::document::{Block, Table, to_markdown};
 use super::super::parameters::{HEADER, LEFT, parameter_rows};
 use super::super::quantity::number;
-use super::super::{checks, trace};
+use super::super::{findings, trace};
 use super::parts;
 use crate::diagnosis::{Closure, Step};
 use crate::effect::describe;
@@ -27,14 +27,14 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
         Block::Table(parts::errors(closure)),
         Block::Text(parts::gain(closure)),
         Block::heading("What the declared problem leaves"),
-        Block::list(checks::all(&closure.before.findings)),
+        Block::list(findings::all(&closure.before.findings)),
     ];
     blocks.extend(trace::ranking(&closure.before, SHOWN));
     blocks.extend(rounds(closure));
     blocks.extend(parts::found(closure));
     blocks.push(Block::heading("What remains"));
     let unexplained = closure.unexplained.iter().flat_map(|rest| parts::unexplained(problem, rest));
-    blocks.push(Block::list(unexplained.chain(checks::all(&closure.findings))));
+    blocks.push(Block::list(unexplained.chain(findings::all(&closure.findings))));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.push(Block::Table(Table {
         header: HEADER.to_vec(),

@@ -21,9 +21,7 @@ pub(super) fn verdict(closure: &Closure) -> String {
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
         (_, false) => format!("{found}; whether structure is left could not be tested."),
-        (Verdict::NothingFound, true) => {
-            "Nothing found: the declared problem leaves nothing but noise that could be told from it.".to_owned()
-        }
+        (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
         (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
     }
 }
@@ -88,7 +86,7 @@ fn point(found: &Found) -> Point {
     let after = found.held_out_after;
     let mm = |value: f64| number(value * 1e3, 4);
     details.push(format!(
-        "{} that it is chance; held-out error once it was in the model: mean {} mm, rms {} mm",
+        "{}, the probability that it is chance; held-out error with it in the model: mean {} mm, rms {} mm",
         effect::p(found.p_value),
         mm(after.mean.norm),
         mm(after.rms.norm)

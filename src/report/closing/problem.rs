@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
-use super::super::effect::p;
+use super::super::effect::{p, value};
 use crate::diagnosis::{Closure, Found};
 use crate::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
@@ -21,18 +21,32 @@ pub fn closed_problem(
     closure: &Closure,
     files: &[PathBuf],
 ) -> Result<String, TomlError> {
+    let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
+    let closed = closure.closed.effects.iter().map(|declared| {
+        let found = closure.effects.iter().find(|found| found.effect == declared.effect);
+        (declared.effect.clone(), found.map(comments).unwrap_or_default())
+    });
+    edited(text, &declared, &closed.collect::<Vec<_>>(), files)
+}
+
+/// The text with the effects `closed`, each with comments, in the place of those `declared`.
+///
+/// The loop keeps what was declared in its order, gives it further orders at most, and adds behind it.
+fn edited(
+    text: &str,
+    declared: &[Effect],
+    closed: &[(Effect, Vec<String>)],
+    files: &[PathBuf],
+) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
         name_files(data, files);
     }
-    // The loop keeps what was declared in its order, gives it further orders at most, and adds behind it.
-    let declared = problem.effects.len();
-    for (k, effect) in closure.closed.effects.iter().map(|declared| &declared.effect).enumerate() {
-        let found = closure.effects.iter().find(|found| found.effect == *effect);
-        if k >= declared {
-            add(&mut document, effect, &found.map(comments).unwrap_or_default());
-        } else if problem.effects[k].effect != *effect {
-            replace(&mut document, k, effect);
+    for (k, (effect, comments)) in closed.iter().enumerate() {
+        match declared.get(k) {
+            Some(known) if known == effect => {}
+            Some(_) => replace(&mut document, k, effect),
+            None => add(&mut document, effect, comments),
         }
     }
     Ok(document.to_string())
@@ -123,12 +137,60 @@ fn arguments(effect: &Effect) -> Value {
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found) -> Vec<String> {
     let first = format!("Found by flexcal loop: {}, {}.", effect::describe(&found.effect), p(found.p_value));
-    let line = |estimate: &Estimate| {
-        let unit = estimate.unit.symbol();
-        match estimate.std_error {
-            Some(error) => format!("{} = {:.4e} ± {error:.1e} {unit}", estimate.name, estimate.estimate),
-            None => format!("{} = {:.4e} {unit}", estimate.name, estimate.estimate),
-        }
-    };
+    let line = |estimate: &Estimate| format!("{} = {}", estimate.name, value(estimate));
     std::iter::once(first).chain(found.estimates.iter().map(line)).collect()
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+mod tests {
+    use super::*;
+
+    const FILES: [&str; 1] = ["../data.csv"];
+
+    fn edit(text: &str, declared: &[Effect], closed: &[Effect]) -> String {
+        let closed: Vec<_> = closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
+        edited(text, declared, &closed, &FILES.map(PathBuf::from)).unwrap()
+    }
+
+    fn gear() -> Effect {
+        Effect::GearRatio { joint: 3 }
+    }
+
+    #[test]
+    fn what_was_written_stays() {
+        let text =
+            "name = \"x\" # a name\n\n[data]\nfiles = [\"data.csv\"] # measured in May\nsigma = 1\n\n# the end\n";
+        let expected = "name = \"x\" # a name\n\n[data]\nfiles = [\"../data.csv\"] # measured in May\nsigma = 1\n\n# the end\n\n\
+                        # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n[[effect]]\nhoist-force = true\n";
+        assert_eq!(edit(text, &[], &[gear(), Effect::HoistForce]), expected);
+        assert_eq!(edit(text, &[], &[]), text.replace("data.csv", "../data.csv"));
+    }
+
+    #[test]
+    fn effects_follow_those_declared() {
+        let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
+        let declared = [harmonic(&[1]), Effect::PayloadMass];
+        let closed = [harmonic(&[1, 2]), Effect::PayloadMass, gear()];
+        let text = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[[effect]]\npayload-mass = true\n\n[data]\nfiles = []\n";
+        let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[[effect]]\npayload-mass = true\n\n[data]\n\
+                        files = [\"../data.csv\"]\n\n# found\n[[effect]]\ngear-ratio = { joint = 3 }\n";
+        assert_eq!(edit(text, &declared, &closed), expected);
+        let text =
+            "effect = [{ joint-harmonic = { joint = 1, orders = [1] } }, { payload-mass = true }]\ndata.files = []\n";
+        let edited = edit(text, &declared, &closed);
+        let read: toml::Table = edited.parse().unwrap();
+        assert_eq!(read["effect"].as_array().unwrap().len(), 3, "{edited}");
+        assert_eq!(read["effect"][0]["joint-harmonic"]["orders"].as_array().unwrap().len(), 2);
+        assert_eq!(read["effect"][2]["gear-ratio"]["joint"].as_integer(), Some(3));
+        assert_eq!(read["data"]["files"][0].as_str(), Some("../data.csv"));
+    }
+
+    #[test]
+    fn other_ends_of_lines_do_no_harm() {
+        let text = "name = \"x\"\r\n[data]\r\nfiles = [\"data.csv\"]\r\n";
+        let read: toml::Table = edit(text, &[], &[gear()]).parse().unwrap();
+        assert_eq!(read["effect"][0]["gear-ratio"]["joint"].as_integer(), Some(3));
+        assert!(edited("name = ", &[], &[], &[]).is_err());
+    }
 }

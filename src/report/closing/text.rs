@@ -1,7 +1,7 @@
 //! What `loop` prints.
 
-use super::super::checks;
 use super::super::document::{Block, to_text};
+use super::super::findings;
 use super::parts;
 use crate::diagnosis::Closure;
 use crate::problem::Problem;
@@ -16,13 +16,13 @@ pub fn loop_text(problem: &Problem, closure: &Closure) -> String {
         Block::Table(parts::errors(closure)),
         Block::Text(parts::gain(closure)),
     ];
-    let failed = checks::failed(&closure.before.findings);
+    let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
         blocks.push(Block::heading("What the declared problem leaves (checks that failed)"));
         blocks.push(Block::list(failed));
     }
     blocks.extend(parts::found(closure));
-    let failed = checks::failed(&closure.findings);
+    let failed = findings::failed(&closure.findings);
     if closure.unexplained.is_some() || (!failed.is_empty() && !closure.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
         let unexplained = closure.unexplained.iter().flat_map(|rest| parts::unexplained(problem, rest));

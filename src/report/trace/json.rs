@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::super::json::{Both, to_text};
-use super::super::{checks, effect};
+use super::super::{effect, findings};
 use crate::diagnosis::{Ranked, Trace};
 use crate::problem::{Effect, Problem};
 
@@ -16,7 +16,7 @@ struct Document<'a> {
     reduced_chi2: Option<f64>,
     /// Whether the checks see structure that an effect could explain.
     structured: bool,
-    checks: Vec<checks::Entry<'a>>,
+    checks: Vec<findings::Entry<'a>>,
     /// Candidates tried, orders and times counted.
     tried: usize,
     /// The p below which a candidate stands out.
@@ -84,7 +84,7 @@ pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
         fitted: (&trace.fit.fitted).into(),
         reduced_chi2: trace.fit.reduced_chi2,
         structured: trace.findings.is_structured(),
-        checks: checks::entries(&trace.findings),
+        checks: findings::entries(&trace.findings),
         tried: trace.tried,
         level: trace.level,
         ranking: trace.ranking.iter().map(RankedEntry::from).collect(),

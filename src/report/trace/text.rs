@@ -2,7 +2,7 @@
 
 use super::super::document::{Block, Point, to_text};
 use super::super::quantity::number;
-use super::super::{checks, effect};
+use super::super::{effect, findings};
 use crate::diagnosis::{Ranked, Trace};
 use crate::problem::Problem;
 use crate::study::Identification;
@@ -17,7 +17,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     let mut blocks = vec![
         Block::Text(headline(problem, &trace.fit)),
         Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
-        Block::list(checks::all(&trace.findings)),
+        Block::list(findings::all(&trace.findings)),
     ];
     blocks.extend(ranking(trace, SHOWN));
     blocks.extend(not_seen(trace));
@@ -79,7 +79,11 @@ pub(in crate::report) fn ranking(trace: &Trace, most: usize) -> Vec<Block> {
 
 fn point(ranked: &Ranked) -> Point {
     let mm = |gain: f64| number(gain * 1e3, 4);
-    let mut gain = format!("{}; takes {} mm off the rms error", effect::p(ranked.p_value), mm(ranked.gain));
+    let mut gain = format!(
+        "{}; would take {} mm off the rms error of the identification poses",
+        effect::p(ranked.p_value),
+        mm(ranked.gain)
+    );
     if let Some(cross_validated) = ranked.cross_validated {
         gain.push_str(&format!(", {} mm on poses left out in turn", mm(cross_validated)));
     }

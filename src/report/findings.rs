@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::diagnosis::{Check, Findings};
+use crate::diagnosis::{Check, Findings, Test};
 
 /// One check.
 #[derive(Debug, Serialize)]
@@ -44,19 +44,20 @@ pub(super) fn failed(findings: &Findings) -> Vec<String> {
     findings.checks.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// Every check in words with its verdict, those that failed first.
+/// Every check in words with its verdict: those that failed, those that passed, those that could not be made.
 pub(super) fn all(findings: &Findings) -> Vec<String> {
-    let verdict = |check: &&Check| match (&check.outcome, check.failed()) {
-        (_, true) => 0,
-        (Ok(_), false) => 1,
-        (Err(_), false) => 2,
-    };
-    let mut checks: Vec<&Check> = findings.checks.iter().collect();
-    checks.sort_by_key(verdict);
-    let words = |check: &Check| match verdict(&check) {
-        0 => format!("failed: {check}"),
-        1 => format!("passed: {check}"),
-        _ => check.to_string(),
-    };
-    checks.into_iter().map(words).collect()
+    let checks = findings.checks.iter();
+    let mut lines: Vec<String> =
+        checks.clone().filter(|check| check.failed()).map(|check| format!("failed: {check}")).collect();
+    let passed = checks.clone().filter(|check| check.outcome.is_ok() && !check.failed());
+    // Drivers that nothing depends on fill one line.
+    let (free, other): (Vec<&Check>, Vec<&Check>) =
+        passed.partition(|check| matches!(check.test, Test::Dependence { .. }));
+    lines.extend(other.iter().map(|check| format!("passed: {check}")));
+    if !free.is_empty() {
+        let drivers: Vec<&str> = free.iter().filter_map(|check| check.about()).collect();
+        lines.push(format!("passed: residuals do not depend beyond chance on {}", drivers.join(", ")));
+    }
+    lines.extend(checks.filter(|check| check.outcome.is_err()).map(ToString::to_string));
+    lines
 }

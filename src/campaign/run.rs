@@ -1,0 +1,98 @@
+//! Doing the fits of a study, and putting its parts together.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::part::{Part, Shard};
+use super::plan::Campaign;
+use super::results::{CellResult, Results};
+use super::store::{Kept, Store, StoreError};
+use super::tally::Tally;
+
+/// Why a study has no results.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum RunError {
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error(
+        "{missing} of {parts} parts of the study are missing in {}; run the study or the shards that lack",
+        list(folders)
+    )]
+    Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
+}
+
+/// The parts of a share that are not in the store yet.
+///
+/// # Errors
+/// A kept part cannot be read.
+pub fn pending(campaign: &Campaign, store: &Store, shard: Shard) -> Result<Vec<Part>, StoreError> {
+    let mut pending = Vec::new();
+    for (_, part) in campaign.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index)) {
+        if store.find(campaign, &part)?.is_none() {
+            pending.push(part);
+        }
+    }
+    Ok(pending)
+}
+
+/// Does the fits of `parts` on every thread there is and keeps each part as soon as it is finished; calls `fitted` after
+/// each fit.
+///
+/// # Errors
+/// A part cannot be kept.
+pub fn run(campaign: &Campaign, store: &Store, parts: &[Part], fitted: impl Fn() + Sync) -> Result<(), StoreError> {
+    let run_part = |part: &Part| {
+        let cell = &campaign.cells[part.cell];
+        let problem = campaign.problem_of(cell);
+        let fit = |repetition| {
+            let score = campaign.fit(&problem, cell, repetition);
+            fitted();
+            score
+        };
+        let fits: Vec<_> = part.repetitions.clone().into_par_iter().map(fit).collect();
+        let mut tally = Tally::new(campaign.parameters.len());
+        let mut seconds = Vec::with_capacity(fits.len());
+        for (score, time) in fits {
+            tally.push(score);
+            seconds.push(time);
+        }
+        store.keep(&Kept::new(campaign, part, tally, seconds))
+    };
+    parts.par_iter().try_for_each(run_part)
+}
+
+/// The results of a study whose parts are all in one of `stores`, added up in the order of the parts.
+///
+/// # Errors
+/// A part is missing or cannot be read.
+pub fn collect(campaign: &Campaign, stores: &[Store]) -> Result<Results, RunError> {
+    let empty =
+        |cell: &_| CellResult { cell: *cell, tally: Tally::new(campaign.parameters.len()), seconds: Vec::new() };
+    let mut cells: Vec<CellResult> = campaign.cells.iter().map(empty).collect();
+    let parts = campaign.parts();
+    let mut missing = 0;
+    for part in &parts {
+        let mut kept = None;
+        for store in stores {
+            kept = kept.or(store.find(campaign, part)?);
+        }
+        match kept {
+            Some(kept) => {
+                cells[part.cell].tally.merge(&kept.tally);
+                cells[part.cell].seconds.extend(kept.seconds);
+            }
+            None => missing += 1,
+        }
+    }
+    if missing > 0 {
+        let folders = stores.iter().map(|store| store.folder().to_owned()).collect();
+        return Err(RunError::Incomplete { missing, parts: parts.len(), folders });
+    }
+    Ok(Results { cells })
+}
+
+fn list(folders: &[PathBuf]) -> String {
+    folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,105 @@
+//! `flexcal check`.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::{Args, value_parser};
+use flexcal::design::{self, Judged};
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::report;
+
+use super::input::Common;
+use super::poses::Source;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal check`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Which poses: --candidates names a table (with --poses: N of its rows, drawn at random); --poses alone draws \
+within the limits of the joints or the ranges of a TRUTH.toml; without both they are those of the measurements.
+
+Examples:
+  flexcal check problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
+  flexcal check my-arm --candidates out/my-arm/plan.csv
+  flexcal check problems/lunar-sampler --json"
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// Number of poses to draw
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=10_000))]
+    poses: Option<u32>,
+    #[command(flatten)]
+    source: Source,
+}
+
+/// A check that has no poses.
+#[derive(Debug, thiserror::Error)]
+enum PosesError {
+    #[error("no poses to check; give --poses N, --candidates FILE.csv, or measurements with --data")]
+    None,
+    #[error("--poses {poses}: the tables of --candidates have only {rows} rows")]
+    TooMany { poses: usize, rows: usize },
+    #[error("--data and --candidates both name poses; keep one of the two")]
+    Twice,
+}
+
+/// Checks, writes `check.json`, and prints what is to be expected.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let problem = Problem::read(&common.problem)?;
+    let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
+    let json = report::check_json(&problem, &check);
+    let path = output::write(&common.folder(&problem), "check.json", &json)?;
+    if common.json {
+        output::print(&json)?;
+    } else if common.talks() {
+        output::print(&report::check_text(&problem, &check))?;
+        output::print(&format!("\nWritten to {}\n", path.display()))?;
+    }
+    if check.suffices() {
+        return Ok(Outcome::Done);
+    }
+    if !common.quiet {
+        diagnostic::warn("these poses leave parameters without a prior undecided: more poses are needed");
+    }
+    Ok(Outcome::NotTrusted)
+}
+
+/// The poses that the arguments mean.
+fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Error>> {
+    let Arguments { common, poses, source } = arguments;
+    let poses = poses.map(|poses| poses as usize);
+    let table = source.table(problem, common.quiet)?;
+    match (table, poses) {
+        (Some(_), _) if !common.data.is_empty() => Err(PosesError::Twice.into()),
+        (Some(table), poses) => {
+            let rows = table.len();
+            let poses = match poses {
+                Some(poses) if poses > rows => return Err(PosesError::TooMany { poses, rows }.into()),
+                Some(poses) => design::some_of(&table, poses, source.seed),
+                None => table,
+            };
+            Ok(Judged::Table { poses: Box::new(poses), within: source.known_ranges(problem)?, held_out: None })
+        }
+        (None, Some(poses)) => Ok(Judged::Drawn(source.ranges(problem)?, poses)),
+        (None, None) => {
+            let files: &[PathBuf] = if common.data.is_empty() { &problem.data.files } else { &common.data };
+            if files.is_empty() {
+                return Err(PosesError::None.into());
+            }
+            let (measured, warnings) = Measurements::read_poses(files, problem)?;
+            if !common.quiet {
+                diagnostic::print_warnings(&warnings);
+            }
+            let split = Split::new(problem, &measured)?;
+            let held_out = design::with_known_words(&measured, &split);
+            Ok(Judged::Table {
+                poses: Box::new(measured.select(&split.identification)),
+                within: source.known_ranges(problem)?,
+                held_out: (!held_out.is_empty()).then(|| Box::new(measured.select(&held_out))),
+            })
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! `flexcal man`.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::{Args, Command, CommandFactory as _};
+use clap_mangen::Man;
+
+use super::{Cli, Outcome, output};
+
+/// Arguments of `flexcal man`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal man | man -l -
+  flexcal man --out ~/.local/share/man/man1")]
+pub struct Arguments {
+    /// Write the page of every command to this folder (flexcal.1, flexcal-identify.1, …), and print nothing
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Prints the manual page, or writes those of all commands.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let mut flexcal = Cli::command().disable_help_subcommand(true);
+    flexcal.build();
+    let Some(folder) = &arguments.out else {
+        output::print(&page(flexcal)?)?;
+        return Ok(Outcome::Done);
+    };
+    for command in flexcal.get_subcommands() {
+        let name = format!("flexcal-{}", command.get_name());
+        output::write(folder, &format!("{name}.1"), &page(command.clone().display_name(name))?)?;
+    }
+    output::write(folder, "flexcal.1", &page(flexcal)?)?;
+    Ok(Outcome::Done)
+}
+
+/// The manual page of a command.
+fn page(command: Command) -> Result<String, std::io::Error> {
+    let mut page = Vec::new();
+    Man::new(command).render(&mut page)?;
+    Ok(String::from_utf8_lossy(&page).into_owned())
+}

@@ -1,0 +1,121 @@
+//! `flexcal plan`.
+
+use std::error::Error;
+
+use clap::{Args, ValueEnum, value_parser};
+use flexcal::design::{self, Candidates, Criterion, PlanOptions, PlanProgress};
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+use flexcal::report;
+
+use super::input::Common;
+use super::poses::Source;
+use super::progress::Line;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal plan`.
+#[derive(Debug, Args)]
+#[command(
+    mut_arg("data", |arg| arg.help("Measurements that are there already: the plan completes them")),
+    after_help = "Poses are sought within the limits of the joints, in the ranges of [poses] of a TRUTH.toml, or among the rows of \
+a table. The plan is plan.csv: measure it, add the columns x_mm, y_mm, z_mm, and identify.
+
+Examples:
+  flexcal plan problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
+  flexcal plan my-arm --poses 40 --candidates reachable.csv --criterion D
+  flexcal plan my-arm --poses 10 --data first.csv --seed 7"
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// Number of poses to measure
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=10_000))]
+    poses: u32,
+    /// What to make small
+    #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
+    criterion: CriterionArgument,
+    #[command(flatten)]
+    source: Source,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CriterionArgument {
+    /// The geometric mean of the standard errors
+    #[value(name = "S")]
+    S,
+    /// The mean variance, each parameter's in units of what average poses leave of it
+    #[value(name = "A")]
+    A,
+    /// The volume of the confidence ellipsoid
+    #[value(name = "D")]
+    D,
+    /// The largest variance of any combination, in units of what average poses leave of it
+    #[value(name = "E")]
+    E,
+}
+
+impl From<CriterionArgument> for Criterion {
+    fn from(argument: CriterionArgument) -> Self {
+        match argument {
+            CriterionArgument::S => Self::S,
+            CriterionArgument::A => Self::A,
+            CriterionArgument::D => Self::D,
+            CriterionArgument::E => Self::E,
+        }
+    }
+}
+
+/// Plans, writes `plan.csv` and `plan.json`, and prints what the plan promises.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let (common, source) = (&arguments.common, &arguments.source);
+    let problem = Problem::read(&common.problem)?;
+    let candidates = match source.table(&problem, common.quiet)? {
+        Some(rows) => Candidates::Rows(Box::new(rows)),
+        None => Candidates::Within(source.ranges(&problem)?),
+    };
+    let given = if common.data.is_empty() {
+        None
+    } else {
+        let (given, warnings) = Measurements::read_poses(&common.data, &problem)?;
+        if !common.quiet {
+            diagnostic::print_warnings(&warnings);
+        }
+        Some(given)
+    };
+    let criterion = Criterion::from(arguments.criterion);
+    let line = common.talks().then(Line::new);
+    let show = |PlanProgress { start, sweep, value }: PlanProgress| {
+        if let Some(line) = &line {
+            let what = start.map_or_else(|| "refining".to_owned(), |start| format!("start {start}"));
+            line.say(|| format!("{what}, sweep {sweep}: ln of the criterion {value:.4}"));
+        }
+    };
+    let options = PlanOptions {
+        poses: arguments.poses as usize,
+        criterion: &criterion,
+        seed: source.seed,
+        progress: Some(&show),
+    };
+    let result = design::plan(&problem, &candidates, given.as_ref(), &options);
+    if let Some(line) = &line {
+        line.clear();
+    }
+    let plan = result?;
+    let folder = common.folder(&problem);
+    let json = report::plan_json(&problem, &criterion, source.seed, &plan);
+    let path = output::write(&folder, "plan.csv", &report::poses_csv(&problem, &plan.poses))?;
+    output::write(&folder, "plan.json", &json)?;
+    if common.json {
+        output::print(&json)?;
+    } else if common.talks() {
+        output::print(&report::plan_text(&problem, &criterion, &plan))?;
+        output::print(&format!("\nWritten to {}, what it promises to plan.json beside it\n", path.display()))?;
+    }
+    if plan.suffices {
+        return Ok(Outcome::Done);
+    }
+    if !common.quiet {
+        diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
+    }
+    Ok(Outcome::NotTrusted)
+}

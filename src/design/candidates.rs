@@ -1,0 +1,235 @@
+//! Poses that might be measured.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::DesignError;
+use crate::measurement::{Labels, Measurements};
+use crate::problem::{JointKind, Problem};
+
+/// Angles are commanded in steps of this [°].
+const ANGLE_STEP: f64 = 1e-4;
+/// Lengths are commanded in steps of this [m].
+const LENGTH_STEP: f64 = 1e-6;
+/// Forces and temperatures are set in steps of this [N], [°C].
+const SETTING_STEP: f64 = 0.1;
+
+/// From where poses are drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranges {
+    /// Range of each joint, shape = (joints) [rad] or [m]; not used at fixed joints.
+    pub joints: Vec<(f64, f64)>,
+    /// Payloads to choose from [kg]; empty: as the problem declares.
+    pub payloads: Vec<f64>,
+    /// Range of the hoist's force [N]; `None`: as the problem declares.
+    pub hoist: Option<(f64, f64)>,
+    /// Range of the temperature [°C]; `None`: not known.
+    pub temperature: Option<(f64, f64)>,
+    /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
+    pub approach: bool,
+}
+
+/// Whether poses at the ends of the ranges are preferred.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extremes {
+    /// Every quantity evenly within its range.
+    No,
+    /// Every quantity at one of its ends as often as within its range.
+    Often,
+}
+
+impl Ranges {
+    /// The limits of the joints that the problem declares.
+    ///
+    /// # Errors
+    /// A moving joint has no limits.
+    pub fn of(problem: &Problem) -> Result<Self, DesignError> {
+        for (index, joint) in problem.joints.iter().enumerate() {
+            let (min, max) = joint.limits;
+            if joint.kind != JointKind::Fixed && !(min.is_finite() && max.is_finite()) {
+                let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };
+                let file = problem.data.location.file.clone();
+                return Err(DesignError::NoRange { file, joint: index + 1, unit });
+            }
+        }
+        let joints = problem.joints.iter().map(|joint| joint.limits).collect();
+        Ok(Self { joints, payloads: Vec::new(), hoist: None, temperature: None, approach: false })
+    }
+
+    /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by
+    /// itself; positions are zero.
+    pub fn draw(&self, problem: &Problem, count: usize, extremes: Extremes, seed: u64, stream: u64) -> Measurements {
+        let mut random = stream_of(seed, stream);
+        let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
+            let (kind, within) = (random.random::<f64>(), random.random::<f64>());
+            match extremes {
+                Extremes::Often if kind < 0.25 => from,
+                Extremes::Often if kind < 0.5 => to,
+                _ => from + (to - from) * within,
+            }
+        };
+        let mut drawn = Table::new(self, problem.joints.len());
+        for _ in 0..count {
+            let joints = self.joints.iter().map(|&range| value(&mut random, range)).collect();
+            let choice = value(&mut random, (0.0, 1.0));
+            let hoist = self.hoist.map(|range| value(&mut random, range));
+            let temperature = self.temperature.map(|range| value(&mut random, range));
+            let sides = self.joints.iter().map(|_| random.random()).collect();
+            drawn.push(problem, &Draft { joints, choice, hoist, temperature, sides });
+        }
+        drawn.finish()
+    }
+
+    /// For each row of `poses` itself and `count` others near it: about half of its quantities moved by up to `reach` of
+    /// their range, and now and then another payload or side.
+    pub(super) fn vary(
+        &self,
+        problem: &Problem,
+        poses: &Measurements,
+        count: usize,
+        reach: f64,
+        (seed, stream): (u64, u64),
+    ) -> Measurements {
+        let mut random = stream_of(seed, stream);
+        let mut drawn = Table::new(self, problem.joints.len());
+        for row in 0..poses.len() {
+            let own = Draft::of(self, poses, row);
+            drawn.push(problem, &own);
+            for _ in 0..count {
+                let mut next = own.clone();
+                let mut near = |value: &mut f64, (from, to): (f64, f64)| {
+                    let (moves, step) = (random.random::<bool>(), 2.0 * random.random::<f64>() - 1.0);
+                    if moves {
+                        *value = (*value + step * reach * (to - from)).clamp(from, to);
+                    }
+                };
+                next.joints.iter_mut().zip(&self.joints).for_each(|(q, &range)| near(q, range));
+                next.hoist.iter_mut().zip(&self.hoist).for_each(|(force, &range)| near(force, range));
+                next.temperature.iter_mut().zip(&self.temperature).for_each(|(degrees, &range)| near(degrees, range));
+                if random.random::<f64>() < 0.25 {
+                    next.choice = random.random();
+                }
+                for side in &mut next.sides {
+                    *side ^= random.random::<f64>() < 0.25;
+                }
+                drawn.push(problem, &next);
+            }
+        }
+        drawn.finish()
+    }
+}
+
+fn stream_of(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    random
+}
+
+/// A pose as it is drawn.
+#[derive(Clone)]
+struct Draft {
+    /// [rad] or [m].
+    joints: Vec<f64>,
+    /// Place among the payloads, 0…1.
+    choice: f64,
+    hoist: Option<f64>,
+    temperature: Option<f64>,
+    /// Whether each joint comes from above.
+    sides: Vec<bool>,
+}
+
+impl Draft {
+    /// A row that was drawn from these ranges.
+    fn of(ranges: &Ranges, poses: &Measurements, row: usize) -> Self {
+        let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+        let place = at(&poses.payload)
+            .and_then(|mass| ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits()));
+        let n = poses.joints;
+        let sides = poses.approach.as_ref().map_or_else(
+            || vec![false; n],
+            |sides| sides[row * n..(row + 1) * n].iter().map(|&side| side > 0.0).collect(),
+        );
+        Self {
+            joints: poses.configuration(row).to_vec(),
+            choice: (place.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,
+            hoist: at(&poses.hoist),
+            temperature: at(&poses.temperature),
+            sides,
+        }
+    }
+}
+
+/// Poses as they are drawn, in steps that a controller can be given.
+struct Table<'a> {
+    ranges: &'a Ranges,
+    joints: usize,
+    configurations: Vec<f64>,
+    payload: Vec<f64>,
+    hoist: Vec<f64>,
+    temperature: Vec<f64>,
+    approach: Vec<f64>,
+}
+
+impl<'a> Table<'a> {
+    fn new(ranges: &'a Ranges, joints: usize) -> Self {
+        let (configurations, payload, hoist, temperature, approach) = Default::default();
+        Self { ranges, joints, configurations, payload, hoist, temperature, approach }
+    }
+
+    fn push(&mut self, problem: &Problem, draft: &Draft) {
+        for (k, joint) in problem.joints.iter().enumerate() {
+            let ((from, to), q) = (self.ranges.joints[k], draft.joints[k]);
+            let q = match joint.kind {
+                JointKind::Fixed => 0.0,
+                JointKind::Prismatic => rounded(q, LENGTH_STEP, (from, to)),
+                JointKind::Revolute => {
+                    rounded(q.to_degrees(), ANGLE_STEP, (from.to_degrees(), to.to_degrees())).to_radians()
+                }
+            };
+            self.configurations.push(q);
+            self.approach.push(match joint.kind {
+                JointKind::Fixed => 0.0,
+                _ if draft.sides[k] => 1.0,
+                _ => -1.0,
+            });
+        }
+        let choices = self.ranges.payloads.len();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down to an index")]
+        let choice = (draft.choice * choices as f64) as usize;
+        self.payload.extend(self.ranges.payloads.get(choice.min(choices.saturating_sub(1))));
+        let set = |value: Option<f64>, range: Option<(f64, f64)>| Some(rounded(value?, SETTING_STEP, range?));
+        self.hoist.extend(set(draft.hoist, self.ranges.hoist));
+        self.temperature.extend(set(draft.temperature, self.ranges.temperature));
+    }
+
+    fn finish(self) -> Measurements {
+        let count = self.configurations.len() / self.joints.max(1);
+        Measurements {
+            files: vec![PathBuf::from("plan.csv")],
+            origin: (2_u32..).take(count).map(|line| (0, line)).collect(),
+            joints: self.joints,
+            configurations: self.configurations,
+            positions: vec![Vector3::zeros(); count],
+            sigma: None,
+            payload: (!self.ranges.payloads.is_empty()).then_some(self.payload),
+            hoist: self.ranges.hoist.map(|_| self.hoist),
+            temperature: self.ranges.temperature.map(|_| self.temperature),
+            time: (0_u32..).take(count).map(f64::from).collect(),
+            time_measured: false,
+            approach: self.ranges.approach.then_some(self.approach),
+            session: Labels { names: vec![String::new()], of_row: vec![0; count] },
+            target: None,
+            marked_held_out: None,
+        }
+    }
+}
+
+/// The multiple of `step` nearest to `value`, or `value` where that leaves the range.
+fn rounded(value: f64, step: f64, (from, to): (f64, f64)) -> f64 {
+    let steps = step.recip().round();
+    let rounded = (value * steps).round() / steps;
+    if (from..=to).contains(&rounded) { rounded } else { value }
+}

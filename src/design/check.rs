@@ -1,0 +1,158 @@
+//! What measurements in given poses will tell, before anyone makes them.
+//!
+//! Rank, blind combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
+//! drawn from the priors.
+
+use super::plan::choose;
+use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
+use crate::error::InputErrorKind;
+use crate::measurement::{Measurements, Split};
+use crate::problem::Problem;
+use crate::study::Placement;
+
+/// Poses in which predictions are judged.
+const WORKSPACE: usize = 500;
+/// Length of the series that shows what more poses would bring.
+const SERIES: usize = 384;
+/// Arms drawn from the priors, least and most; as many poses together as these, if that lies between.
+const ARMS: (usize, usize) = (16, 200);
+const ARM_POSES: usize = 20_000;
+/// Streams of random numbers of one seed.
+const POSES: u64 = 0;
+const ELSEWHERE: u64 = 10;
+const ORDER: u64 = 11;
+const ARM: u64 = 12;
+
+/// Which poses are to be judged.
+#[derive(Debug, Clone)]
+pub enum Judged {
+    /// So many, drawn evenly within ranges.
+    Drawn(Ranges, usize),
+    /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in the rows themselves.
+    Table {
+        /// The poses.
+        poses: Box<Measurements>,
+        /// Ranges in which predictions count.
+        within: Option<Ranges>,
+        /// Rows in which predictions count, where no ranges are known.
+        held_out: Option<Box<Measurements>>,
+    },
+}
+
+/// Where predictions are judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Elsewhere {
+    /// In poses drawn evenly within the ranges.
+    Ranges,
+    /// In the rows held out.
+    HeldOut,
+    /// In the poses themselves.
+    Same,
+}
+
+/// What measurements in some poses will tell.
+#[derive(Debug, Clone)]
+pub struct Check {
+    /// Of these poses.
+    pub forecast: Forecast,
+    /// Error of the arm identified from them, elsewhere.
+    pub prediction: Prediction,
+    /// Where that is.
+    pub elsewhere: Elsewhere,
+    /// Root mean square length of the error of one measured position [m].
+    pub noise: f64,
+    /// Of the first n of a series of such poses.
+    pub growth: Growth,
+    /// Measured coordinates.
+    pub coordinates: usize,
+    /// Free parameters without a prior.
+    pub without_prior: usize,
+}
+
+/// Judges poses.
+///
+/// # Errors
+/// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of a table.
+pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, DesignError> {
+    let draw = |ranges: &Ranges, count, stream| ranges.draw(problem, count, Extremes::No, seed, stream);
+    let (series, count, workspace, elsewhere) = match judged {
+        Judged::Drawn(ranges, count) => {
+            let series = draw(ranges, SERIES.max(2 * count), POSES);
+            (series, *count, draw(ranges, WORKSPACE, ELSEWHERE), Elsewhere::Ranges)
+        }
+        Judged::Table { poses, within, held_out } => {
+            let series = poses.select(&choose(poses.len(), poses.len(), seed, ORDER));
+            let (workspace, elsewhere) = match (within, held_out) {
+                (Some(ranges), _) => (draw(ranges, WORKSPACE, ELSEWHERE), Elsewhere::Ranges),
+                (None, Some(rows)) => (rows.as_ref().clone(), Elsewhere::HeldOut),
+                (None, None) => (poses.as_ref().clone(), Elsewhere::Same),
+            };
+            (series, poses.len(), workspace, elsewhere)
+        }
+    };
+    let site = Site::new(problem, &[&series])?;
+    let parameters = &site.model.parameters;
+    let (series, told) = match judged {
+        Judged::Drawn(..) => site.at_rest(&series),
+        Judged::Table { .. } => {
+            let all = site.sensitivity(&series, None);
+            if let Some(row) = (0..all.len()).find(|&row| !all.is_finite(row)) {
+                return Err(series.location(row).error(InputErrorKind::NoEquilibrium).into());
+            }
+            (series, all)
+        }
+    };
+    if told.len() < count {
+        return Err(DesignError::NoEquilibrium);
+    }
+    let poses = series.select(&(0..count).collect::<Vec<_>>());
+    let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
+    let noise = noise(problem, &series);
+    let forecast = Forecast::new(parameters, &told.select(&(0..count).collect::<Vec<_>>()));
+    let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));
+    Ok(Check {
+        prediction: forecast.prediction(&workspace),
+        forecast: forecast.over(parameters, &arms),
+        elsewhere,
+        noise,
+        growth: Growth::new(parameters, &told, &workspace, noise, count),
+        coordinates: 3 * count,
+        without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
+    })
+}
+
+impl Check {
+    /// Whether the poses decide every parameter as far as poses of their kind can.
+    pub fn suffices(&self) -> bool {
+        self.coordinates >= self.without_prior && self.forecast.open == self.growth.open
+    }
+}
+
+/// `count` rows of a table, drawn at random; the same for the same seed.
+pub fn some_of(table: &Measurements, count: usize, seed: u64) -> Measurements {
+    table.select(&choose(table.len(), count, seed, ORDER))
+}
+
+/// The held-out rows of sessions and targets that identification rows use as well: those in which predictions can be judged.
+pub fn with_known_words(measurements: &Measurements, split: &Split) -> Vec<usize> {
+    let placement = Placement::of(measurements);
+    let known = |of: fn(&Placement, usize) -> usize, row: usize| {
+        split.identification.iter().any(|&own| of(&placement, own) == of(&placement, row))
+    };
+    let judges = |&row: &usize| known(Placement::base_of, row) && known(Placement::target_of, row);
+    split.held_out.iter().copied().filter(judges).collect()
+}
+
+fn finite(all: &Sensitivity) -> Sensitivity {
+    all.select(&(0..all.len()).filter(|&row| all.is_finite(row)).collect::<Vec<_>>())
+}
+
+/// √3 σ, of the mean σ² of the rows.
+fn noise(problem: &Problem, table: &Measurements) -> f64 {
+    let declared = problem.data.position_sigma.unwrap_or(1.0);
+    let squares = match &table.sigma {
+        Some(sigmas) => sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len().max(1) as f64,
+        None => declared * declared,
+    };
+    (3.0 * squares).sqrt()
+}

@@ -1,0 +1,53 @@
+//! What keeps a design from being made.
+
+use std::path::PathBuf;
+
+use crate::error::InputError;
+
+/// Why there is no plan and no forecast.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// Problem and poses do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A joint may go anywhere.
+    #[error(
+        "{}: joint[{joint}].min_{unit}: missing; write min_{unit} and max_{unit} of every moving joint, or name a TRUTH.toml \
+         with --truth whose [poses] say where to draw, or a table of poses with --candidates",
+        file.display()
+    )]
+    NoRange {
+        /// The problem file.
+        file: PathBuf,
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Suffix of its unit.
+        unit: &'static str,
+    },
+    /// Nothing says how exact positions will be.
+    #[error(
+        "{}: data.position_sigma_mm: missing; write the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)",
+        file.display()
+    )]
+    NoSigma {
+        /// The problem file.
+        file: PathBuf,
+    },
+    /// No parameter is free.
+    #[error("{}: parameters: no parameter is free, so there is nothing to identify", file.display())]
+    NothingFree {
+        /// The problem file.
+        file: PathBuf,
+    },
+    /// Fewer candidates than poses.
+    #[error("--poses {poses}: there are only {candidates} candidates")]
+    TooFewCandidates {
+        /// Poses asked for.
+        poses: usize,
+        /// Candidates in which the arm comes to rest.
+        candidates: usize,
+    },
+    /// The nominal arm does not come to rest anywhere.
+    #[error("the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses")]
+    NoEquilibrium,
+}

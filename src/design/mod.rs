@@ -1,0 +1,28 @@
+//! Design of experiments: which poses to measure, and what measurements will tell before anyone makes them.
+//!
+//! Everything here is linear about the nominal arm. M = Σ JᵢᵀJᵢ + P is the information on the free parameters: Jᵢ the
+//! derivatives of a position over its σ (3 rows a pose), P = diag(1/σ²) of the priors; C = M⁻¹ is the covariance to expect.
+//! Positions need not be measured for that.
+
+mod candidates;
+mod check;
+mod criterion;
+mod error;
+mod exchange;
+mod forecast;
+mod growth;
+mod plan;
+mod scan;
+mod sensitivity;
+mod site;
+
+pub use candidates::{Extremes, Ranges};
+pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
+pub use criterion::Criterion;
+pub use error::DesignError;
+pub use exchange::{Exchange, Exchanged};
+pub use forecast::{Expected, Forecast, Prediction};
+pub use growth::{Growth, GrowthStep};
+pub use plan::{Candidates, Plan, PlanOptions, PlanProgress, plan};
+pub use sensitivity::Sensitivity;
+pub use site::Site;

@@ -1,0 +1,101 @@
+//! What each pose says about each parameter.
+
+use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
+
+use crate::fit::{Block, LeastSquares as _, Triangle};
+use crate::model::{Model, Pose, PoseResiduals};
+
+/// Poses differentiated together.
+const TOGETHER: usize = 64;
+
+/// Derivatives of the measured coordinates of some poses, over their σ, with respect to every free parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensitivity {
+    /// Jᵀ, shape = (parameters, 3 · poses) [1 / unit of x]; not finite where a pose has no equilibrium.
+    pub rows: DMatrix<f64>,
+}
+
+impl Sensitivity {
+    /// Of `poses` at the full parameter vector `at`; what was measured there does not matter.
+    pub fn of(model: &Model, poses: &[Pose], at: &DVector<f64>) -> Self {
+        let n = model.parameters.len();
+        let residuals = PoseResiduals::new(model, poses.to_vec(), (0..n).collect(), at.clone());
+        let starts: Vec<usize> = (0..poses.len()).step_by(TOGETHER).collect();
+        let blocks: Vec<(usize, Block)> = starts
+            .into_par_iter()
+            .map(|start| {
+                let items = start..(start + TOGETHER).min(poses.len());
+                let mut block = Block::zeros(3 * items.len(), n);
+                residuals.linearise(at, items, &mut block);
+                (start, block)
+            })
+            .collect();
+        let mut rows = DMatrix::zeros(n, 3 * poses.len());
+        for (start, block) in blocks {
+            for j in 0..n {
+                for (k, value) in block.column(j).iter().enumerate() {
+                    rows[(j, 3 * start + k)] = *value;
+                }
+            }
+        }
+        Self { rows }
+    }
+
+    /// Number of poses.
+    pub fn len(&self) -> usize {
+        self.rows.ncols() / 3
+    }
+
+    /// Whether there is no pose.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Jᵢᵀ of one pose, shape = (parameters, 3).
+    pub fn pose(&self, pose: usize) -> DMatrixView<'_, f64> {
+        self.rows.columns(3 * pose, 3)
+    }
+
+    /// Whether the arm comes to rest in a pose.
+    pub fn is_finite(&self, pose: usize) -> bool {
+        self.pose(pose).iter().all(|value| value.is_finite())
+    }
+
+    /// The poses with these numbers, in this order.
+    #[must_use]
+    pub fn select(&self, poses: &[usize]) -> Self {
+        let mut rows = DMatrix::zeros(self.rows.nrows(), 3 * poses.len());
+        for (k, &pose) in poses.iter().enumerate() {
+            rows.columns_mut(3 * k, 3).copy_from(&self.pose(pose));
+        }
+        Self { rows }
+    }
+
+    /// These poses, then those of `other`.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        let (own, n) = (self.rows.ncols(), self.rows.nrows());
+        let mut rows = DMatrix::zeros(n, own + other.rows.ncols());
+        rows.columns_mut(0, own).copy_from(&self.rows);
+        rows.columns_mut(own, other.rows.ncols()).copy_from(&other.rows);
+        Self { rows }
+    }
+
+    /// Σ JᵢᵀJᵢ, shape = (parameters, parameters).
+    pub fn information(&self) -> DMatrix<f64> {
+        &self.rows * self.rows.transpose()
+    }
+
+    /// Triangular factor R of J, shape = (parameters, parameters): RᵀR = Σ JᵢᵀJᵢ.
+    pub fn triangle(&self) -> DMatrix<f64> {
+        let n = self.rows.nrows();
+        let mut block = Block::zeros(self.rows.ncols(), n);
+        for j in 0..n {
+            block.column_mut(j).iter_mut().zip(self.rows.row(j).iter()).for_each(|(out, value)| *out = *value);
+        }
+        let mut triangle = Triangle::new(n);
+        triangle.absorb(&mut block);
+        triangle.into_linearisation().triangle
+    }
+}

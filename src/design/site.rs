@@ -1,0 +1,104 @@
+//! The arm where it is to be measured.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DVector;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::{DesignError, Sensitivity};
+use crate::measurement::Measurements;
+use crate::model::Model;
+use crate::parameter::Parameter;
+use crate::problem::Problem;
+use crate::study::Placement;
+
+/// The model with a base for every session and a target for every word of some tables of poses.
+#[derive(Debug, Clone)]
+pub struct Site<'a> {
+    /// The declared arm, its bases and targets.
+    pub model: Model,
+    problem: &'a Problem,
+    bases: Vec<String>,
+    targets: Vec<String>,
+}
+
+impl<'a> Site<'a> {
+    /// For all poses of `tables`.
+    ///
+    /// # Errors
+    /// Rules of `[parameters]` do not fit the arm, no parameter is free, or σ is not known.
+    pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
+        let file = || problem.data.location.file.clone();
+        let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
+        let add = |all: &mut Vec<String>, word: &String| {
+            if !all.contains(word) {
+                all.push(word.clone());
+            }
+        };
+        for table in tables {
+            let placement = Placement::of(table);
+            for row in 0..table.len() {
+                add(&mut bases, &placement.bases[placement.base_of(row)]);
+                add(&mut targets, &placement.targets[placement.target_of(row)]);
+            }
+            if problem.data.position_sigma.is_none() && table.sigma.is_none() {
+                return Err(DesignError::NoSigma { file: file() });
+            }
+        }
+        let model = Model::new(problem, &bases, &targets)?;
+        if model.parameters.is_empty() {
+            return Err(DesignError::NothingFree { file: file() });
+        }
+        Ok(Self { model, problem, bases, targets })
+    }
+
+    /// What the poses of a table tell about the nominal arm; `unit` [m] stands for σ, if it is given. Words that the site does
+    /// not know are taken for its first.
+    pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
+        self.sensitivity_at(table, unit, &DVector::zeros(self.model.parameters.len()))
+    }
+
+    /// The same about `count` arms drawn from the priors; parameters without one stay nominal, and arms that do not come to
+    /// rest in all of the poses are left out.
+    pub(super) fn arms(&self, table: &Measurements, count: usize, (seed, stream): (u64, u64)) -> Vec<Sensitivity> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(stream);
+        let mut draw = |parameter: &Parameter| {
+            let number = normal(&mut random) * parameter.sigma.unwrap_or(0.0);
+            number.clamp(parameter.lower, parameter.upper)
+        };
+        let n = self.model.parameters.len();
+        let drawn: Vec<DVector<f64>> =
+            (0..count).map(|_| DVector::from_iterator(n, self.model.parameters.iter().map(&mut draw))).collect();
+        let all = drawn.par_iter().map(|at| self.sensitivity_at(table, None, at));
+        all.filter(|arm| (0..arm.len()).all(|row| arm.is_finite(row))).collect()
+    }
+
+    fn sensitivity_at(&self, table: &Measurements, unit: Option<f64>, at: &DVector<f64>) -> Sensitivity {
+        let placement = Placement::of(table);
+        let rows: Vec<usize> = (0..table.len()).collect();
+        let mut poses = placement.poses(table, &rows, self.problem.data.position_sigma.unwrap_or(1.0));
+        let place = |all: &[String], word: &String| all.iter().position(|known| known == word).unwrap_or(0);
+        for pose in &mut poses {
+            pose.base = place(&self.bases, &placement.bases[pose.base]);
+            pose.target = place(&self.targets, &placement.targets[pose.target]);
+            pose.sigma = unit.unwrap_or(pose.sigma);
+        }
+        Sensitivity::of(&self.model, &poses, at)
+    }
+
+    /// A table without the poses in which the arm does not come to rest, and what the others tell.
+    pub(super) fn at_rest(&self, table: &Measurements) -> (Measurements, Sensitivity) {
+        let all = self.sensitivity(table, None);
+        let rows: Vec<usize> = (0..all.len()).filter(|&row| all.is_finite(row)).collect();
+        if rows.len() == all.len() { (table.clone(), all) } else { (table.select(&rows), all.select(&rows)) }
+    }
+}
+
+/// A standard normal number (Box and Muller).
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    let (u, v): (f64, f64) = (random.random(), random.random());
+    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
+}

@@ -1,0 +1,16 @@
+//! Plans and forecasts: the exchange, what it promises against what measurements then give, and the commands.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod common;
+
+#[path = "design/bench.rs"]
+mod bench;
+#[path = "design/command.rs"]
+mod command;
+#[path = "design/confirmed.rs"]
+mod confirmed;
+#[path = "design/exchange.rs"]
+mod exchange;
+#[path = "design/forecast.rs"]
+mod forecast;

@@ -1,0 +1,70 @@
+//! What the tests of this theme share.
+
+use std::path::Path;
+
+use flexcal::design::Ranges;
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::rig::{Conditions, Rig, Truth, simulate};
+use flexcal::study::{Identification, Options, identify};
+use nalgebra::{DVector, Vector3};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::common::arms::path;
+use super::common::made::{model_of, normal};
+
+/// The lunar sampler and what the test rig knows about it.
+pub fn lunar() -> (Problem, Truth) {
+    let problem = Problem::read(&path("problems/lunar-sampler")).unwrap();
+    let truth = Truth::read(Path::new(&path("tests/cases/truth.toml")), &problem).unwrap();
+    (problem, truth)
+}
+
+/// The ranges of joints, payload and hoist from which the test rig draws.
+pub fn ranges(truth: &Truth) -> Ranges {
+    let poses = &truth.poses;
+    let (joints, payloads) = (poses.joints.clone(), poses.payloads.clone());
+    Ranges { joints, payloads, hoist: poses.hoist, temperature: None, approach: false }
+}
+
+/// Every row fitted, and the same rows as if held out.
+pub fn fit(problem: &Problem, rows: &Measurements) -> Identification {
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let split = Split { identification: all.clone(), held_out: all };
+    identify(problem, rows, &split, &Options::default()).unwrap()
+}
+
+/// A true arm on the test rig, drawn from `seed`, and its deviations from nominal as the model counts them.
+pub fn true_arm(problem: &Problem, truth: &Truth, rows: &Measurements, seed: u64) -> (Rig, DVector<f64>) {
+    let simulation = simulate(problem, truth, 1, seed).unwrap();
+    let value = |name: &str| {
+        // One EI in the model is an EIy and an EIz on the rig; the first stands for both.
+        let known =
+            simulation.parameters.iter().find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
+        known.map(|parameter| parameter.value)
+    };
+    let x = model_of(problem, rows).vector_of(value).unwrap();
+    (simulation.rig, x)
+}
+
+/// Measures every row on the rig, with noise of 1 σ = `sigma` [m].
+pub fn measure(rig: &Rig, rows: &mut Measurements, sigma: f64, seed: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    for row in 0..rows.len() {
+        let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+        let conditions = Conditions {
+            configuration: rows.configuration(row).to_vec(),
+            payload: at(&rows.payload),
+            hoist: at(&rows.hoist),
+            ..Conditions::default()
+        };
+        let noise = Vector3::from_fn(|_, _| sigma * normal(&mut random));
+        rows.positions[row] = rig.position(&conditions).unwrap() + noise;
+    }
+}
+
+/// Root mean square of entry `k`.
+pub fn rms(errors: &[DVector<f64>], k: usize) -> f64 {
+    (errors.iter().map(|error| error[k] * error[k]).sum::<f64>() / errors.len() as f64).sqrt()
+}

@@ -1,0 +1,208 @@
+//! The commands as users meet them: results, exit status, messages, help, colours.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// A folder for results, and flexcal run in the package's folder.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name).display().to_string()
+    }
+
+    fn flexcal(&self, arguments: &str, more: &[&str]) -> Command {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments.split_whitespace()).args(more);
+        command.arg("--out").arg(self.folder.path());
+        command
+    }
+
+    /// Standard output of a run that ends with this status, and standard error.
+    fn run(&self, status: i32, arguments: &str, more: &[&str]) -> (String, String) {
+        let assert = self.flexcal(arguments, more).assert().code(status);
+        let output = assert.get_output();
+        (text(&output.stdout), text(&output.stderr))
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+fn flexcal(arguments: &[&str]) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    command.args(arguments);
+    command
+}
+
+#[test]
+fn a_plan_can_be_checked_and_measured() {
+    let bench = Bench::new();
+    let table = bench.write("some.csv", &drawn(60));
+    let (out, _) = bench.run(0, "plan problems/lunar-sampler --poses 20 --candidates", &[&table]);
+    for expected in ["20 poses, from 60 candidates", "joint2.stiffness", "times smaller", "rank 31 of 32", "plan.csv"] {
+        assert!(out.contains(expected), "{expected} missing in:\n{out}");
+    }
+    let csv = fs::read_to_string(bench.path("plan.csv")).unwrap();
+    assert!(csv.starts_with("pose,split,q1_deg,q2_deg,q3_deg,q4_deg,payload_kg,hoist_N\n1,identification,"), "{csv}");
+    assert_eq!(csv.lines().count(), 21);
+    // Every pose is one of the candidates.
+    for line in csv.lines().skip(1) {
+        let pose = line.splitn(3, ',').nth(2).unwrap();
+        assert!(fs::read_to_string(&table).unwrap().lines().any(|candidate| candidate == pose), "{pose}");
+    }
+    let plan: Value = serde_json::from_str(&fs::read_to_string(bench.path("plan.json")).unwrap()).unwrap();
+    assert!(plan["gain"].as_f64().unwrap() > 1.0 && plan["sufficient"] == true && plan["criterion"] == "S");
+    let path = bench.path("plan.csv").display().to_string();
+    let (out, _) = bench.run(0, "check problems/lunar-sampler --json --candidates", &[&path]);
+    let check: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((check["poses"].as_u64(), check["rank"].as_u64()), (Some(20), Some(31)));
+    let found = |json: &Value, name: &str| {
+        let all = json["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["name"] == name).unwrap()["std_error"].as_f64().unwrap()
+    };
+    // Nominal there, over arms of the prior here.
+    let ratio = found(&check, "joint2.alpha") / found(&plan, "joint2.alpha");
+    assert!((0.8..1.5).contains(&ratio), "{ratio}");
+}
+
+/// A table of candidates within the ranges of the test rig.
+fn drawn(count: usize) -> String {
+    let (problem, truth) = super::bench::lunar();
+    let poses = super::bench::ranges(&truth).draw(&problem, count, flexcal::design::Extremes::Often, 2, 0);
+    let mut plain = problem.clone();
+    plain.data.held_out = None;
+    let text = flexcal::report::poses_csv(&plain, &poses);
+    text.lines().map(|line| line.split_once(',').unwrap().1.to_owned() + "\n").collect()
+}
+
+#[test]
+fn a_check_takes_measured_poses_or_draws_them() {
+    let bench = Bench::new();
+    let (out, _) = bench.run(0, "check problems/lunar-sampler", &[]);
+    for expected in ["32 parameters, 28 poses", "in the held-out poses", "these", "joint1.beta + 0.71 joint2.theta"] {
+        assert!(out.contains(expected), "{expected} missing in:\n{out}");
+    }
+    let (out, _) = bench.run(0, "check problems/lunar-sampler --truth tests/cases/truth.toml --poses 12 --json", &[]);
+    let check: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(check["poses"], 12);
+    let steps = check["growth"].as_array().unwrap();
+    let rms: Vec<f64> = steps.iter().map(|step| step["rms_mm"].as_f64().unwrap()).collect();
+    assert!(rms.windows(2).all(|pair| pair[1] <= pair[0] * (1.0 + 1e-9)), "{rms:?}");
+    let enough = check["enough"].as_u64().unwrap();
+    assert!((10..60).contains(&enough), "{enough}");
+}
+
+#[test]
+fn too_few_poses_are_not_to_be_trusted() {
+    let bench = Bench::new();
+    let problem = fs::read_to_string("problems/ur10-ipa/problem.toml").unwrap();
+    let limited = problem.replace("[[joint]]\n", "[[joint]]\nmin_deg = -120\nmax_deg = 120\n");
+    let limited = bench.write("problem.toml", &limited);
+    let (_, err) = bench.run(1, "check --poses 1", &[&limited]);
+    assert!(err.contains("more poses are needed"), "{err}");
+    bench.run(0, "check --poses 30 --quiet", &[&limited]);
+}
+
+#[test]
+fn bad_input_names_file_and_key_or_the_option() {
+    let bench = Bench::new();
+    let bad = bench.write("bad.csv", "q1_deg,q2_deg,q3_deg,q4_deg\n1,2,3,4\n1,2,x,4\n");
+    let short = bench.write("short.csv", "q1_deg,q2_deg,q3_deg\n1,2,3\n");
+    let three = bench.write("three.csv", "q1_deg,q2_deg,q3_deg,q4_deg\n1,2,3,4\n5,6,7,8\n9,10,11,12\n");
+    let lunar = fs::read_to_string("problems/lunar-sampler/problem.toml").unwrap();
+    let sigma = bench.write("no-sigma.toml", &lunar.replace("position_sigma_mm = 0.05\n", ""));
+    let fixed = lunar.split("[parameters]").next().unwrap().to_owned() + "[data]\nposition_sigma_mm = 0.05\n";
+    let fixed = bench.write("fixed.toml", &fixed);
+    let cases: [(&str, &[&str], &[&str]); 10] = [
+        ("plan problems/lunar-sampler --poses 28", &[], &["problem.toml: joint[1].min_deg", "--truth", "--candidates"]),
+        ("check problems/lunar-sampler --poses 28", &[], &["problem.toml: joint[1].min_deg"]),
+        ("plan problems/lunar-sampler --poses 28 --candidates", &[&bad], &["bad.csv:3: column q3_deg", "\"x\""]),
+        ("plan problems/lunar-sampler --poses 28 --candidates", &[&short], &["short.csv:1: column q4", "missing"]),
+        ("plan problems/lunar-sampler --poses 28 --candidates", &[&three], &["--poses 28", "only 3 candidates"]),
+        ("check problems/lunar-sampler --poses 28 --candidates", &[&three], &["--poses 28", "only 3 rows"]),
+        ("plan problems/lunar-sampler --poses 0", &[], &["--poses"]),
+        ("plan problems/lunar-sampler --poses 9 --criterion Q", &[], &["--criterion", "'Q'"]),
+        ("plan --poses 2 --candidates", &[&three, "--", &sigma], &["no-sigma.toml: data.position_sigma_mm"]),
+        ("plan --poses 2 --candidates", &[&three, "--", &fixed], &["fixed.toml: parameters: no parameter is free"]),
+    ];
+    for (arguments, more, expected) in cases {
+        let mut command = flexcal(&[]);
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).arg(arguments.split_whitespace().next().unwrap());
+        command.arg("--out").arg(bench.path("out"));
+        let assert = command.args(arguments.split_whitespace().skip(1)).args(more).assert().code(2);
+        let err = text(&assert.get_output().stderr);
+        assert!(expected.iter().all(|part| err.contains(part)), "{arguments} {more:?}: {expected:?} not in\n{err}");
+        assert!(assert.get_output().stdout.is_empty() && !bench.path("out").exists());
+    }
+}
+
+#[test]
+fn quiet_is_quiet_and_progress_keeps_to_standard_error() {
+    let bench = Bench::new();
+    let table = bench.write("some.csv", &drawn(30));
+    let (out, err) = bench.run(0, "plan problems/lunar-sampler --poses 20 --quiet --candidates", &[&table]);
+    assert!(out.is_empty() && err.is_empty(), "{out}{err}");
+    let (out, err) =
+        bench.run(0, "plan problems/lunar-sampler --poses 20 --json --criterion d --candidates", &[&table]);
+    let json: Value = serde_json::from_str(&out).unwrap();
+    assert!(json["criterion"] == "D" && err.is_empty(), "{err}");
+}
+
+#[test]
+fn every_command_has_examples() {
+    let help = text(&flexcal(&["--help"]).assert().success().get_output().stdout);
+    assert!(help.contains("Examples:"), "{help}");
+    for command in ["identify", "compare", "compensate", "simulate", "plan", "check", "completions", "man"] {
+        assert!(help.contains(command), "{command} missing in:\n{help}");
+        let own = text(&flexcal(&[command, "--help"]).assert().success().get_output().stdout);
+        assert!(own.contains("Examples:\n") && own.contains(&format!("\n  flexcal {command}")), "{own}");
+    }
+}
+
+#[test]
+fn shells_are_completed_and_manuals_written() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = text(&flexcal(&["completions", shell]).assert().success().get_output().stdout);
+        assert!(script.contains("criterion") && script.contains("compensate"), "{shell}");
+    }
+    flexcal(&["completions", "tcsh"]).assert().code(2);
+    let page = text(&flexcal(&["man"]).assert().success().get_output().stdout);
+    assert!(page.contains(".TH flexcal 1") && page.contains("Exit status"), "{page}");
+    let folder = tempfile::tempdir().unwrap();
+    flexcal(&["man", "--out"]).arg(folder.path()).assert().success().stdout("");
+    for name in ["flexcal.1", "flexcal-identify.1", "flexcal-plan.1"] {
+        let page = fs::read_to_string(Path::new(folder.path()).join(name)).unwrap();
+        assert!(page.contains(".TH") && page.contains("NAME"), "{name}");
+    }
+    let page = fs::read_to_string(folder.path().join("flexcal-plan.1")).unwrap();
+    assert!(page.contains("flexcal\\-plan") && page.contains("criterion"), "{page}");
+}
+
+#[test]
+fn colours_are_for_terminals_and_no_color_forbids_them() {
+    let coloured = |variables: &[(&str, &str)]| {
+        let mut command = flexcal(&["identify", "no-such-folder"]);
+        command.env_remove("NO_COLOR").env_remove("CLICOLOR_FORCE").env("TERM", "xterm-256color");
+        command.envs(variables.iter().copied());
+        text(&command.assert().code(2).get_output().stderr).contains('\u{1b}')
+    };
+    assert!(!coloured(&[]), "a pipe is no terminal");
+    assert!(coloured(&[("CLICOLOR_FORCE", "1")]));
+    assert!(!coloured(&[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]));
+}

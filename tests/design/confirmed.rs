@@ -1,0 +1,74 @@
+//! What plans promise, measured on the virtual test rig, which shares no physics with the model.
+
+use flexcal::design::{Candidates, Criterion, Extremes, Plan, PlanOptions, plan};
+use flexcal::problem::Problem;
+use flexcal::rig::Truth;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::bench::{fit, lunar, measure, ranges, rms, true_arm};
+
+/// Errors of the estimates of arms drawn from TRUTH.toml, each measured anew: in the planned poses, and in as many drawn anew.
+fn errors(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<DVector<f64>>; 2] {
+    let within = ranges(truth);
+    [true, false].map(|planned| {
+        let of = |arm: u64| {
+            let mut rows = if planned {
+                plan.poses.clone()
+            } else {
+                within.draw(problem, plan.poses.len(), Extremes::No, 1000 + arm, 0)
+            };
+            let (rig, x) = true_arm(problem, truth, &rows, arm);
+            measure(&rig, &mut rows, truth.noise_sigma, 5000 + arm);
+            fit(problem, &rows).x - x
+        };
+        (0..arms).into_par_iter().map(of).collect()
+    })
+}
+
+/// Geometric mean over parameters of the rms error after random poses over that after planned ones.
+fn gain([planned, random]: &[Vec<DVector<f64>>; 2], parameters: &[usize]) -> f64 {
+    let logs = parameters.iter().map(|&k| (rms(random, k) / rms(planned, k)).ln());
+    (logs.sum::<f64>() / parameters.len() as f64).exp()
+}
+
+#[test]
+fn planned_poses_give_smaller_errors_than_random_ones() {
+    let (problem, truth) = lunar();
+    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None };
+    let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
+    let meaningful = plan.meaningful();
+    assert!(meaningful.len() > 12, "{meaningful:?}");
+    let promised = plan.gain(&meaningful).unwrap();
+    assert!(promised > 2.0, "{promised}");
+    let measured = gain(&errors(&problem, &truth, &plan, 40), &meaningful);
+    assert!(measured > 1.7, "{measured}");
+}
+
+/// The figures of docs/plan.md.
+#[test]
+#[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture planned"]
+fn planned_poses_halve_the_errors() {
+    let (problem, truth) = lunar();
+    let mut halved = Vec::new();
+    for criterion in [Criterion::S, Criterion::A, Criterion::D, Criterion::E] {
+        for seed in [1, 2] {
+            let options = PlanOptions { poses: 28, criterion: &criterion, seed, progress: None };
+            let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
+            let (meaningful, all) = (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());
+            let found = errors(&problem, &truth, &plan, 1000);
+            let (promised, measured) = (plan.gain(&meaningful).unwrap(), gain(&found, &meaningful));
+            println!(
+                "{} seed {seed}: promised {promised:.3}, measured {measured:.3} over {} parameters; over all {:.3}, {:.3}",
+                criterion.as_str(),
+                meaningful.len(),
+                plan.gain(&all).unwrap(),
+                gain(&found, &all),
+            );
+            if criterion == Criterion::S {
+                halved.push(measured);
+            }
+        }
+    }
+    assert!(halved.iter().all(|&gain| gain > 1.9), "{halved:?}");
+}

@@ -1,0 +1,113 @@
+//! What a check expects of given poses, against what many fits then show.
+
+use flexcal::design::{Check, Expected, Extremes, Judged, check};
+use flexcal::measurement::Measurements;
+use flexcal::parameter::Unit;
+use flexcal::problem::{Freedom, Problem};
+use nalgebra::DVector;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::bench::{fit, lunar, ranges, rms};
+use super::common::arms::with_parameters;
+use super::common::made::{at_random, draw, measure, model_of, predicted};
+
+/// Errors of the estimates, in x, and of predictions in `elsewhere` [m], of arms drawn from the priors, each measured anew.
+fn errors(problem: &Problem, rows: &Measurements, elsewhere: &Measurements, runs: u64) -> (Vec<DVector<f64>>, f64) {
+    let model = model_of(problem, rows);
+    // Bases without a prior stand within 1 mm and 1 mrad of where the problem puts them.
+    let free = |_: Unit| 1e-3;
+    let of = |run: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(run);
+        let x = draw(&model, free, &mut random);
+        let mut rows = rows.clone();
+        measure(problem, &mut rows, &x, problem.data.position_sigma.unwrap(), &mut random);
+        let found = fit(problem, &rows).x;
+        let (there, found_there) = (predicted(problem, elsewhere, &x), predicted(problem, elsewhere, &found));
+        let squares: f64 = there.iter().zip(&found_there).map(|(a, b)| (a - b).norm_squared()).sum();
+        (found - x, squares / elsewhere.len() as f64)
+    };
+    let all: Vec<_> = (0..runs).into_par_iter().map(of).collect();
+    let prediction = (all.iter().map(|(_, square)| square).sum::<f64>() / runs as f64).sqrt();
+    (all.into_iter().map(|(error, _)| error).collect(), prediction)
+}
+
+/// 1 σ of x.
+fn expected_x(expected: &Expected) -> Option<f64> {
+    let relative = !matches!(expected.unit, Unit::Angle | Unit::Length);
+    expected.std_error.map(|error| if relative { error / expected.nominal } else { error })
+}
+
+/// Actual over expected standard errors, by name.
+fn ratios(check: &Check, errors: &[DVector<f64>]) -> Vec<(String, f64)> {
+    let own = check.forecast.expected.iter().enumerate();
+    own.filter_map(|(k, expected)| Some((expected.name.clone(), rms(errors, k) / expected_x(expected)?))).collect()
+}
+
+/// Poses, a check of them, and what `runs` fits show.
+fn compare(problem: &Problem, rows: &Measurements, elsewhere: &Measurements, runs: u64) -> (Vec<(String, f64)>, f64) {
+    let judged =
+        Judged::Table { poses: Box::new(rows.clone()), within: None, held_out: Some(Box::new(elsewhere.clone())) };
+    let check = check(problem, &judged, 3).unwrap();
+    let (errors, prediction) = errors(problem, rows, elsewhere, runs);
+    (ratios(&check, &errors), prediction / check.prediction.rms)
+}
+
+/// The lunar sampler, its stiffnesses known to 20 %: arms half as stiff as declared do not all stand.
+fn lunar_case(runs: u64) -> (Vec<(String, f64)>, f64) {
+    let (mut problem, truth) = lunar();
+    for rule in &mut problem.parameters {
+        if let Freedom::Free { sigma, .. } = &mut rule.freedom {
+            sigma.relative = sigma.relative.map(|_| 0.2);
+        }
+    }
+    let draw = |count, stream| ranges(&truth).draw(&problem, count, Extremes::No, 3, stream);
+    compare(&problem, &draw(32, 0), &draw(60, 10), runs)
+}
+
+/// A UR10 whose base is free, without a prior, and takes the place of joint 1's own geometry.
+fn ur10_case(runs: u64) -> (Vec<(String, f64)>, f64) {
+    let rules = "\"joint*.a*\" = { sigma_deg = 0.1, sigma_mm = 1.0 }\n\"joint*.theta\" = { sigma_deg = 0.1 }\n\
+                 \"joint*.d\" = { sigma_mm = 1.0 }\n\"joint*.beta\" = { sigma_deg = 0.1 }\n\
+                 \"tool.*\" = { sigma_mm = 3.0 }\n\"joint1.*\" = { fixed = true }\n\"base.*\" = { free = true }\n";
+    let problem = with_parameters("problems/ur10-ipa/problem.toml", rules);
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let mut draw = |count| at_random(&problem, count, 2.0, &mut random);
+    let (rows, elsewhere) = (draw(40), draw(60));
+    compare(&problem, &rows, &elsewhere, runs)
+}
+
+/// ln of the geometric mean of the ratios, and the furthest of them.
+fn summary(ratios: &[(String, f64)]) -> (f64, &(String, f64)) {
+    let mean = ratios.iter().map(|(_, ratio)| ratio.ln()).sum::<f64>() / ratios.len() as f64;
+    (mean, ratios.iter().max_by(|a, b| a.1.ln().abs().total_cmp(&b.1.ln().abs())).unwrap())
+}
+
+#[test]
+fn expected_errors_are_those_of_many_fits() {
+    for (case, least) in [(lunar_case(120), 30), (ur10_case(120), 25)] {
+        let (ratios, prediction) = case;
+        assert!(ratios.len() >= least, "{ratios:?}");
+        let (mean, furthest) = summary(&ratios);
+        // 120 fits know an error to 6 %.
+        assert!(mean.abs() < 0.08 && furthest.1.ln().abs() < 0.3, "{} {furthest:?}", mean.exp());
+        assert!(prediction.ln().abs() < 0.15, "{prediction}");
+    }
+}
+
+/// The figures of docs/plan.md.
+#[test]
+#[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture expected"]
+fn expected_errors_are_those_of_very_many_fits() {
+    for (name, (ratios, prediction)) in [("lunar sampler", lunar_case(1000)), ("UR10", ur10_case(2000))] {
+        let (mean, furthest) = summary(&ratios);
+        println!(
+            "{name}: actual / expected {:.3} on average, furthest {furthest:?}; prediction {prediction:.3}",
+            mean.exp()
+        );
+        println!("  {ratios:.2?}");
+        assert!(ratios.iter().all(|(_, ratio)| (ratio - 1.0).abs() < 0.15), "{ratios:?}");
+        assert!((prediction - 1.0).abs() < 0.15, "{prediction}");
+    }
+}

@@ -1,0 +1,19 @@
+//! Every effect of the catalogue in the model: against the virtual rig, at zero, its derivatives, and found from data.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
+
+mod common;
+
+#[path = "effects/catalogue.rs"]
+mod catalogue;
+#[path = "effects/commands.rs"]
+mod commands;
+#[path = "effects/derivatives.rs"]
+mod derivatives;
+#[path = "effects/recovery.rs"]
+mod recovery;
+#[path = "effects/rig.rs"]
+mod rig;
+#[path = "effects/rules.rs"]
+mod rules;

@@ -1,0 +1,155 @@
+//! Every family with strengths of a realistic size on two arms, and poses in which everything acts.
+
+use std::path::Path;
+
+use flexcal::error::Location;
+use flexcal::measurement::Measurements;
+use flexcal::model::Model;
+use flexcal::problem::{Effect, EffectDeclaration, Equilibrium, JointKind, Problem};
+use flexcal::rig::{Cause, Conditions, TrueEffect};
+use nalgebra::DVector;
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::common::arms::{ODD, golden_problem, parse};
+use crate::common::made::at_random;
+
+/// An effect and its strength in SI units.
+pub type Strong = (Effect, Vec<f64>);
+
+/// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts on it.
+pub fn lunar() -> (Problem, Vec<Strong>) {
+    let mut arm = golden_problem();
+    arm.joints[1].a = 0.3;
+    arm.data.reference_temperature = Some(20.0);
+    let link = || "B".to_owned();
+    let all = vec![
+        (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
+        (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::GearRatio { joint: 3 }, vec![4e-4]),
+        (Effect::Backlash { joint: 3 }, vec![5e-4]),
+        (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),
+        (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
+        (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
+        (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
+        (Effect::LinkBending { joint: 2 }, vec![1e-5]),
+        (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
+        (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
+        (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),
+        (Effect::PayloadMass, vec![0.1]),
+        (Effect::HoistForce, vec![0.05]),
+        (Effect::HoistDirection, vec![0.02, 0.01, 0.03]),
+        (Effect::BaseCompliance, vec![1e-6, 2e-6]),
+        (Effect::GravityDirection, vec![0.01, 0.02]),
+        (Effect::DeflectedEquilibrium, vec![1.0]),
+        (Effect::TrackerScale, vec![5e-5]),
+        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
+        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+    ];
+    (arm, all)
+}
+
+/// The arm with every kind of joint, a link along −x and a leaning rope.
+pub fn odd() -> (Problem, Vec<Strong>) {
+    let mut arm = parse(ODD);
+    arm.data.reference_temperature = Some(20.0);
+    let lower = || "lower".to_owned();
+    let all = vec![
+        (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
+        (Effect::JointHarmonic { joint: 4, orders: vec![1, 7] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::GearRatio { joint: 4 }, vec![4e-3]),
+        (Effect::Backlash { joint: 4 }, vec![5e-4]),
+        (Effect::Backlash { joint: 5 }, vec![5e-4]),
+        (Effect::JointNonlinearStiffness { joint: 4 }, vec![1e-8]),
+        (Effect::JointNonlinearStiffness { joint: 3 }, vec![1e-7]),
+        (Effect::JointLateralCompliance { joint: 4 }, vec![1e-5, 2e-5]),
+        (Effect::JointThermalDrift { joint: 4 }, vec![2e-5]),
+        (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
+        (Effect::JointCoupling { joint: 3, from: 4 }, vec![3e-3]),
+        (Effect::LinkBending { joint: 2 }, vec![1e-4]),
+        (Effect::LinkBending { joint: 5 }, vec![3e-5]),
+        (Effect::LinkThermalBending { link: lower() }, vec![1e-5, 2e-5]),
+        (Effect::LinkThermalExpansion { link: lower() }, vec![12e-6]),
+        (Effect::UnmodelledMass { link: lower() }, vec![1.4, 0.3]),
+        (Effect::PayloadMass, vec![0.3]),
+        (Effect::HoistForce, vec![0.08]),
+        (Effect::HoistDirection, vec![0.05, -0.03, 0.04]),
+        (Effect::BaseCompliance, vec![1e-5, 2e-5]),
+        (Effect::GravityDirection, vec![0.03, -0.02]),
+        (Effect::DeflectedEquilibrium, vec![1.0]),
+        (Effect::TrackerScale, vec![5e-4]),
+        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
+        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+    ];
+    (arm, all)
+}
+
+/// The arm with an effect declared; that of equilibrium needs the statics without it.
+pub fn declared(arm: &Problem, effects: &[Effect]) -> Problem {
+    let mut arm = arm.clone();
+    if effects.contains(&Effect::DeflectedEquilibrium) {
+        arm.statics.equilibrium = Equilibrium::Undeflected;
+    }
+    let location = Location::file(Path::new("problem.toml"));
+    let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
+    arm.effects = effects.iter().map(declare).collect();
+    arm
+}
+
+/// The same effect for the rig.
+pub fn in_truth(arm: &Problem, (effect, values): &Strong) -> TrueEffect {
+    TrueEffect::new(Cause::Catalogued(effect.clone()), values, &arm.joints).unwrap()
+}
+
+/// Random poses in which every effect may act, every second with directions of approach if wanted.
+pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng) -> Measurements {
+    let mut rows = at_random(arm, count, 1.5, rng);
+    let n = arm.joints.len();
+    rows.payload = Some((0..count).map(|k| if k % 3 == 0 { 0.0 } else { rng.random_range(0.5..3.0) }).collect());
+    rows.hoist = Some((0..count).map(|_| rng.random_range(30.0..60.0)).collect());
+    rows.temperature = Some((0..count).map(|_| rng.random_range(10.0..35.0)).collect());
+    rows.time = (0..count).map(|k| 60.0 + 90.0 * k as f64).collect();
+    rows.time_measured = true;
+    let side = |k: usize, rng: &mut ChaCha8Rng| match arm.joints[k % n].kind {
+        JointKind::Fixed => 0.0,
+        _ if rng.random() => 1.0,
+        _ => -1.0,
+    };
+    rows.approach = approaches.then(|| (0..count * n).map(|k| side(k, rng)).collect());
+    rows
+}
+
+/// What was set in a row, for the rig.
+pub fn conditions(rows: &Measurements, row: usize) -> Conditions {
+    let n = rows.joints;
+    let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+    Conditions {
+        configuration: rows.configuration(row).to_vec(),
+        payload: at(&rows.payload),
+        hoist: at(&rows.hoist),
+        temperature: at(&rows.temperature),
+        time: rows.time[row],
+        first_time: rows.time[0],
+        approach: rows.approach.as_ref().map_or_else(Vec::new, |all| all[row * n..(row + 1) * n].to_vec()),
+    }
+}
+
+/// Numbers of the parameters of effects.
+pub fn of_effects(model: &Model) -> Vec<usize> {
+    let is_effect = |name: &str| {
+        let family = name.split(['[', '.']).next().unwrap();
+        flexcal::effect::FAMILIES.iter().any(|known| known.name == family)
+    };
+    (0..model.parameters.len()).filter(|&k| is_effect(&model.parameters[k].name)).collect()
+}
+
+/// The full parameter vector with these strengths of the declared effects, everything else nominal.
+pub fn strengths(model: &Model, values: &[f64]) -> DVector<f64> {
+    let mut x = DVector::zeros(model.parameters.len());
+    let places = of_effects(model);
+    assert_eq!(places.len(), values.len());
+    for (k, value) in places.into_iter().zip(values) {
+        x[k] = model.parameters[k].deviation(*value);
+    }
+    x
+}

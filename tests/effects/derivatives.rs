@@ -1,0 +1,141 @@
+//! Derivatives of effects by dual numbers against extrapolated differences.
+
+use flexcal::fit::{check_jacobian, jacobian};
+use flexcal::measurement::Measurements;
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::parameter::Unit;
+use flexcal::problem::{Effect, Equilibrium, Problem};
+use flexcal::study::Placement;
+use nalgebra::DVector;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::catalogue::{Strong, declared, lunar, odd, of_effects, poses, strengths};
+use crate::common::arms::path;
+use crate::common::made::{labels, model_of};
+
+/// Largest difference of a column of the Jacobian, relative to its norm.
+const WORST: f64 = 1e-7;
+
+/// How far each parameter may move: thrice a realistic strength, or what the arm's own parameters vary by.
+fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
+    let of_arm = |unit| match unit {
+        Unit::Angle | Unit::Length => 0.1,
+        _ => 0.5,
+    };
+    let mut step = DVector::from_iterator(
+        model.parameters.len(),
+        model.parameters.iter().map(|parameter| of_arm(parameter.unit())),
+    );
+    for (k, value) in of_effects(model).into_iter().zip(values) {
+        let parameter = &model.parameters[k];
+        let size = if parameter.nominal == 0.0 { value.abs() } else { 0.1 };
+        step[k] = 3.0 * size.max(1e-3 * parameter.sigma.unwrap());
+    }
+    step
+}
+
+/// Checks the columns of `unknowns` at `x`; the names of those without effect must be the ones in `silent`.
+fn check_at(
+    what: &str,
+    problem: &Problem,
+    rows: &Measurements,
+    (x, step): (&DVector<f64>, &DVector<f64>),
+    unknowns: &[usize],
+    silent: &[&str],
+) {
+    let model = model_of(problem, rows);
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let poses = Placement::of(rows).poses(rows, &all, 1e-3);
+    let residuals = PoseResiduals::new(&model, poses, unknowns.to_vec(), x.clone());
+    let (at, step) = (residuals.reduced(x), residuals.reduced(step));
+    let exact = jacobian(&residuals, &at);
+    let mut without = Vec::new();
+    for (j, column) in check_jacobian(&residuals, &at, &step).columns.iter().enumerate() {
+        let name = model.parameters[unknowns[j]].name.as_str();
+        if exact.column(j).norm() * step[j] < 1e-9 {
+            without.push(name);
+            continue;
+        }
+        assert!(column.relative_error < WORST, "{what}: {name} is off: {column:?}");
+    }
+    assert_eq!(without, silent, "{what}: parameters without effect");
+}
+
+/// One effect at a time or all at once, at zero and off it.
+fn check(what: &str, arm: &Problem, effects: &[Strong], rows: &Measurements, everything: bool, silent: &[&str]) {
+    let kinds: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
+    let values: Vec<f64> = effects.iter().flat_map(|(_, values)| values.clone()).collect();
+    let problem = declared(arm, &kinds);
+    let model = model_of(&problem, rows);
+    let unknowns = if everything { (0..model.parameters.len()).collect() } else { of_effects(&model) };
+    let step = steps(&model, &values);
+    let zero = DVector::zeros(model.parameters.len());
+    let mut silent_at_zero: Vec<&str> =
+        unknowns.iter().map(|&k| model.parameters[k].name.as_str()).filter(|name| name.ends_with("].at")).collect();
+    silent_at_zero.extend(silent);
+    check_at(&format!("{what}, {kinds:?} at zero"), &problem, rows, (&zero, &step), &unknowns, &silent_at_zero);
+    let mut strong = strengths(&model, &values);
+    // Play that a moment takes up turns about within 1 N·m: where it counts, the arm's own parameters stay.
+    for k in unknowns.iter().filter(|k| !of_effects(&model).contains(k)) {
+        strong[*k] = 0.01;
+    }
+    check_at(&format!("{what}, {kinds:?}"), &problem, rows, (&strong, &step), &unknowns, silent);
+}
+
+#[test]
+fn every_effect_on_elastic_arms() {
+    for (what, (arm, all)) in [("lunar sampler", lunar()), ("odd arm", odd())] {
+        for elements in [1, 3] {
+            let mut arm = arm.clone();
+            arm.statics.beam_elements = elements;
+            for approaches in [true, false] {
+                let rows = poses(&arm, 6, approaches, &mut ChaCha8Rng::seed_from_u64(5));
+                for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
+                    arm.statics.equilibrium = equilibrium;
+                    for effect in &all {
+                        let slides = matches!(effect.0, Effect::Backlash { joint: 4 }) && what == "odd arm";
+                        let silent: &[&str] = if slides && !approaches { &["backlash[4].width"] } else { &[] };
+                        check(what, &arm, std::slice::from_ref(effect), &rows, false, silent);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn all_effects_at_once_with_everything_else_free_in_two_sessions() {
+    for (what, (arm, all)) in [("lunar sampler", lunar()), ("odd arm", odd())] {
+        let mut rows = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(6));
+        rows.session = labels((0..10).map(|k| if k < 5 { "A" } else { "B" }));
+        check(what, &arm, &all, &rows, true, &[]);
+    }
+}
+
+#[test]
+fn what_drives_the_joints_of_a_rigid_arm() {
+    let mut arm = Problem::read(&path("problems/ur10-ipa")).unwrap();
+    arm.data.reference_temperature = Some(20.0);
+    let effects = [
+        (Effect::JointHarmonic { joint: 2, orders: vec![1, 2, 30] }, vec![1e-4, 2e-4, 3e-4, 4e-4, 1e-5, 2e-5]),
+        (Effect::JointHarmonic { joint: 2, orders: vec![3] }, vec![1e-4, 2e-4]),
+        (Effect::GearRatio { joint: 3 }, vec![4e-4]),
+        (Effect::GearRatio { joint: 2 }, vec![4e-4]),
+        (Effect::JointCoupling { joint: 5, from: 4 }, vec![3e-4]),
+        (Effect::JointThermalDrift { joint: 1 }, vec![1e-5]),
+        (Effect::TrackerScale, vec![5e-5]),
+        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
+        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+    ];
+    let mut rows = poses(&arm, 16, false, &mut ChaCha8Rng::seed_from_u64(7));
+    rows.session = labels((0..16).map(|k| if k < 8 { "A" } else { "B" }));
+    for effect in &effects {
+        check("UR10", &arm, std::slice::from_ref(effect), &rows, false, &[]);
+    }
+    check("UR10", &arm, &effects, &rows, false, &[]);
+    // With play or compliance the same arm is not rigid any more.
+    let soft = [effects.as_slice(), &[(Effect::Backlash { joint: 3 }, vec![5e-4])]].concat();
+    rows.approach = poses(&arm, 16, true, &mut ChaCha8Rng::seed_from_u64(8)).approach;
+    check("UR10 with play", &arm, &soft, &rows, false, &[]);
+}

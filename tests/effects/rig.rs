@@ -1,0 +1,112 @@
+//! The model's effects do what those of the rig do, which shares no physics with it; and nothing at zero.
+
+use flexcal::measurement::Measurements;
+use flexcal::problem::{Effect, JointKind, Problem};
+use flexcal::rig::Rig;
+use nalgebra::{DVector, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::catalogue::{Strong, conditions, declared, in_truth, lunar, odd, poses, strengths};
+use crate::common::made::{model_of, predicted};
+
+/// Part of an effect by which model and rig may differ.
+const PART: f64 = 0.005;
+/// What they may differ by besides [m].
+const FLOOR: f64 = 1e-6;
+
+fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vector3<f64>> {
+    let effects = effects.iter().map(|effect| in_truth(arm, effect)).collect();
+    let rig = Rig::new(arm.clone(), effects);
+    (0..rows.len()).map(|row| rig.position(&conditions(rows, row)).unwrap()).collect()
+}
+
+/// Compares what an effect changes: largest change, largest difference, and whether that is allowed.
+fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
+    let with = declared(arm, std::slice::from_ref(&effect.0));
+    let x = strengths(&model_of(&with, rows), &effect.1);
+    let strong = predicted(&with, rows, &x);
+    let rest = predicted(arm, rows, &DVector::zeros(model_of(arm, rows).parameters.len()));
+    let (rig_strong, rig_rest) = (measured(arm, std::slice::from_ref(effect), rows), measured(arm, &[], rows));
+    let (mut change, mut difference) = (0.0_f64, 0.0_f64);
+    for row in 0..rows.len() {
+        let expected = rig_strong[row] - rig_rest[row];
+        let off = (strong[row] - rest[row] - expected).norm();
+        assert!(
+            off < PART * expected.norm() + FLOOR,
+            "{:?}, row {row}: {} m off, the effect is {} m",
+            effect.0,
+            off,
+            expected.norm()
+        );
+        (change, difference) = (change.max(expected.norm()), difference.max(off));
+    }
+    println!("{:8.4} mm, off by {:.5} mm  {:?}", change * 1e3, difference * 1e3, effect.0);
+    // No moment moves a joint along its slide: without a direction of approach its play does nothing.
+    let slides = |joint: usize| arm.joints[joint - 1].kind == JointKind::Prismatic;
+    let silent = match effect.0 {
+        Effect::DeflectedEquilibrium => true,
+        Effect::Backlash { joint } => slides(joint) && rows.approach.is_none(),
+        _ => false,
+    };
+    assert!(silent || change > 1e-5, "{:?} changes nothing", effect.0);
+}
+
+fn check_all((mut arm, all): (Problem, Vec<Strong>), seed: u64) {
+    arm.statics.beam_elements = 12;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for approaches in [true, false] {
+        let rows = poses(&arm, 8, approaches, &mut rng);
+        for effect in &all {
+            check(&arm, effect, &rows);
+        }
+    }
+}
+
+#[test]
+fn effects_on_the_lunar_sampler_are_those_of_the_rig() {
+    check_all(lunar(), 1);
+}
+
+#[test]
+fn effects_on_an_arm_with_every_kind_of_joint_are_those_of_the_rig() {
+    check_all(odd(), 2);
+}
+
+#[test]
+fn several_effects_at_once_are_those_of_the_rig() {
+    for (mut arm, mut all) in [lunar(), odd()] {
+        arm.statics.beam_elements = 12;
+        all.retain(|(effect, _)| *effect != Effect::DeflectedEquilibrium);
+        let rows = poses(&arm, 8, true, &mut ChaCha8Rng::seed_from_u64(3));
+        let effects: Vec<Effect> = all.iter().map(|(effect, _)| effect.clone()).collect();
+        let values: Vec<f64> = all.iter().flat_map(|(_, values)| values.clone()).collect();
+        let with = declared(&arm, &effects);
+        let ours = predicted(&with, &rows, &strengths(&model_of(&with, &rows), &values));
+        let (theirs, rest) = (measured(&arm, &all, &rows), measured(&arm, &[], &rows));
+        for row in 0..rows.len() {
+            let (off, change) = ((ours[row] - theirs[row]).norm(), (theirs[row] - rest[row]).norm());
+            assert!(off < PART * change + FLOOR, "row {row}: {off} m off of {change} m");
+        }
+    }
+}
+
+#[test]
+fn every_effect_is_inert_at_zero() {
+    for (arm, all) in [lunar(), odd()] {
+        for approaches in [true, false] {
+            let rows = poses(&arm, 6, approaches, &mut ChaCha8Rng::seed_from_u64(4));
+            for (effect, _) in &all {
+                let with = declared(&arm, std::slice::from_ref(effect));
+                let mut without = with.clone();
+                without.effects.clear();
+                let zero = |problem: &Problem| {
+                    predicted(problem, &rows, &DVector::zeros(model_of(problem, &rows).parameters.len()))
+                };
+                for (one, other) in zero(&with).iter().zip(zero(&without)) {
+                    assert!((one - other).norm() < 1e-12, "{effect:?}: {:e} m", (one - other).norm());
+                }
+            }
+        }
+    }
+}

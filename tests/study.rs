@@ -1,0 +1,353 @@
+//! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that mean what they say; and
+//! bad input.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command as Process, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use assert_cmd::Command;
+use flexcal::campaign::{Campaign, Results, Shard, Store, collect, pending, run};
+use flexcal::report;
+use serde_json::Value;
+
+/// Three rigid joints, few parameters: a fit takes a moment.
+const ARM: &str = r#"
+name = "small"
+[[joint]]
+d_m = 0.3
+[[joint]]
+alpha_deg = 90.0
+[[joint]]
+a_m = 0.6
+[tool]
+target_m = [0.5, 0.05, 0.0]
+[parameters]
+"joint*.theta" = { sigma_deg = 0.5 }
+"joint3.a" = { sigma_mm = 3.0 }
+"tool.x" = { sigma_mm = 3.0 }
+[data]
+position_sigma_mm = 0.1
+"#;
+
+const STUDY: &str = r#"
+name = "small-study"
+problem = "problem.toml"
+seed = 7
+repetitions = 120
+position_sigma_mm = [0.05, 0.2]
+identification_poses = [8]
+held_out_poses = 10
+strategies = ["joint"]
+solvers = ["auto", "gauss-newton"]
+[poses]
+q1_deg = [-120, 120]
+q2_deg = [-40, 80]
+q3_deg = [-120, -10]
+"#;
+
+/// Cells, and parts of 50 fits at most.
+const CELLS: usize = 4;
+const PARTS: usize = 12;
+
+/// The results that have to repeat.
+const RESULTS: [&str; 3] = ["study.csv", "study.json", "parameters.csv"];
+
+/// A folder with a study.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("problem.toml"), ARM).unwrap();
+        fs::write(folder.path().join("STUDY.toml"), STUDY).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Replaces the first `from` in a file.
+    fn edit(&self, name: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(name)).unwrap();
+        assert!(text.contains(from), "{name} has no {from:?}");
+        fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
+    }
+
+    fn campaign(&self) -> Campaign {
+        Campaign::read(&self.path("STUDY.toml")).unwrap()
+    }
+
+    /// The texts of the results in a folder.
+    fn results(&self, out: &str) -> Vec<String> {
+        RESULTS.iter().map(|name| fs::read_to_string(self.path(out).join(name)).unwrap()).collect()
+    }
+
+    /// Finished parts in a folder of results.
+    fn parts(&self, out: &str) -> usize {
+        let Ok(entries) = fs::read_dir(self.path(out).join("cells")) else { return 0 };
+        entries.filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|e| e == "json")).count()
+    }
+
+    fn flexcal(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(self.folder.path()).args(arguments).assert()
+    }
+}
+
+/// Does what is open of a share, on so many threads.
+fn run_on(threads: usize, campaign: &Campaign, store: &Store, shard: Shard) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let open = pending(campaign, store, shard).unwrap();
+    pool.install(|| run(campaign, store, &open, || ())).unwrap();
+}
+
+fn texts(campaign: &Campaign, results: &Results) -> [String; 3] {
+    [
+        report::study_csv(campaign, results),
+        report::study_json(campaign, results),
+        report::study_parameters_csv(campaign, results),
+    ]
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn threads_shares_and_order_change_nothing() {
+    let bench = Bench::new();
+    let campaign = bench.campaign();
+    assert_eq!((campaign.cells.len(), campaign.parts().len()), (CELLS, PARTS));
+    let whole = Store::new(&bench.path("whole"));
+    run_on(1, &campaign, &whole, Shard::WHOLE);
+    let expected = texts(&campaign, &collect(&campaign, std::slice::from_ref(&whole)).unwrap());
+    assert_eq!(expected[0].lines().count(), 1 + CELLS);
+    assert_eq!(expected[2].lines().count(), 1 + CELLS * campaign.parameters.len());
+    for (threads, shares) in [(2, 1), (3, 3), (2, 5), (1, 20)] {
+        let folder = |i: usize| bench.path(&format!("{shares}-{i}"));
+        let stores: Vec<Store> = (1..=shares).map(|i| Store::new(&folder(i))).collect();
+        for i in (1..=shares).rev() {
+            run_on(threads, &campaign, &stores[i - 1], Shard::new(i, shares).unwrap());
+        }
+        let found = texts(&campaign, &collect(&campaign, &stores).unwrap());
+        assert_eq!(found, expected, "{threads} threads, {shares} shares");
+        if shares > 1 {
+            let message = collect(&campaign, &stores[1..]).unwrap_err().to_string();
+            assert!(message.contains("of 12 parts of the study are missing"), "{message}");
+        }
+    }
+}
+
+#[test]
+fn finished_parts_are_kept_and_no_others_used() {
+    let bench = Bench::new();
+    let store = Store::new(&bench.path("out"));
+    let fits = |campaign: &Campaign| {
+        let count = AtomicUsize::new(0);
+        let open = pending(campaign, &store, Shard::WHOLE).unwrap();
+        run(campaign, &store, &open, || _ = count.fetch_add(1, Ordering::Relaxed)).unwrap();
+        count.into_inner()
+    };
+    let campaign = bench.campaign();
+    assert_eq!(fits(&campaign), CELLS * 120);
+    let first = texts(&campaign, &collect(&campaign, std::slice::from_ref(&store)).unwrap());
+    assert_eq!(fits(&campaign), 0, "everything is there");
+    // One more noise level: the others' fits are still theirs.
+    bench.edit("STUDY.toml", "[0.05, 0.2]", "[0.1, 0.05, 0.2]");
+    assert_eq!(fits(&bench.campaign()), 2 * 120);
+    // More repetitions: full parts stay, the last one of 20 is done again within one of 50.
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 150");
+    assert_eq!(fits(&bench.campaign()), 6 * 50);
+    // Other arms, poses, noise: nothing is.
+    for (file, from, to) in [
+        ("STUDY.toml", "seed = 7", "seed = 8"),
+        ("STUDY.toml", "held_out_poses = 10", "held_out_poses = 11"),
+        ("STUDY.toml", "q3_deg = [-120", "q3_deg = [-110"),
+        ("problem.toml", "0.5 }", "0.4 }"),
+    ] {
+        bench.edit(file, from, to);
+        assert_eq!(fits(&bench.campaign()), 6 * 150, "{to}");
+    }
+    // And back.
+    fs::write(bench.path("STUDY.toml"), STUDY).unwrap();
+    fs::write(bench.path("problem.toml"), ARM).unwrap();
+    assert_eq!(fits(&bench.campaign()), 0);
+    assert_eq!(texts(&campaign, &collect(&campaign, std::slice::from_ref(&store)).unwrap()), first);
+}
+
+#[test]
+fn damaged_and_foreign_parts_are_not_used() {
+    let bench = Bench::new();
+    let campaign = bench.campaign();
+    let store = Store::new(&bench.path("out"));
+    run_on(2, &campaign, &store, Shard::WHOLE);
+    let mut files = fs::read_dir(store.folder()).unwrap().map(|entry| entry.unwrap().path());
+    let (one, other) = (files.next().unwrap(), files.next().unwrap());
+    fs::copy(&other, &one).unwrap();
+    let message = pending(&campaign, &store, Shard::WHOLE).unwrap_err().to_string();
+    assert!(message.contains("belongs to other inputs") && message.contains(&one.display().to_string()), "{message}");
+    fs::write(&one, "{").unwrap();
+    let assert = bench.flexcal(&["study", "STUDY.toml", "--out", "out"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("damaged"));
+    fs::remove_file(&one).unwrap();
+    assert_eq!(pending(&campaign, &store, Shard::WHOLE).unwrap().len(), 1);
+}
+
+#[test]
+fn a_killed_study_goes_on_and_ends_alike() {
+    let bench = Bench::new();
+    // Enough fits to be caught in the act.
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 2000");
+    let start = || {
+        let mut process = Process::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        process.current_dir(bench.folder.path()).args(["study", ".", "--out", "killed", "--quiet"]);
+        process.env("RAYON_NUM_THREADS", "1").stdout(Stdio::null()).spawn().unwrap()
+    };
+    let mut stopped = 0;
+    for wanted in [1, 40] {
+        let mut process = start();
+        while bench.parts("killed") < wanted && process.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        process.kill().unwrap();
+        process.wait().unwrap();
+        stopped += usize::from(!bench.path("killed/study.csv").exists());
+    }
+    assert!(stopped > 0 && bench.parts("killed") < 160, "killed before the end");
+    bench.flexcal(&["study", ".", "--out", "killed", "--quiet"]).success();
+    bench.flexcal(&["study", ".", "--out", "whole", "--quiet"]).success();
+    assert_eq!(bench.results("killed"), bench.results("whole"));
+}
+
+#[test]
+fn shares_of_the_command_line_merge_to_the_same_bytes() {
+    let bench = Bench::new();
+    let assert = bench.flexcal(&["study", "STUDY.toml"]).success();
+    let table = text(&assert.get_output().stdout);
+    for expected in ["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"] {
+        assert!(table.contains(expected), "{expected} missing in:\n{table}");
+    }
+    for share in ["1/3", "2/3", "3/3"] {
+        // In one folder, and each in its own.
+        bench.flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share]).success();
+        let own = format!("own-{}", &share[..1]);
+        bench.flexcal(&["study", "STUDY.toml", "--out", &own, "--shard", share, "--quiet"]).success();
+        assert!(!bench.path("shared/study.csv").exists() && bench.parts(&own) == PARTS / 3);
+    }
+    let assert = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "own-1"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("8 of 12 parts of the study are missing"));
+    let json = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "shared", "--json"]).success();
+    let from = ["study", "merge", "STUDY.toml", "--out", "all", "--from", "own-1", "own-2", "own-3", "--quiet"];
+    bench.flexcal(&from).success();
+    let expected = bench.results("out/small-study");
+    assert_eq!(bench.results("shared"), expected);
+    assert_eq!(bench.results("all"), expected);
+    assert_eq!(text(&json.get_output().stdout), expected[1]);
+    assert_eq!(fs::read_to_string(bench.path("all/timing.csv")).unwrap().lines().count(), 1 + CELLS);
+}
+
+#[test]
+fn figures_are_what_they_say() {
+    let bench = Bench::new();
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 1000");
+    let assert = bench.flexcal(&["study", ".", "--json"]).success();
+    let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    let cells = json["cells"].as_array().unwrap();
+    let number = |value: &Value| value.as_f64().unwrap();
+    for cell in cells {
+        assert_eq!((number(&cell["fits"]), number(&cell["failed"])), (1000.0, 0.0));
+        assert!((number(&cell["reduced_chi2"]) - 1.0).abs() < 0.05, "{}", cell["reduced_chi2"]);
+        // Of the noise on three axes, and of the estimates.
+        let noise = number(&cell["position_sigma_mm"]) * 3.0_f64.sqrt();
+        let rms = number(&cell["held_out_mm"]["rms"]);
+        assert!(rms > noise && rms < 1.5 * noise, "{rms} against {noise}");
+        for parameter in cell["parameters"].as_array().unwrap() {
+            let of = |key: &str| number(&parameter[key]);
+            let (bias, spread, claimed) = (of("bias"), of("spread"), of("std_error"));
+            // Four standard deviations of each figure.
+            assert!(bias.abs() < 4.0 * spread / 1000.0_f64.sqrt(), "{parameter}");
+            assert!((spread / claimed - 1.0).abs() < 4.0 / 2000.0_f64.sqrt(), "{parameter}");
+            assert!((of("coverage") - 0.95).abs() < 4.0 * (0.95_f64 * 0.05 / 1000.0).sqrt(), "{parameter}");
+        }
+    }
+    // The same arms, poses and noise: solvers that find the minimum find the same one; four times the noise, four times
+    // the spread, nearly.
+    let spread = |cell: usize, k: usize| number(&cells[cell]["parameters"][k]["spread"]);
+    for k in 0..5 {
+        assert!((spread(0, k) / spread(1, k) - 1.0).abs() < 1e-4);
+        let ratio = spread(2, k) / spread(0, k);
+        assert!(ratio > 3.0 && ratio < 4.01, "{ratio}");
+    }
+}
+
+#[test]
+fn the_rig_measures_what_the_model_lacks() {
+    let bench = Bench::new();
+    let truth = "[random]\n\"joint*.theta\" = { sigma_deg = 0.5 }\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n\
+                 sin1_deg = 0.1\n[poses]\nq1_deg = [-120, 120]\nq2_deg = [-40, 80]\nq3_deg = [-120, -10]\n";
+    fs::write(bench.path("TRUTH.toml"), truth).unwrap();
+    let (before, _) = STUDY.split_once("[poses]").unwrap();
+    let study = before.replace("repetitions = 120", "repetitions = 20");
+    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\n")).unwrap();
+    let assert = bench.flexcal(&["study", "."]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("write data = \"rig\""));
+    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\ndata = \"rig\"\n")).unwrap();
+    let assert = bench.flexcal(&["study", ".", "--json"]).success();
+    let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
+    let chi2 = json["cells"][0]["reduced_chi2"].as_f64().unwrap();
+    assert!(chi2 > 5.0, "a harmonic of 0.1° at 1 m is far above 0.05 mm: χ²/ν {chi2}");
+    assert!(json["cells"][0]["coverage"].as_f64().unwrap() < 0.95);
+}
+
+#[test]
+fn bad_studies_are_named_and_leave_nothing_behind() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("seed = 7", "sed = 7", &["seed", "missing"]),
+        ("seed = 7", "seed = 7\nsteps = 3", &["STUDY.toml:5", "steps", "unknown key"]),
+        ("repetitions = 120", "repetitions = 0", &["STUDY.toml:5", "repetitions"]),
+        ("repetitions = 120", "repetitions = 2000000", &["STUDY.toml:5", "too large"]),
+        ("[0.05, 0.2]", "[0.05, 0.0]", &["STUDY.toml:6", "position_sigma_mm[2]", "above zero"]),
+        ("[0.05, 0.2]", "[0.05, 0.05]", &["position_sigma_mm[2]", "already"]),
+        ("[0.05, 0.2]", "[]", &["STUDY.toml:6", "empty"]),
+        ("position_sigma_mm", "position_sigma", &["unit", "position_sigma_mm"]),
+        ("[8]", "[8.5]", &["STUDY.toml:7", "identification_poses[1]"]),
+        ("\"joint\"", "\"both\"", &["STUDY.toml:9", "strategies[1]", "sequential"]),
+        ("\"joint\"", "\"stiffness-only\"", &["STUDY.toml:9", "stiffness-only"]),
+        ("\"auto\"", "\"newton\"", &["STUDY.toml:10", "solvers[1]", "pseudo-inverse"]),
+        ("\"auto\"", "\"levenberg-marquardt\", \"auto\"", &["solvers[2]", "already"]),
+        ("problem.toml", "other.toml", &["STUDY.toml:3", "other.toml"]),
+        ("name = \"small-study\"", "name = \"a/b\"", &["STUDY.toml:2", "folder"]),
+        ("q3_deg = [-120, -10]", "", &["poses.q3", "missing"]),
+        (
+            "q3_deg = [-120, -10]",
+            "q3_deg = [-120, -10]\nidentification = 8",
+            &["poses.identification", "the study says"],
+        ),
+        ("[poses]", "truth = \"TRUTH.toml\"\n[poses]", &["STUDY.toml:11", "TRUTH.toml"]),
+    ];
+    for &(from, to, expected) in cases {
+        let bench = Bench::new();
+        bench.edit("STUDY.toml", from, to);
+        let assert = bench.flexcal(&["study", "STUDY.toml"]).code(2);
+        let message = text(&assert.get_output().stderr);
+        for word in expected {
+            assert!(message.contains(word), "{to}: {word:?} missing in: {message}");
+        }
+        assert!(assert.get_output().stdout.is_empty() && !bench.path("out").exists(), "{to} left something behind");
+    }
+    let bench = Bench::new();
+    bench.edit("problem.toml", "sigma_mm = 3.0 }", "sigma_mm = 3.0, max_mm = 9.0 }");
+    let assert = bench.flexcal(&["study", "STUDY.toml"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("gauss-newton does not keep the bounds"));
+    for arguments in [&["study"][..], &["study", ".", "--shard", "0/3"], &["study", ".", "--shard", "1/3", "--json"]] {
+        bench.flexcal(arguments).code(2);
+    }
+    bench.flexcal(&["study", "nowhere.toml"]).code(2);
+}
