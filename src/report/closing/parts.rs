@@ -128,7 +128,7 @@ pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<S
             ));
             let (factor, unit) = unit(problem, &on);
             sentences.push(format!(
-                "It reaches from {} to {} {unit}, as far as the identification poses do; nothing is corrected beyond \
+                "It holds for {on} from {} to {} {unit}, as far as the identification poses reach; nothing is corrected beyond \
                  ({beyond} of {} held-out poses).",
                 number(range.0 * factor, 2),
                 number(range.1 * factor, 2),

@@ -26,6 +26,8 @@ pub fn loop_text(problem: &Problem, closure: &Closure) -> String {
     if closure.unexplained.is_some() || (!failed.is_empty() && !closure.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
         let unexplained = closure.unexplained.iter().flat_map(|rest| parts::unexplained(problem, rest));
+        // Without effects the checks are those above.
+        let failed = failed.into_iter().filter(|_| !closure.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
     }
     to_text(&blocks)
