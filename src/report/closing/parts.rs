@@ -113,7 +113,7 @@ pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<S
     sentences.push("No effect of the catalogue explains it.".to_owned());
     match correction {
         None => {
-            sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned())
+            sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
         }
         Some(Correction { range, beyond, cross_validated: (without, with), held_out, .. }) => {
             let mm = |value: &f64| number(value * 1e3, 4);

@@ -1,5 +1,7 @@
 //! What `trace` prints.
 
+use std::fmt::Write as _;
+
 use super::super::document::{Block, Point, to_text};
 use super::super::quantity::number;
 use super::super::{effect, findings};
@@ -65,7 +67,7 @@ pub(in crate::report) fn ranking(trace: &Trace, most: usize) -> Vec<Block> {
         trace.tried, trace.level
     );
     if all.len() > most {
-        notes.push_str(&format!(" {} more that stand out are left out here.", all.len() - most));
+        let _ = write!(notes, " {} more that stand out are left out here.", all.len() - most);
     }
     if all.iter().take(most).any(|ranked| !ranked.alike.is_empty()) {
         notes.push_str(
@@ -85,7 +87,7 @@ fn point(ranked: &Ranked) -> Point {
         mm(ranked.gain)
     );
     if let Some(cross_validated) = ranked.cross_validated {
-        gain.push_str(&format!(", {} mm on poses left out in turn", mm(cross_validated)));
+        let _ = write!(gain, ", {} mm on poses left out in turn", mm(cross_validated));
     }
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {
