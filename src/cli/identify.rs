@@ -88,6 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         strategy: arguments.strategy.into(),
         solver: arguments.solver.into(),
         progress: line.as_ref().map(Line::sink),
+        ..Options::default()
     };
     let result = study::identify(&problem, &measurements, &split, &options);
     if let Some(line) = line {

@@ -41,6 +41,12 @@ impl Fitted {
         Ok(Self { problem, model, found, placement, unknowns, sigma })
     }
 
+    /// Options to fit a problem that differs by a few effects: from where this fit ended.
+    pub fn onwards(&self, options: &Options) -> Options {
+        let values = self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+        Options { start: values.collect(), ..options.clone() }
+    }
+
     /// The same problem with other effects declared.
     pub fn with_effects(&self, effects: &[Effect]) -> Problem {
         let mut problem = self.problem.clone();

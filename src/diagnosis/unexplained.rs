@@ -1,6 +1,7 @@
 //! Structure that no effect of the catalogue explains: where it is, what it depends on, and what a smooth correction gains.
 
 use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
 
 use super::checks::Findings;
 use super::data::Data;
@@ -15,6 +16,10 @@ use crate::study::ErrorSummary;
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
 const BETTER: f64 = 6.0;
 
+/// Poses that are enough to find a place.
+const ENOUGH: usize = 1000;
+/// Splines whose places and quantities are looked at for single bumps and steps.
+const PROMISING: usize = 12;
 /// Bumps and steps whose shape is fitted.
 const REFINED: usize = 4;
 
@@ -79,8 +84,15 @@ pub(super) fn best(
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
         Some(Tried { generic, gain, criterion, corrected })
     };
-    let mut all: Vec<Tried> =
-        generics.iter().filter(|generic| wanted(generic)).filter_map(|generic| tried(generic.clone())).collect();
+    // Splines everywhere; single bumps and steps where splines find most.
+    let wanted: Vec<&Generic> = generics.iter().filter(|generic| wanted(generic)).collect();
+    let (single, splines): (Vec<&Generic>, Vec<&Generic>) = wanted.iter().partition(|g| g.functions.len() == 1);
+    let mut all: Vec<Tried> = splines.into_par_iter().filter_map(|generic| tried(generic.clone())).collect();
+    all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
+    let near: Vec<(Slot, Quantity)> = all.iter().take(PROMISING).map(|t| (t.generic.slot, t.generic.of)).collect();
+    let promising = |generic: &&&Generic| near.is_empty() || near.contains(&(generic.slot, generic.of));
+    let single: Vec<&Generic> = single.iter().filter(promising).copied().collect();
+    all.extend(single.into_par_iter().filter_map(|generic| tried(generic.clone())).collect::<Vec<_>>());
     all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
     let shapes: Vec<Generic> =
         all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
@@ -147,7 +159,7 @@ fn function_of(effect: &Effect) -> Option<(usize, usize)> {
 /// What is known of structure at a generic, or of the strongest one where `known` is none; `level` is that of chance.
 pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, level: f64) -> Option<Unexplained> {
     let generics = Generic::all(&fitted.problem, data);
-    let library = fitted.library(data, &[], &generics);
+    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &generics);
     let linear = fitted.linear(&library, &[], &[]);
     let tried = match known {
         None => best(&linear, &library, &generics, |_| true),
@@ -160,6 +172,8 @@ pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, le
     }
     let Tried { generic, corrected, gain, .. } = tried;
     debug_assert!(gain.freedom > 0);
+    let library = fitted.library(data, &[], std::slice::from_ref(&generic));
+    let linear = fitted.linear(&library, &[], &[]);
     let mut with = linear.clone();
     with.add(&generic.columns(&library));
     let coordinates = linear.rows() as f64;

@@ -39,7 +39,7 @@ pub fn compare(
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let run = |model: &Model, strategy, solver| {
-        let options = Options { strategy, solver, progress: progress.cloned() };
+        let options = Options { strategy, solver, progress: progress.cloned(), ..Options::default() };
         identify_model(model, problem, measurements, split, &options)
     };
     let bounded = model.is_bounded();

@@ -34,6 +34,8 @@ pub struct Options {
     pub solver: SolverChoice,
     /// Told of every step.
     pub progress: Option<ProgressSink>,
+    /// Values [SI] by name from which the fit starts; the registered nominal arm gives the others.
+    pub start: Vec<(String, f64)>,
 }
 
 /// Why an identification could not be made.
@@ -136,7 +138,13 @@ pub fn identify_model(
     if !noise_is_declared {
         fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
     }
-    let (mut end, statistics, noise) = fitted(&mut fitting, &start, noise_is_declared)?;
+    let mut begin = start.clone();
+    for (k, parameter) in model.parameters.iter().enumerate() {
+        if let Some((_, value)) = options.start.iter().find(|(name, _)| *name == parameter.name) {
+            begin[k] = parameter.deviation(*value);
+        }
+    }
+    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, noise_is_declared)?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();

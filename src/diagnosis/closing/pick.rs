@@ -2,7 +2,7 @@
 
 use super::super::candidates::same_family;
 use super::super::data::Data;
-use super::super::trace::{Scan, Tried};
+use super::super::trace::Scan;
 use crate::problem::Effect;
 
 /// Level of a whole scan: probability that noise alone points to anything.
@@ -12,7 +12,7 @@ const RIVAL: f64 = 10.0;
 /// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.
 const OVERWHELMING: f64 = 1e-12;
 /// Effects that a round adds at most.
-const MOST: usize = 40;
+const MOST: usize = 100;
 
 /// What a round adds.
 pub(super) struct Pick {
@@ -21,12 +21,25 @@ pub(super) struct Pick {
     pub rivals: Vec<Effect>,
 }
 
-/// The candidates that stand out of what is left, each the best after those before it.
+/// The candidates that stand out of what is left, each the best after those before it: beyond chance, better than nothing,
+/// and better at predicting poses that were left out.
 pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
     let mut picks: Vec<Pick> = Vec::new();
+    let mut left_out = scan.linear.cross_validate(&data.block);
     while picks.len() < MOST {
         let ranking = scan.ranking();
-        let Some(best) = ranking.iter().find(|tried| stands_out(scan, data, tried)) else { break };
+        let mut found = None;
+        for tried in ranking.iter().take_while(|tried| tried.criterion < 0.0).filter(|tried| tried.corrected < LEVEL) {
+            let mut with = scan.linear.clone();
+            with.add(&scan.columns(tried.index));
+            let with = with.cross_validate(&data.block);
+            if left_out.zip(with).is_none_or(|(without, with)| with < without) {
+                found = Some((tried, with));
+                break;
+            }
+        }
+        let Some((best, with)) = found else { break };
+        left_out = with;
         let rivals: Vec<Effect> = ranking
             .iter()
             .filter(|tried| tried.index != best.index && tried.criterion < best.criterion + RIVAL)
@@ -46,17 +59,4 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
         scan.take(index);
     }
     picks
-}
-
-/// Whether a candidate is beyond chance, better than nothing, and predicts poses that were left out better than without it.
-fn stands_out(scan: &Scan, data: &Data, tried: &Tried) -> bool {
-    if tried.corrected >= LEVEL || tried.criterion >= 0.0 {
-        return false;
-    }
-    let mut with = scan.linear.clone();
-    with.add(&scan.columns(tried.index));
-    match (scan.linear.cross_validate(&data.block), with.cross_validate(&data.block)) {
-        (Some(without), Some(with)) => with < without,
-        _ => true,
-    }
 }

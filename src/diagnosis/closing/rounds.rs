@@ -12,6 +12,8 @@ use crate::study::{ErrorSummary, IdentifyError, Options};
 
 /// Rounds after which the loop ends whatever is left.
 const MOST_ROUNDS: usize = 24;
+/// Poses beyond which rivals are not fitted one by one: the linear neighbourhood of so many decides as well.
+const MOST_REFITTED: usize = 1000;
 /// Rivals that are fitted to decide between them.
 const MOST_RIVALS: usize = 5;
 
@@ -90,7 +92,7 @@ impl Rounds<'_> {
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        Fitted::new(fitted.with_effects(&effects), self.data, self.options)
+        Fitted::new(fitted.with_effects(&effects), self.data, &fitted.onwards(self.options))
     }
 
     /// The problem fitted with what was picked; among rivals the one that fits best.
@@ -98,7 +100,7 @@ impl Rounds<'_> {
         let present = self.added(fitted);
         match picks {
             [] => Ok(None),
-            [Pick { effect, rivals }] if !rivals.is_empty() => {
+            [Pick { effect, rivals }] if !rivals.is_empty() && self.data.rows().len() <= MOST_REFITTED => {
                 let mut best: Option<(f64, Fitted)> = None;
                 for candidate in std::iter::once(effect).chain(rivals.iter().take(MOST_RIVALS)) {
                     let next = self.fit(fitted, &joined(&present, candidate))?;
