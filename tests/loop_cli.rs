@@ -79,6 +79,20 @@ fn is_summary(value: &Value, poses: u64) {
     }
 }
 
+/// Fits from different starts end within the solver's tolerance of each other, far below any noise.
+fn are_alike(one: &Value, other: &Value) {
+    match (one, other) {
+        (Value::Object(one), Value::Object(other)) => {
+            assert!(one.keys().eq(other.keys()), "{one:?} {other:?}");
+            one.iter().for_each(|(key, value)| are_alike(value, &other[key]));
+        }
+        _ => {
+            let (one, other) = (one.as_f64().unwrap(), other.as_f64().unwrap());
+            assert!((one - other).abs() < 1e-6, "{one} {other}");
+        }
+    }
+}
+
 fn held_out_rms(value: &Value) -> f64 {
     value["held_out"]["rms_mm"]["norm"].as_f64().unwrap()
 }
@@ -129,7 +143,7 @@ fn the_closed_problem_is_input_again() {
     assert!(text.contains("# link-thermal-bending[B].about_y = ") && text.contains(" ± "), "{text}");
     let again = bench.json(&["identify", "results/of/may/problem.closed.toml"]);
     for part in ["identification", "held_out", "reduced_chi2"] {
-        assert_eq!(again[part], before["after"][part]);
+        are_alike(&again[part], &before["after"][part]);
     }
     let closed = bench.json(&["loop", "results/of/may/problem.closed.toml"]);
     assert_eq!((&closed["verdict"], &closed["effects"]), (&"nothing-found".into(), &Value::Array(Vec::new())));
@@ -141,7 +155,7 @@ fn other_data_go_into_the_closed_problem() {
     fs::rename(bench.path("arm/data.csv"), bench.path("other data.csv")).unwrap();
     let before = bench.json(&["loop", "arm", "--data", "other data.csv"]);
     let again = bench.json(&["identify", "out/lunar-sampler/problem.closed.toml"]);
-    assert_eq!(again["held_out"], before["after"]["held_out"]);
+    are_alike(&again["held_out"], &before["after"]["held_out"]);
     let text = fs::read_to_string(bench.path("out/lunar-sampler/problem.closed.toml")).unwrap();
     assert!(text.contains("files = [\"../../other data.csv\"]"), "{text}");
 }
