@@ -269,21 +269,22 @@ fn a_result_that_cannot_be_written_is_an_error() {
 fn the_readme_shows_what_is_printed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let (_, after) = readme.split_once("<!-- lunar -->\n```text\n").unwrap();
-    let (shown, _) = after.split_once("\n```").unwrap();
+    let shown = |mark: &str| {
+        let (_, after) = readme.split_once(&format!("<!-- {mark} -->\n```text\n")).unwrap();
+        after.split_once("\n```").unwrap().0.to_owned()
+    };
     let folder = tempfile::tempdir().unwrap();
-    let printed = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
-        .current_dir(folder.path())
-        .arg("identify")
-        .arg(root.join("problems/lunar-sampler"))
-        .output()
-        .unwrap();
-    let printed = text(&printed.stdout);
+    let printed = |command: &str, problem: &Path| {
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).output().unwrap().stdout)
+    };
+    assert_eq!(shown("loop"), printed("loop", &root.join("problems/lunar-sampler")).trim_end());
+    let identified = printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"));
     // The third line ends in the time it took.
     let timeless = |text: &str| -> Vec<String> {
         text.trim_end().lines().enumerate().filter(|(k, _)| *k != 2).map(|(_, line)| line.to_owned()).collect()
     };
-    assert_eq!(timeless(shown), timeless(&printed));
+    assert_eq!(timeless(&shown("lunar")), timeless(&identified));
 }
 
 /// A bench whose problem declares effects, with few other parameters.

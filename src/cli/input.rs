@@ -39,13 +39,22 @@ impl Common {
     /// Reads the problem and its measurements.
     pub fn read(&self) -> Result<Input, InputError> {
         let problem = Problem::read(&self.problem)?;
-        let files: &[PathBuf] = if self.data.is_empty() { &problem.data.files } else { &self.data };
-        let (measurements, warnings) = Measurements::read(files, &problem)?;
+        let (measurements, warnings) = Measurements::read(self.files(&problem), &problem)?;
         if !self.quiet {
             diagnostic::print_warnings(&warnings);
         }
         let split = Split::new(&problem, &measurements)?;
         Ok(Input { problem, measurements, split })
+    }
+
+    /// The measurement files.
+    pub fn files<'a>(&'a self, problem: &'a Problem) -> &'a [PathBuf] {
+        if self.data.is_empty() { &problem.data.files } else { &self.data }
+    }
+
+    /// The problem file itself.
+    pub fn problem_file(&self) -> PathBuf {
+        if self.problem.is_dir() { self.problem.join("problem.toml") } else { self.problem.clone() }
     }
 
     /// Folder for the results of `problem`.

@@ -1,6 +1,7 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
 mod check;
+mod closing;
 mod compare;
 mod compensate;
 mod completions;
@@ -14,6 +15,7 @@ mod poses;
 mod progress;
 mod simulate;
 mod study;
+mod trace;
 
 use std::process::ExitCode;
 
@@ -43,6 +45,10 @@ enum Command {
     Identify(identify::Arguments),
     /// Put every strategy and solver, and every part of the elasticity left out, side by side.
     Compare(compare::Arguments),
+    /// Rank the effects that the residual points to; changes nothing.
+    Trace(trace::Arguments),
+    /// Find the effects that a problem lacks and add them, until nothing is left to find.
+    Loop(closing::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
@@ -81,6 +87,8 @@ pub fn run() -> ExitCode {
     let outcome = match cli.command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
+        Command::Loop(arguments) => closing::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),

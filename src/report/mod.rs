@@ -1,10 +1,17 @@
 //! Results as people and programs read them.
+//!
+//! - [`estimate_text`], [`compare_text`], [`commands_text`]: tables of one command each, with their JSON beside them.
+//! - [`trace`](trace_text), [`closing`](loop_text): the residual's story, as text, JSON, Markdown and a problem file.
 
 mod check;
+mod closing;
 mod commands;
 mod compare_json;
 mod compare_text;
+mod document;
+mod effect;
 mod expected;
+mod findings;
 mod json;
 mod parameters;
 mod plan;
@@ -14,8 +21,10 @@ mod study_json;
 mod study_tables;
 mod study_text;
 mod text;
+mod trace;
 
 pub use check::{check_json, check_text};
+pub use closing::{closed_problem, loop_json, loop_markdown, loop_text};
 pub use commands::{commands_csv, commands_json, commands_text};
 pub use compare_json::compare_json;
 pub use compare_text::compare_text;
@@ -26,3 +35,4 @@ pub use study_json::study_json;
 pub use study_tables::{study_csv, study_parameters_csv, study_timing_csv};
 pub use study_text::study_text;
 pub use text::{estimate_text, why_not_trusted};
+pub use trace::{trace_json, trace_text};

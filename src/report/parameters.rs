@@ -17,32 +17,37 @@ const NAMED: f64 = 0.02;
 /// Correlations that fit on a screen.
 const SHOWN_CORRELATIONS: usize = 12;
 
+/// Columns of the table of parameters.
+pub(super) const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
+/// Those of them that hold words.
+pub(super) const LEFT: [usize; 3] = [0, 5, 6];
+
 /// Nominal, estimate, change and standard error of every free parameter.
 pub(super) fn parameter_table(result: &Identification) -> String {
-    let rows = result
-        .estimates
-        .iter()
-        .map(|estimate| {
-            let unit = Display::of(estimate.unit, estimate.nominal);
-            let error = estimate.std_error.map(|error| error * unit.factor);
-            let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
-            let show = |value: f64| number(value * unit.factor, digits);
-            vec![
-                estimate.name.clone(),
-                number(estimate.nominal * unit.factor, digits.min(PLAIN)),
-                show(estimate.estimate),
-                show(estimate.estimate - estimate.nominal),
-                error.map_or_else(|| "–".to_owned(), |error| number(error, digits)),
-                unit.symbol,
-                verdict(estimate),
-            ]
-        })
-        .collect();
-    let header = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
-    let text = table(&header, rows, &[0, 5, 6]);
+    let text = table(&HEADER, parameter_rows(result), &LEFT);
     format!(
         "{text}  identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations\n"
     )
+}
+
+/// The rows of that table.
+pub(super) fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
+    let row = |estimate: &Estimate| {
+        let unit = Display::of(estimate.unit, estimate.nominal);
+        let error = estimate.std_error.map(|error| error * unit.factor);
+        let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
+        let show = |value: f64| number(value * unit.factor, digits);
+        vec![
+            estimate.name.clone(),
+            number(estimate.nominal * unit.factor, digits.min(PLAIN)),
+            show(estimate.estimate),
+            show(estimate.estimate - estimate.nominal),
+            error.map_or_else(|| "–".to_owned(), |error| number(error, digits)),
+            unit.symbol,
+            verdict(estimate),
+        ]
+    };
+    result.estimates.iter().map(row).collect()
 }
 
 /// How well a parameter is identified, in a word and a share.

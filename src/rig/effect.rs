@@ -110,7 +110,9 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, &'static Kin
         }
         Effect::JointCoupling { .. } => named(&[("factor", &RELATIVE)]),
         Effect::LinkBending { .. } => named(&[("flexibility", &FLEXIBILITY)]),
-        Effect::LinkThermalBending { .. } => about_xy(&CURVATURE_PER_DEGREE),
+        Effect::LinkThermalBending { .. } => {
+            named(&[("about_y", &CURVATURE_PER_DEGREE), ("about_z", &CURVATURE_PER_DEGREE)])
+        }
         Effect::LinkThermalExpansion { .. } => named(&[("strain", &STRAIN_PER_DEGREE)]),
         Effect::UnmodelledMass { .. } => named(&[("mass", &MASS), ("at", &LENGTH)]),
         Effect::PayloadMass => named(&[("mass", &MASS)]),

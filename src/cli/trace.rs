@@ -1,0 +1,50 @@
+//! `flexcal trace`.
+
+use std::error::Error;
+
+use clap::Args;
+use flexcal::study::Options;
+use flexcal::{diagnosis, report};
+
+use super::input::{Common, Input};
+use super::progress::Line;
+use super::{Outcome, diagnostic, output};
+
+/// Arguments of `flexcal trace`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal trace problems/lunar-sampler
+  flexcal trace problems/ur10-ipa --data session_A.csv session_B.csv session_C.csv
+  flexcal trace my-arm/problem.toml --json")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Fits, traces what is left, writes `trace.json`, and prints the ranking.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let Input { problem, measurements, split } = common.read()?;
+    let line = common.talks().then(Line::new);
+    let options = Options { progress: line.as_ref().map(Line::sink), ..Options::default() };
+    let result = diagnosis::trace(&problem, &measurements, &split, &options);
+    if let Some(line) = line {
+        line.clear();
+    }
+    let trace = result?;
+    let json = report::trace_json(&problem, &trace);
+    let path = output::write(&common.folder(&problem), "trace.json", &json)?;
+    if common.json {
+        output::print(&json)?;
+    } else if common.talks() {
+        output::print(&report::trace_text(&problem, &trace))?;
+        output::print(&format!("\nWritten to {}\n", path.display()))?;
+    }
+    if trace.fit.is_trusted() {
+        return Ok(Outcome::Done);
+    }
+    if !common.quiet {
+        diagnostic::warn(&report::why_not_trusted(&trace.fit));
+    }
+    Ok(Outcome::NotTrusted)
+}

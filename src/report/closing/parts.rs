@@ -1,0 +1,158 @@
+//! Parts of the loop's story.
+
+use super::super::document::{Block, Point, Table};
+use super::super::effect;
+use super::super::quantity::number;
+use crate::diagnosis::{Closure, Correction, Found, Unexplained, Verdict};
+use crate::effect::describe;
+use crate::problem::{JointKind, Problem};
+use crate::study::ErrorSummary;
+
+/// Alternatives that are named.
+const SHOWN: usize = 4;
+
+/// The outcome in a sentence or two.
+pub(super) fn verdict(closure: &Closure) -> String {
+    let found = match closure.effects.as_slice() {
+        [] => "No effect was found".to_owned(),
+        [one] => format!("One effect was found ({})", describe(&one.effect)),
+        several => format!("{} effects were found", several.len()),
+    };
+    match (closure.verdict, closure.findings.is_testable()) {
+        (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
+        (_, false) => format!("{found}; whether structure is left could not be tested."),
+        (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
+        (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
+    }
+}
+
+fn lower(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// Errors of the nominal arm, the declared problem and the closed one.
+pub(super) fn errors(closure: &Closure) -> Table {
+    let row = |poses: &str, model: &str, of: &ErrorSummary, chi2: Option<f64>| {
+        let mut row = vec![poses.to_owned(), model.to_owned()];
+        row.extend([of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value * 1e3, 4)));
+        row.push(chi2.map_or_else(String::new, |chi2| format!("{chi2:.2}")));
+        row
+    };
+    let (before, after) = (&closure.before.fit, &closure.after);
+    let mut rows = vec![
+        row("held out", "nominal arm, base and tool fitted", &before.registered.held_out, None),
+        row("", "as declared, fitted", &before.fitted.held_out, None),
+        row("", "with what was found", &after.fitted.held_out, None),
+        row("identification", "nominal arm, base and tool fitted", &before.registered.identification, None),
+        row("", "as declared, fitted", &before.fitted.identification, before.reduced_chi2),
+        row("", "with what was found", &after.fitted.identification, after.reduced_chi2),
+    ];
+    if closure.effects.is_empty() {
+        rows.retain(|row| row[1] != "with what was found");
+    }
+    Table { header: vec!["error, mm", "", "mean", "rms", "max", "χ²/ν"], rows, left: vec![0, 1] }
+}
+
+/// How the figures are to be read, with the gain and how sure it is.
+pub(super) fn gain(closure: &Closure) -> String {
+    let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
+    if closure.effects.is_empty() {
+        return chi2.to_owned();
+    }
+    let gain = closure.gain;
+    let mm = |value: f64| number(value * 1e3, 4);
+    format!(
+        "What was found takes {} mm off the mean error of the {} held-out poses (95 % interval {} to {} mm). They took no \
+         part in any choice. {chi2}",
+        mm(gain.value),
+        closure.after.fitted.held_out.n,
+        mm(gain.low),
+        mm(gain.high),
+    )
+}
+
+/// Every effect that was found.
+pub(super) fn found(closure: &Closure) -> Vec<Block> {
+    if closure.effects.is_empty() {
+        return Vec::new();
+    }
+    vec![Block::heading("What was found"), Block::Ranking(closure.effects.iter().map(point).collect())]
+}
+
+fn point(found: &Found) -> Point {
+    let mut details: Vec<String> =
+        found.estimates.iter().map(|estimate| format!("{} = {}", estimate.name, effect::value(estimate))).collect();
+    let after = found.held_out_after;
+    let mm = |value: f64| number(value * 1e3, 4);
+    details.push(format!(
+        "{}, the probability that it is chance; held-out error with it in the model: mean {} mm, rms {} mm",
+        effect::p(found.p_value),
+        mm(after.mean.norm),
+        mm(after.rms.norm)
+    ));
+    if !found.alternatives.is_empty() {
+        let named: Vec<String> = found.alternatives.iter().take(SHOWN).map(describe).collect();
+        let more = match found.alternatives.len().saturating_sub(SHOWN) {
+            0 => String::new(),
+            more => format!("; and {more} more"),
+        };
+        details.push(format!("these data do not tell it from: {}{more}", named.join("; ")));
+    }
+    Point { text: effect::both(&found.effect), details }
+}
+
+/// What no effect explains.
+pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<String> {
+    let Unexplained { place, depends_on, p_value, correction } = unexplained;
+    let on = depends_on.join(", ");
+    let mut sentences = vec![match on.as_str() {
+        "" => format!("Structure is left: {place} ({}).", effect::p(*p_value)),
+        on => format!("Structure is left: {place}, depending on {on} ({}).", effect::p(*p_value)),
+    }];
+    sentences.push("No effect of the catalogue explains it.".to_owned());
+    match correction {
+        None => {
+            sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
+        }
+        Some(Correction { range, beyond, cross_validated: (without, with), held_out, .. }) => {
+            let mm = |value: &f64| number(value * 1e3, 4);
+            sentences.push(format!(
+                "A smooth correction there as a function of {on} would bring the held-out error to {} mm in the mean, rms \
+                 {} mm, and that of identification poses left out in turn from rms {} to {} mm. It names no cause and is \
+                 not part of `problem.closed.toml`.",
+                mm(&held_out.mean.norm),
+                mm(&held_out.rms.norm),
+                mm(without),
+                mm(with),
+            ));
+            let (factor, unit) = unit(problem, &on);
+            sentences.push(format!(
+                "It holds for {on} from {} to {} {unit}, as far as the identification poses reach; nothing is corrected beyond \
+                 ({beyond} of {} held-out poses).",
+                number(range.0 * factor, 2),
+                number(range.1 * factor, 2),
+                held_out.n
+            ));
+        }
+    }
+    sentences
+}
+
+/// Factor from SI to the unit in which people read a quantity of the poses.
+fn unit(problem: &Problem, quantity: &str) -> (f64, &'static str) {
+    match quantity {
+        "temperature" => (1.0, "°C"),
+        "time" => (1.0 / 3600.0, "h"),
+        "payload" => (1.0, "kg"),
+        "hoist" => (1.0, "N"),
+        command => {
+            let joint = command.strip_prefix('q').and_then(|number| number.parse::<usize>().ok());
+            let joint = joint.and_then(|number| problem.joints.get(number.checked_sub(1)?));
+            match joint.map(|joint| joint.kind) {
+                Some(JointKind::Prismatic) => (1e3, "mm"),
+                _ => (180.0 / std::f64::consts::PI, "°"),
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Effects as results name them.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::quantity::{Display, decimals, number};
+use crate::effect::{self, Argument};
+use crate::problem::Effect;
+use crate::study::Estimate;
+
+/// Decimals of a value at most.
+const MOST: usize = 6;
+/// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
+const LEAST_P: f64 = 1e-16;
+
+/// Its name and its arguments: `{"effect": "gear-ratio", "joint": 3}`.
+#[derive(Debug)]
+pub(super) struct Entry<'a>(pub &'a Effect);
+
+impl Serialize for Entry<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let arguments = effect::arguments(self.0);
+        let mut map = serializer.serialize_map(Some(1 + arguments.len()))?;
+        map.serialize_entry("effect", effect::name(self.0))?;
+        for (key, argument) in &arguments {
+            match argument {
+                Argument::Joint(joint) => map.serialize_entry(key, joint)?,
+                Argument::Orders(orders) => map.serialize_entry(key, orders)?,
+                Argument::Link(link) => map.serialize_entry(key, link)?,
+                Argument::Time(time) => map.serialize_entry(key, time)?,
+            }
+        }
+        map.end()
+    }
+}
+
+/// As a problem declares it: `gear-ratio = { joint = 3 }`.
+pub(super) fn declaration(effect: &Effect) -> String {
+    let write = |(key, argument): (&str, Argument)| match argument {
+        Argument::Joint(joint) => format!("{key} = {joint}"),
+        Argument::Orders(orders) => format!("{key} = {orders:?}"),
+        Argument::Link(link) => format!("{key} = {link:?}"),
+        Argument::Time(time) => format!("{key} = {time:?}"),
+    };
+    let arguments: Vec<String> = effect::arguments(effect).into_iter().map(write).collect();
+    match arguments.join(", ") {
+        none if none.is_empty() => format!("{} = true", effect::name(effect)),
+        arguments => format!("{} = {{ {arguments} }}", effect::name(effect)),
+    }
+}
+
+/// In words and as a problem declares it.
+pub(super) fn both(effect: &Effect) -> String {
+    format!("{}: `{}`", effect::describe(effect), declaration(effect))
+}
+
+/// A parameter with its error in a unit for people: `4.12 ± 0.05 µrad/(m·K)`.
+pub(super) fn value(estimate: &Estimate) -> String {
+    let unit = Display::of(estimate.unit, estimate.estimate);
+    let scaled = estimate.estimate * unit.factor;
+    match estimate.std_error.map(|error| error * unit.factor) {
+        Some(error) => {
+            let digits = decimals(error, MOST);
+            format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
+        }
+        None => format!("{} {}, its error unknown", number(scaled, MOST), unit.symbol),
+    }
+}
+
+/// `p 0.003`, `p 2e-9`, `p below 1e-16`.
+pub(super) fn p(value: f64) -> String {
+    match value {
+        p if p < LEAST_P => "p below 1e-16".to_owned(),
+        p if p < 1e-3 => format!("p {p:.0e}"),
+        p => format!("p {p:.3}"),
+    }
+}
+
+/// Effects with the harmonics of one joint that share a reason taken together, in the order in which they come.
+pub(super) fn joined<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(Effect, R)> {
+    let mut all: Vec<(Effect, R)> = Vec::new();
+    for (effect, reason) in effects {
+        if let Effect::JointHarmonic { joint, orders } = &effect {
+            let same = all.iter_mut().find_map(|(known, why)| match known {
+                Effect::JointHarmonic { joint: other, orders } if other == joint && *why == reason => Some(orders),
+                _ => None,
+            });
+            if let Some(known) = same {
+                known.extend(orders);
+                continue;
+            }
+        }
+        all.push((effect, reason));
+    }
+    all
+}
+
+/// Effects in one line for each family and reason: "`backlash` at joints 1, 2, 3".
+pub(super) fn grouped<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(String, R)> {
+    let mut groups: Vec<(Vec<Effect>, R)> = Vec::new();
+    for (effect, reason) in joined(effects) {
+        let alike = |(members, why): &&mut (Vec<Effect>, R)| {
+            *why == reason
+                && effect::name(&members[0]) == effect::name(&effect)
+                && orders(&members[0]) == orders(&effect)
+        };
+        match groups.iter_mut().find(alike) {
+            Some((members, _)) => members.push(effect),
+            None => groups.push((vec![effect], reason)),
+        }
+    }
+    groups.into_iter().map(|(members, reason)| (group(&members), reason)).collect()
+}
+
+fn orders(effect: &Effect) -> Option<&[u32]> {
+    if let Effect::JointHarmonic { orders, .. } = effect { Some(orders) } else { None }
+}
+
+fn group(members: &[Effect]) -> String {
+    let name = effect::name(&members[0]);
+    if let (Effect::StationShift { .. }, true) = (&members[0], members.len() > 1) {
+        return format!("`{name}` at {} times", members.len());
+    }
+    let place = |effect: &Effect| match effect {
+        Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
+        Effect::StationShift { at_time } => format!("{at_time} s"),
+        other => effect::place(other),
+    };
+    let places = members.iter().map(place).collect::<Vec<_>>().join(", ");
+    let of = match effect::arguments(&members[0]).first() {
+        Some(("joint", _)) if members.len() > 1 => "of joints ",
+        Some(("joint", _)) => "of joint ",
+        Some(("link", _)) if members.len() > 1 => "of links ",
+        Some(("link", _)) => "of link ",
+        Some(_) => "at ",
+        None => return format!("`{name}`"),
+    };
+    let orders = match orders(&members[0]) {
+        Some([one]) => format!(", order {one}"),
+        Some(all @ [first, .., last]) if (last - first) as usize + 1 == all.len() => {
+            format!(", orders {first} to {last}")
+        }
+        Some(all) => format!(", orders {}", all.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")),
+        None => String::new(),
+    };
+    format!("`{name}` {of}{places}{orders}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_are_written_as_they_are_read() {
+        assert_eq!(declaration(&Effect::GearRatio { joint: 3 }), "gear-ratio = { joint = 3 }");
+        assert_eq!(declaration(&Effect::HoistForce), "hoist-force = true");
+        let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1, 4] };
+        assert_eq!(
+            serde_json::to_string(&Entry(&harmonic)).ok().as_deref(),
+            Some(r#"{"effect":"joint-harmonic","joint":2,"orders":[1,4]}"#)
+        );
+    }
+
+    #[test]
+    fn many_effects_take_one_line() {
+        let harmonics =
+            (1..=2).flat_map(|joint| (1..=60).map(move |order| Effect::JointHarmonic { joint, orders: vec![order] }));
+        let others = [Effect::Backlash { joint: 3 }, Effect::JointCoupling { joint: 2, from: 1 }];
+        let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())));
+        let words: Vec<&str> = lines.iter().map(|(words, ())| words.as_str()).collect();
+        let expected = [
+            "`joint-harmonic` of joints 1, 2, orders 1 to 60",
+            "`backlash` of joint 3",
+            "`joint-coupling` of joint 2 by 1",
+        ];
+        assert_eq!(words, expected);
+    }
+}

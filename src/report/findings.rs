@@ -1,0 +1,63 @@
+//! Checks of what a fit leaves, for programs and for people.
+
+use serde::Serialize;
+
+use crate::diagnosis::{Check, Findings, Test};
+
+/// One check.
+#[derive(Debug, Serialize)]
+pub(super) struct Entry<'a> {
+    check: &'static str,
+    about: Option<&'a str>,
+    structure: bool,
+    failed: bool,
+    statistic: Option<f64>,
+    /// Where chance keeps the statistic.
+    bounds: Option<[f64; 2]>,
+    p_value: Option<f64>,
+    words: String,
+}
+
+impl<'a> From<&'a Check> for Entry<'a> {
+    fn from(check: &'a Check) -> Self {
+        let outcome = check.outcome.as_ref().ok();
+        Self {
+            check: check.name(),
+            about: check.about(),
+            structure: check.is_structure(),
+            failed: check.failed(),
+            statistic: outcome.map(|outcome| outcome.statistic),
+            bounds: outcome.map(|outcome| outcome.bounds.into()),
+            p_value: outcome.map(|outcome| outcome.p_value),
+            words: check.to_string(),
+        }
+    }
+}
+
+/// Every check.
+pub(super) fn entries(findings: &Findings) -> Vec<Entry<'_>> {
+    findings.checks.iter().map(Entry::from).collect()
+}
+
+/// The checks that failed, in words.
+pub(super) fn failed(findings: &Findings) -> Vec<String> {
+    findings.checks.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
+}
+
+/// Every check in words with its verdict: those that failed, those that passed, those that could not be made.
+pub(super) fn all(findings: &Findings) -> Vec<String> {
+    let checks = findings.checks.iter();
+    let mut lines: Vec<String> =
+        checks.clone().filter(|check| check.failed()).map(|check| format!("failed: {check}")).collect();
+    let passed = checks.clone().filter(|check| check.outcome.is_ok() && !check.failed());
+    // Drivers that nothing depends on fill one line.
+    let (free, other): (Vec<&Check>, Vec<&Check>) =
+        passed.partition(|check| matches!(check.test, Test::Dependence { .. }));
+    lines.extend(other.iter().map(|check| format!("passed: {check}")));
+    if !free.is_empty() {
+        let drivers: Vec<&str> = free.iter().filter_map(|check| check.about()).collect();
+        lines.push(format!("passed: residuals do not depend beyond chance on {}", drivers.join(", ")));
+    }
+    lines.extend(checks.filter(|check| check.outcome.is_err()).map(ToString::to_string));
+    lines
+}
