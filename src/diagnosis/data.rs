@@ -111,12 +111,12 @@ impl<'a> Data<'a> {
             let values = self.rows().iter().map(move |&row| measurements.configuration(row)[joint]);
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
         };
-        let varies = |values: Vec<f64>| values.iter().any(|value| *value != values[0]);
+        let varies = |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
         let payload = measurements.payload.as_deref().map(|all| self.pick(all));
         let temperature = measurements.temperature.as_deref().map(|all| self.pick(all));
         let n = measurements.joints;
         let from = |joint: usize, side: f64| {
-            let came = |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] == side);
+            let came = |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] * side > 0.0);
             measurements.approach.as_ref().is_some_and(came)
         };
         Conditions {

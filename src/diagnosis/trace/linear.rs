@@ -61,18 +61,14 @@ impl Linear {
             all[(rows + row, j)] = sigma.recip();
             long[rows + row] = x[j] / sigma;
         }
-        match orthonormal(&all) {
-            Some(basis) => {
-                let along = basis.tr_mul(&long);
-                let residual = long - &basis * along;
-                Self { residual, basis, rows }
-            }
-            None => {
-                let mut linear = Self { residual: long, basis: DMatrix::zeros(all.nrows(), 0), rows };
-                linear.fit(&all);
-                linear
-            }
+        if let Some(basis) = orthonormal(&all) {
+            let along = basis.tr_mul(&long);
+            let residual = long - &basis * along;
+            return Self { residual, basis, rows };
         }
+        let mut linear = Self { residual: long, basis: DMatrix::zeros(all.nrows(), 0), rows };
+        linear.fit(&all);
+        linear
     }
 
     /// Data rows, 3 N.
