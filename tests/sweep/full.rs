@@ -1,0 +1,52 @@
+//! The whole sweep: `cargo test --release --test sweep -- --ignored --nocapture`.
+
+use std::env;
+
+use rayon::prelude::*;
+
+use crate::bench::{LARGE, SMALL, Size};
+use crate::families::{Lacking, catalogue};
+use crate::judged::{Judged, named};
+
+/// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
+fn sets(otherwise: u64) -> u64 {
+    env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
+}
+
+fn name(lacking: &[Lacking]) -> String {
+    let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
+    lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
+}
+
+fn run(kinds: &[Vec<Lacking>], size: Size, seeds: std::ops::Range<u64>) {
+    let all: Vec<(&Vec<Lacking>, u64)> =
+        kinds.iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
+    let one = |(lacking, seed): (&Vec<Lacking>, u64)| {
+        println!("{}", Judged::of(lacking, size, seed).line(&name(lacking), size, seed));
+    };
+    all.into_par_iter().for_each(one);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn noise_alone_in_few_poses() {
+    run(&[Vec::new()], SMALL, 1000..1000 + sets(200));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn noise_alone_in_many_poses() {
+    run(&[Vec::new()], LARGE, 2000..2000 + sets(30));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn one_effect_in_few_poses() {
+    run(&catalogue().into_iter().map(|one| vec![one]).collect::<Vec<_>>(), SMALL, 0..sets(4));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn one_effect_in_many_poses() {
+    run(&catalogue().into_iter().map(|one| vec![one]).collect::<Vec<_>>(), LARGE, 100..100 + sets(2));
+}
