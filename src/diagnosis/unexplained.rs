@@ -34,9 +34,9 @@ pub struct Unexplained {
 /// A smooth correction of one place's error as a function of one quantity.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Range of the quantity that the identification poses cover, in its unit: nothing is corrected beyond it.
+    /// Range of the quantity that the identification poses cover, in its unit: beyond it the correction keeps its last value.
     pub range: (f64, f64),
-    /// Held-out poses beyond it, which stay uncorrected.
+    /// Held-out poses beyond it, where the correction is a guess.
     pub beyond: usize,
     /// Root mean squared error of identification poses left out in turn, before and with the correction [m].
     pub cross_validated: (f64, f64),
@@ -204,11 +204,8 @@ fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f6
     let mut errors = fitted.errors(data, &data.split.held_out);
     let mut beyond = 0;
     for (k, (pose, error)) in held_out.poses().iter().zip(&mut errors).enumerate() {
-        if generic.reaches(&pose.setup) {
-            *error += Vector3::from_fn(|axis, _| change[3 * k + axis]) * pose.sigma;
-        } else {
-            beyond += 1;
-        }
+        *error += Vector3::from_fn(|axis, _| change[3 * k + axis]) * pose.sigma;
+        beyond += usize::from(!generic.reaches(&pose.setup));
     }
     let count = generic.functions.len();
     let functions = step.rows(step.len() - count, count);
