@@ -144,6 +144,14 @@ fn function_of(effect: &Effect) -> Option<(usize, usize)> {
     }
 }
 
+/// The strongest structure that is left, if it is beyond chance.
+pub(super) fn strongest(fitted: &Fitted, data: &Data, level: f64) -> Option<Generic> {
+    let generics = Generic::all(&fitted.problem, data);
+    let library = fitted.library(data, &[], &generics);
+    let tried = best(&fitted.linear(&library, &[], &[]), &library, &generics, |_| true)?;
+    (tried.corrected < level && tried.criterion < 0.0).then_some(tried.generic)
+}
+
 /// What is known of structure at a generic, or of the strongest one where `known` is none; `level` is that of chance.
 pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, level: f64) -> Option<Unexplained> {
     let generics = Generic::all(&fitted.problem, data);
