@@ -15,3 +15,5 @@ mod families;
 mod full;
 #[path = "sweep/judged.rs"]
 mod judged;
+#[path = "sweep/outside.rs"]
+mod outside;

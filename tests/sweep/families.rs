@@ -74,7 +74,7 @@ pub fn catalogue() -> Vec<Lacking> {
         all.push(Lacking::new(Effect::JointCompliance { joint }, &[]));
     }
     all.push(Lacking::new(Effect::JointCompliance { joint: 1 }, &[1e-5]));
-    for (joint, cubic) in [(2, 2e-11), (3, 1e-10), (4, 2e-9)] {
+    for (joint, cubic) in [(2, 2e-11), (3, 1e-10), (4, 5e-7)] {
         all.push(Lacking::new(Effect::JointNonlinearStiffness { joint }, &[cubic]));
     }
     for joint in [2, 3, 4] {
@@ -114,4 +114,43 @@ pub fn catalogue() -> Vec<Lacking> {
     all.push(Lacking::new(Effect::StationShift { at_time: 3000.0 }, &[3e-4, 0.0, 1e-4]));
     all.push(Lacking::new(Effect::StationShift { at_time: 4500.0 }, &[0.0, 2e-4, 2e-4]));
     all
+}
+
+/// Two effects at once.
+pub fn pairs() -> Vec<Vec<Lacking>> {
+    let per_hour = 1e-3 / 3600.0;
+    let b = || "B".to_owned();
+    let harmonic = |joint, order| {
+        Lacking::new(Effect::JointHarmonic { joint, orders: vec![order] }, &[0.016 * DEGREE, 0.012 * DEGREE])
+    };
+    let drift = || Lacking::new(Effect::TrackerDrift, &[0.3 * per_hour, 0.2 * per_hour, 0.0]);
+    let backlash = |joint| Lacking::new(Effect::Backlash { joint }, &[0.03 * DEGREE]);
+    vec![
+        vec![Lacking::new(Effect::GearRatio { joint: 3 }, &[7e-4]), drift()],
+        vec![backlash(2), Lacking::new(Effect::LinkThermalBending { link: b() }, &[1e-5, 2e-5])],
+        vec![Lacking::new(Effect::PayloadMass, &[0.35]), harmonic(2, 1)],
+        vec![Lacking::new(Effect::BaseCompliance, &[2e-6, 1e-6]), backlash(3)],
+        vec![Lacking::new(Effect::HoistForce, &[0.1]), Lacking::new(Effect::TrackerScale, &[3e-4])],
+        vec![harmonic(3, 2), Lacking::new(Effect::JointThermalDrift { joint: 2 }, &[3e-5])],
+        vec![Lacking::new(Effect::StationShift { at_time: 3000.0 }, &[3e-4, 0.0, 1e-4]), harmonic(1, 2)],
+        vec![
+            Lacking::new(Effect::JointCompliance { joint: 3 }, &[]),
+            Lacking::new(Effect::JointCoupling { joint: 2, from: 1 }, &[1e-3]),
+        ],
+    ]
+}
+
+/// Three effects at once.
+pub fn triples() -> Vec<Vec<Lacking>> {
+    let with = |mut pair: Vec<Lacking>, third: Lacking| {
+        pair.push(third);
+        pair
+    };
+    let thirds = [
+        Lacking::new(Effect::Backlash { joint: 2 }, &[0.03 * DEGREE]),
+        Lacking::new(Effect::PayloadMass, &[0.35]),
+        Lacking::new(Effect::Backlash { joint: 4 }, &[0.06 * DEGREE]),
+        Lacking::new(Effect::JointHarmonic { joint: 1, orders: vec![2] }, &[0.02 * DEGREE, 0.0]),
+    ];
+    pairs().into_iter().zip(thirds).map(|(pair, third)| with(pair, third)).collect()
 }

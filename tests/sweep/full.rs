@@ -5,8 +5,9 @@ use std::env;
 use rayon::prelude::*;
 
 use crate::bench::{LARGE, SMALL, Size};
-use crate::families::{Lacking, catalogue};
+use crate::families::{Lacking, catalogue, pairs, triples};
 use crate::judged::{Judged, named};
+use crate::outside::{KINDS, Left};
 
 /// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
 fn sets(otherwise: u64) -> u64 {
@@ -49,4 +50,27 @@ fn one_effect_in_few_poses() {
 #[ignore = "minutes"]
 fn one_effect_in_many_poses() {
     run(&catalogue().into_iter().map(|one| vec![one]).collect::<Vec<_>>(), LARGE, 100..100 + sets(2));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn two_effects() {
+    run(&pairs(), SMALL, 300..300 + sets(4));
+    run(&pairs(), LARGE, 320..320 + sets(4));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn three_effects() {
+    run(&triples(), SMALL, 340..340 + sets(4));
+    run(&triples(), LARGE, 360..360 + sets(4));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn what_no_catalogue_holds() {
+    for (size, first) in [(SMALL, 400), (LARGE, 420)] {
+        let all: Vec<_> = KINDS.iter().flat_map(|kind| (first..first + sets(4)).map(move |seed| (*kind, seed))).collect();
+        all.into_par_iter().for_each(|(kind, seed)| println!("{}", Left::of(kind, size, seed).line(kind, size, seed)));
+    }
 }
