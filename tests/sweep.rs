@@ -17,3 +17,5 @@ mod full;
 mod judged;
 #[path = "sweep/outside.rs"]
 mod outside;
+#[path = "sweep/quick.rs"]
+mod quick;

@@ -155,11 +155,6 @@ impl Fitted {
             parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
         library.fitted().select_columns(&places)
     }
-
-    /// Full parameter vector.
-    pub fn x(&self) -> &DVector<f64> {
-        &self.found.x
-    }
 }
 
 /// Fitted columns, then those of `generics`, shape = (3 N, …).

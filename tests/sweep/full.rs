@@ -6,17 +6,12 @@ use rayon::prelude::*;
 
 use crate::bench::{LARGE, SMALL, Size};
 use crate::families::{Lacking, catalogue, pairs, triples};
-use crate::judged::{Judged, named};
+use crate::judged::{Judged, name};
 use crate::outside::{KINDS, Left};
 
 /// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
 fn sets(otherwise: u64) -> u64 {
     env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
-}
-
-fn name(lacking: &[Lacking]) -> String {
-    let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
-    lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
 }
 
 fn run(kinds: &[Vec<Lacking>], size: Size, seeds: std::ops::Range<u64>) {

@@ -174,3 +174,9 @@ pub fn named(effect: &Effect) -> String {
     };
     format!("{} {}{orders}", effect::name(effect), effect::place(effect)).trim().to_owned()
 }
+
+/// What a set lacks, with strengths.
+pub fn name(lacking: &[Lacking]) -> String {
+    let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
+    lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
+}

@@ -1,6 +1,6 @@
 //! What no catalogue holds: a bump or a step of one joint's coordinate.
 
-use flexcal::diagnosis::{Closure, Verdict, close};
+use flexcal::diagnosis::{Closure, close};
 use flexcal::rig::Shape;
 use flexcal::study::Options;
 
@@ -31,8 +31,6 @@ pub const KINDS: [Outside; 14] = [
 /// A set with one of them after the loop.
 pub struct Left {
     pub closure: Closure,
-    /// Whether the loop says that something is unexplained.
-    pub unexplained: bool,
     /// Whether it is located at the right joint, as a function of the right command.
     pub located: bool,
     /// Held-out rms over that of the noise: before, and with the correction.
@@ -50,7 +48,6 @@ impl Left {
         });
         let correction = left.and_then(|left| left.correction.as_ref());
         Self {
-            unexplained: closure.verdict == Verdict::Unexplained,
             located,
             before: closure.before.fit.fitted.held_out.rms.norm / NOISE,
             corrected: correction.map(|correction| correction.held_out.rms.norm / NOISE),
