@@ -128,22 +128,31 @@ impl Fitted {
         (0..self.model.parameters.len()).filter(is_own).collect()
     }
 
-    /// What the fit would lose without some of its parameters: sum of squares, priors included, in the linear neighbourhood.
+    /// What the fit would lose without some of its parameters: sum of squares, priors included, in the linear neighbourhood,
+    /// at the optimum with what was put in.
     ///
     /// xᵀ ([N⁻¹])⁻¹ x over those parameters, with N = JᵀJ + Λ and what neither data nor priors see left out.
     pub fn loss_without(&self, normal: &Normal, parameters: &[usize]) -> Option<f64> {
         let places: Vec<usize> =
             parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
-        let x = DVector::from_iterator(places.len(), places.iter().map(|&j| self.found.x[self.unknowns[j]]));
+        let at = |&j: &usize| self.found.x[self.unknowns[j]] + normal.step[j];
+        let x = DVector::from_iterator(places.len(), places.iter().map(at));
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| normal.inverse[(places[i], places[j])]);
         Some((x.transpose() * covariance.try_inverse()? * &x)[(0, 0)])
     }
 
-    /// N = JᵀJ + Λ of the fit, with `generics` put in.
+    /// N = JᵀJ + Λ of the fit, with `generics` put in, and the step to where they belong.
     pub fn normal(&self, library: &Library, generics: &[Generic]) -> Normal {
         let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
         let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
-        Normal::new(&with_generics(library, generics), &priors)
+        let columns = with_generics(library, generics);
+        let mut pull = columns.tr_mul(library.residual());
+        for (j, &k) in self.unknowns.iter().enumerate() {
+            if let Some(sigma) = self.model.parameters[k].sigma {
+                pull[j] += self.found.x[k] / (sigma * sigma);
+            }
+        }
+        Normal::new(&columns, &priors, &pull)
     }
 
     /// Columns of some of the model's parameters, shape = (3 N, k).
@@ -151,11 +160,6 @@ impl Fitted {
         let places: Vec<usize> =
             parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
         library.fitted().select_columns(&places)
-    }
-
-    /// Full parameter vector.
-    pub fn x(&self) -> &DVector<f64> {
-        &self.found.x
     }
 }
 
@@ -174,14 +178,16 @@ pub(super) fn with_generics(library: &Library, generics: &[Generic]) -> DMatrix<
 /// The inverse of a normal matrix; 0 in directions that neither data nor priors see.
 pub(super) struct Normal {
     pub inverse: DMatrix<f64>,
+    /// − N⁻¹ g: from where the derivatives were taken to the optimum of what they describe.
+    pub step: DVector<f64>,
 }
 
 /// Eigenvalues of a normal matrix of unit diagonal below this are what nothing sees.
 const UNSEEN: f64 = 1e-12;
 
 impl Normal {
-    /// Of columns, shape = (3 N, n), with priors on the first of them.
-    pub fn new(columns: &DMatrix<f64>, priors: &[Option<f64>]) -> Self {
+    /// Of columns, shape = (3 N, n), with priors on the first of them, and the gradient g.
+    fn new(columns: &DMatrix<f64>, priors: &[Option<f64>], gradient: &DVector<f64>) -> Self {
         let mut matrix = columns.tr_mul(columns);
         for (j, sigma) in priors.iter().enumerate() {
             if let Some(sigma) = sigma {
@@ -191,11 +197,13 @@ impl Normal {
         let scale: Vec<f64> = matrix.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
         let n = matrix.nrows();
         if n == 0 {
-            return Self { inverse: matrix };
+            return Self { inverse: matrix, step: DVector::zeros(0) };
         }
         let eigen = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
         let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
         let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
-        Self { inverse: DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j])) }
+        let inverse = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j]));
+        let step = -(&inverse * gradient);
+        Self { inverse, step }
     }
 }

@@ -94,19 +94,20 @@ impl Generic {
         self
     }
 
-    /// Whether it corrects a pose: nothing is said beyond the range that the identification poses cover.
+    /// Whether a pose is within the range that the identification poses cover.
     pub fn reaches(&self, setup: &Setup) -> bool {
         (self.range.0..=self.range.1).contains(&self.of.value(setup))
     }
 
-    /// Its columns: those of the place times its functions, shape = (3 N, functions).
+    /// Its columns: those of the place times its functions, shape = (3 N, functions); beyond the range they keep their last
+    /// values.
     pub fn columns(&self, library: &Library) -> DMatrix<f64> {
         let poses = library.poses();
         let mut columns = DMatrix::zeros(3 * poses.len(), self.functions.len());
         let Some(place) = library.place(self.slot) else { return columns };
         for (function, mut out) in self.functions.iter().zip(columns.column_iter_mut()) {
-            for (k, pose) in poses.iter().enumerate().filter(|(_, pose)| self.reaches(&pose.setup)) {
-                let value = function.value(&pose.setup);
+            for (k, pose) in poses.iter().enumerate() {
+                let value = function.at(self.of.value(&pose.setup).clamp(self.range.0, self.range.1));
                 for row in 3 * k..3 * k + 3 {
                     out[row] = place[row] * value;
                 }

@@ -1,11 +1,11 @@
 //! Structure that no effect of the catalogue explains: where it is, what it depends on, and what a smooth correction gains.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::checks::Findings;
 use super::data::Data;
-use super::fitted::{Fitted, Normal, with_generics};
+use super::fitted::{Fitted, with_generics};
 use super::generic::Generic;
 use super::trace::{Gain, Linear, tries};
 use crate::effect;
@@ -156,6 +156,14 @@ fn function_of(effect: &Effect) -> Option<(usize, usize)> {
     }
 }
 
+/// The strongest structure that is left, if it is beyond chance.
+pub(super) fn strongest(fitted: &Fitted, data: &Data, level: f64) -> Option<Generic> {
+    let generics = Generic::all(&fitted.problem, data);
+    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &generics);
+    let tried = best(&fitted.linear(&library, &[], &[]), &library, &generics, |_| true)?;
+    (tried.corrected < level && tried.criterion < 0.0).then_some(tried.generic)
+}
+
 /// What is known of structure at a generic, or of the strongest one where `known` is none; `level` is that of chance.
 pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, level: f64) -> Option<Unexplained> {
     let generics = Generic::all(&fitted.problem, data);
@@ -203,16 +211,7 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
 fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f64, f64)) -> Correction {
     let generics = std::slice::from_ref(generic);
     let library = fitted.library(data, &[], generics);
-    let columns = with_generics(&library, generics);
-    let own = fitted.unknowns.iter().map(|&k| fitted.model.parameters[k].sigma);
-    let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
-    let mut pull = columns.tr_mul(library.residual());
-    for (j, &k) in fitted.unknowns.iter().enumerate() {
-        if let Some(sigma) = fitted.model.parameters[k].sigma {
-            pull[j] += fitted.x()[k] / (sigma * sigma);
-        }
-    }
-    let step: DVector<f64> = -(Normal::new(&columns, &priors).inverse * pull);
+    let step = fitted.normal(&library, generics).step;
     let held_out = fitted.library_of(data, &data.split.held_out, &[], generics);
     let change = with_generics(&held_out, generics) * &step;
     let mut errors = fitted.errors(data, &data.split.held_out);

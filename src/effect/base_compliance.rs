@@ -10,8 +10,8 @@ pub(super) const FAMILY: Family = Family {
     name: "base-compliance",
     terms: |effect, _| match effect {
         Effect::BaseCompliance => vec![
-            Term::constant("about_x", Slot::Arm(ArmField::MountingX), 1e-4),
-            Term::constant("about_y", Slot::Arm(ArmField::MountingY), 1e-4),
+            Term::constant("about_x", Slot::Arm(ArmField::MountingX), 1e-4).never_negative(),
+            Term::constant("about_y", Slot::Arm(ArmField::MountingY), 1e-4).never_negative(),
         ],
         _ => Vec::new(),
     },

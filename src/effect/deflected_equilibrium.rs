@@ -9,7 +9,7 @@ use crate::problem::{Effect, Equilibrium};
 pub(super) const FAMILY: Family = Family {
     name: "deflected-equilibrium",
     terms: |effect, _| match effect {
-        Effect::DeflectedEquilibrium => vec![Term::constant("lambda", Slot::Arm(ArmField::Mixing), 1.0)],
+        Effect::DeflectedEquilibrium => vec![Term::constant("lambda", Slot::Arm(ArmField::Mixing), 1.0).never_negative()],
         _ => Vec::new(),
     },
     candidates: |problem, conditions| {

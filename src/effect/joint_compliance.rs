@@ -11,7 +11,7 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, _| match effect {
         Effect::JointCompliance { joint } => {
             let slot = Slot::Joint { joint: joint - 1, field: JointField::Compliance };
-            vec![Term::constant("compliance", slot, 1e-3)]
+            vec![Term::constant("compliance", slot, 1e-3).never_negative()]
         }
         _ => Vec::new(),
     },

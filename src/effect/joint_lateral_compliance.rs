@@ -13,8 +13,8 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointLateralCompliance { joint } => {
             let slot = |field| Slot::Joint { joint: joint - 1, field };
             vec![
-                Term::constant("about_x", slot(JointField::LateralX), 1e-3),
-                Term::constant("about_y", slot(JointField::LateralY), 1e-3),
+                Term::constant("about_x", slot(JointField::LateralX), 1e-3).never_negative(),
+                Term::constant("about_y", slot(JointField::LateralY), 1e-3).never_negative(),
             ]
         }
         _ => Vec::new(),

@@ -17,7 +17,7 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, problem| match effect {
         Effect::JointNonlinearStiffness { joint } => {
             let slot = Slot::Joint { joint: joint - 1, field: JointField::Cubic };
-            vec![Term::constant("cubic", slot, MOST / greatest_moment(problem).max(LEAST_MOMENT).powi(3))]
+            vec![Term::constant("cubic", slot, MOST / greatest_moment(problem, *joint).max(LEAST_MOMENT).powi(3))]
         }
         _ => Vec::new(),
     },

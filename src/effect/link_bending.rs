@@ -11,7 +11,7 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, _| match effect {
         Effect::LinkBending { joint } => {
             let slot = Slot::Beam { joint: joint - 1, field: BeamField::Flexibility };
-            vec![Term::constant("flexibility", slot, 1e-2)]
+            vec![Term::constant("flexibility", slot, 1e-2).never_negative()]
         }
         _ => Vec::new(),
     },

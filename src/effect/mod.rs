@@ -81,6 +81,8 @@ pub struct Term {
     pub nominal: f64,
     /// A size that no realistic effect exceeds by much, SI: 1 σ of its prior.
     pub size: f64,
+    /// Whether nature knows no negative ones: an effect that would need one is no explanation.
+    pub never_negative: bool,
 }
 
 impl Term {
@@ -91,7 +93,13 @@ impl Term {
 
     /// A parameter that is multiplied by what is known of a pose.
     pub fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
-        Self { name: name.to_owned(), slot, driver, nominal: 0.0, size }
+        Self { name: name.to_owned(), slot, driver, nominal: 0.0, size, never_negative: false }
+    }
+
+    /// The same, never negative.
+    #[must_use]
+    pub fn never_negative(self) -> Self {
+        Self { never_negative: true, ..self }
     }
 }
 

@@ -104,12 +104,13 @@ pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 
-/// The weight of everything that is declared, at the length of the whole arm [N·m].
-pub(super) fn greatest_moment(problem: &Problem) -> f64 {
+/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the arm beyond it [N·m].
+pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
-    let mass: f64 = problem.joints.iter().map(|joint| all(&joint.bodies) + beam(joint)).sum();
-    let reach: f64 = problem.joints.iter().map(|joint| joint.a.hypot(joint.d)).sum();
+    let (own, beyond) = (&problem.joints[joint - 1], &problem.joints[joint..]);
+    let mass = all(&own.bodies) + beyond.iter().map(|joint| all(&joint.bodies) + beam(joint)).sum::<f64>();
+    let reach: f64 = beyond.iter().map(|joint| joint.a.hypot(joint.d)).sum();
     problem.gravity.norm() * (mass + problem.tool.payload_mass) * (reach + problem.tool.target.norm())
 }
 

@@ -16,7 +16,7 @@ pub(super) const FAMILY: Family = Family {
                 let length = problem.joints[joint].a.abs();
                 let at = Term::constant("at", slot(joint, BeamField::AddedAt), length / 2.0);
                 vec![
-                    Term::constant("mass", slot(joint, BeamField::AddedMass), 5.0),
+                    Term::constant("mass", slot(joint, BeamField::AddedMass), 5.0).never_negative(),
                     Term { nominal: length / 2.0, ..at },
                 ]
             };

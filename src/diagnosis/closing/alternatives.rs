@@ -44,7 +44,9 @@ pub(super) fn alternatives(
     for tried in ranking.iter().take_while(|tried| tried.criterion < own + UNTOLD) {
         let candidate = &scan.effects[tried.index];
         let known = |other: &Effect| named_place(other) == named_place(candidate);
-        if !effects.iter().any(known) && named_place(candidate) != named_place(effect) {
+        // Other times of the same shift are the same effect; other orders of a harmonic are not.
+        let is_own = matches!(effect, Effect::StationShift { .. }) && known(effect);
+        if !effects.iter().any(known) && !is_own {
             effects.push(candidate.clone());
         }
     }

@@ -7,6 +7,8 @@ use crate::problem::Effect;
 
 /// Level of a whole scan: probability that noise alone points to anything.
 pub(in crate::diagnosis) const LEVEL: f64 = 0.01;
+/// Level above which an effect is taken out again: above that of coming in, so that no effect goes to and fro at the border.
+pub(super) const LEAVING: f64 = 0.05;
 /// Candidates whose criterion is this close to the best are its rivals: odds of about 150 to 1.
 const RIVAL: f64 = 10.0;
 /// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.

@@ -5,7 +5,7 @@ use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::generic::Generic;
 use super::super::trace::{Scan, tries};
-use super::pick::{LEVEL, Pick, pick};
+use super::pick::{LEAVING, Pick, pick};
 use super::retest::{Retested, retest};
 use crate::problem::Effect;
 use crate::study::{ErrorSummary, IdentifyError, Options};
@@ -148,7 +148,7 @@ impl Rounds<'_> {
         loop {
             let added = self.added(&fitted);
             let worst = self.tested(&fitted).into_iter().max_by(|a, b| a.p.total_cmp(&b.p));
-            let Some(worst) = worst.filter(|worst| worst.p >= LEVEL) else { return Ok(fitted) };
+            let Some(worst) = worst.filter(|worst| worst.p >= LEAVING) else { return Ok(fitted) };
             let kept: Vec<Effect> = added.iter().flat_map(parts).filter(|part| *part != worst.effect).collect();
             fitted = self.fit(&fitted, &kept)?;
         }

@@ -110,6 +110,11 @@ impl<'a> Library<'a> {
         columns
     }
 
+    /// For each of an effect's parameters, whether it is never negative.
+    pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
+        effect::terms(effect, self.problem).iter().map(|term| term.never_negative).collect()
+    }
+
     /// Column of a place, 3 N; `None` where no effect enters there.
     pub fn place(&self, slot: Slot) -> Option<DVector<f64>> {
         let &(_, place) = self.places.iter().find(|(known, _)| *known == slot)?;

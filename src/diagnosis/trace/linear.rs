@@ -205,6 +205,18 @@ impl Linear {
 }
 
 impl Score {
+    /// What the fit would make of the columns' parameters, −G⁺b, each with its standard error for residuals of unit scatter.
+    pub fn estimates(&self) -> Vec<(f64, f64)> {
+        let k = self.lengths.len();
+        let scale: Vec<f64> = self.lengths.iter().map(|l| if *l > 0.0 { l.sqrt() } else { 1.0 }).collect();
+        let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
+        let inverted = eigen.eigenvalues.map(|value| if value > ABSORBED * ABSORBED { value.recip() } else { 0.0 });
+        let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
+        let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
+        let estimate = &inverse * product;
+        (0..k).map(|i| (-estimate[i] / scale[i], inverse[(i, i)].max(0.0).sqrt() / scale[i])).collect()
+    }
+
     /// bᵀ G⁺ b and the rank of G, scaled columns; `None` where nothing new is left of them.
     fn reduction(&self) -> Option<(f64, usize)> {
         let scale = DVector::from_iterator(self.lengths.len(), self.lengths.iter().map(|length| length.sqrt()));

@@ -19,7 +19,12 @@ pub(crate) struct Scan<'a, 'l> {
     tries: Vec<f64>,
     /// Families that are tried.
     families: usize,
+    /// For each candidate's parameters, whether they are never negative.
+    never_negative: Vec<Vec<bool>>,
 }
+
+/// Standard errors below zero from which what is never negative is impossible.
+const IMPOSSIBLE: f64 = 3.0;
 
 /// A candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,13 +43,14 @@ impl<'a, 'l> Scan<'a, 'l> {
     pub fn new(library: &'l Library<'a>, linear: Linear, effects: Vec<Effect>) -> Self {
         let scores = effects.par_iter().map(|effect| linear.score(&library.columns(effect))).collect();
         let (tries, families) = tries(&effects);
-        Self { library, linear, effects, scores, tries, families }
+        let never_negative = effects.iter().map(|effect| library.never_negative(effect)).collect();
+        Self { library, linear, effects, scores, tries, families, never_negative }
     }
 
-    /// Candidates that the fit does not absorb, best first.
+    /// Candidates that the fit does not absorb and that are possible, best first.
     pub fn ranking(&self) -> Vec<Tried> {
         let tried = |(index, score): (usize, &Score)| {
-            let gain = self.linear.gain(score)?;
+            let gain = self.linear.gain(score).filter(|_| self.is_possible(index, score))?;
             let tries = self.tries[index] * self.families as f64;
             let (criterion, corrected) = (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
             Some(Tried { index, gain, criterion, corrected })
@@ -52,6 +58,17 @@ impl<'a, 'l> Scan<'a, 'l> {
         let mut all: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
         all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         all
+    }
+
+    /// Whether a candidate is no negative compliance or mass, beyond doubt.
+    fn is_possible(&self, index: usize, score: &Score) -> bool {
+        let never_negative = &self.never_negative[index];
+        if !never_negative.contains(&true) {
+            return true;
+        }
+        let scatter = (self.linear.squares() / self.linear.freedom()).sqrt();
+        let fine = |((value, error), never): ((f64, f64), &bool)| !never || value > -IMPOSSIBLE * error * scatter;
+        score.estimates().into_iter().zip(never_negative).all(fine)
     }
 
     /// Candidates that the fit absorbs, so that nothing is left to show them.

@@ -1,0 +1,21 @@
+//! The loop against the independent rig, in many sets of measurements of which the truth is known.
+//!
+//! A representative part runs with all other tests; the whole, with its figures: `docs/sweep.md`.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
+
+mod common;
+
+#[path = "sweep/bench.rs"]
+mod bench;
+#[path = "sweep/families.rs"]
+mod families;
+#[path = "sweep/full.rs"]
+mod full;
+#[path = "sweep/judged.rs"]
+mod judged;
+#[path = "sweep/outside.rs"]
+mod outside;
+#[path = "sweep/quick.rs"]
+mod quick;

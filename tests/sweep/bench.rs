@@ -1,0 +1,136 @@
+//! Sets of measurements of the lunar sampler on the rig.
+
+use std::path::{Path, PathBuf};
+
+use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::problem::{Effect, Problem};
+use flexcal::rig::{Cause, Row, Shape, TrueEffect, Truth, simulate};
+
+use crate::common::arms::path;
+
+/// 1 σ of a measured coordinate [m].
+pub const SIGMA: f64 = 5e-5;
+/// Root mean square of the noise of a position [m].
+pub const NOISE: f64 = SIGMA * 1.732_050_807_568_877_2;
+
+/// Geometric errors of Table 2 of [Chen2021], as deviations from nominal.
+const TABLE_2: &str = r#"
+[parameters]
+"joint1.alpha" = { deg = 0.019 }
+"joint1.theta" = { deg = -0.008 }
+"joint1.d" = { mm = -3 }
+"joint1.beta" = { deg = 0.304 }
+"joint2.alpha" = { deg = -0.004 }
+"joint2.a" = { mm = -2 }
+"joint2.theta" = { deg = 0.304 }
+"joint2.d" = { mm = 16 }
+"joint2.beta" = { deg = 0.007 }
+"joint3.alpha" = { deg = -0.001 }
+"joint3.a" = { mm = 24 }
+"joint3.theta" = { deg = 0.189 }
+"joint3.d" = { mm = 5 }
+"joint4.alpha" = { deg = -0.019 }
+"joint4.a" = { mm = 16 }
+"joint4.theta" = { deg = -0.790 }
+"joint4.d" = { mm = 8 }
+"joint4.beta" = { deg = 0.005 }
+"#;
+
+/// What differs from set to set, and in which poses it is measured.
+const DRAWN: &str = r#"
+[random]
+"joint*.alpha" = { sigma_deg = 0.2 }
+"joint*.theta" = { sigma_deg = 0.2 }
+"joint*.beta" = { sigma_deg = 0.2 }
+"joint*.a" = { sigma_mm = 5 }
+"joint*.d" = { sigma_mm = 5 }
+"joint*.stiffness" = { sigma_relative = 0.18 }
+"A.*" = { sigma_relative = 0.18 }
+"B.*" = { sigma_relative = 0.18 }
+
+[noise]
+position_sigma_mm = 0.05
+
+[poses]
+q1_deg = [-90, 90]
+q2_deg = [-15, 65]
+q3_deg = [-130, -15]
+q4_deg = [-75, 95]
+payload_kg = [0, 0.5, 1, 2]
+hoist_N = [58, 65]
+temperature_C = [17, 31]
+time_step_s = [60, 110]
+"#;
+
+/// The declared lunar sampler.
+pub fn lunar() -> Problem {
+    Problem::read(&path("tests/cases")).unwrap()
+}
+
+/// How many poses a set has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    pub identification: usize,
+    pub held_out: usize,
+}
+
+/// As in the paper.
+pub const SMALL: Size = Size { identification: 28, held_out: 50 };
+/// Where poses are no scarce thing.
+pub const LARGE: Size = Size { identification: 200, held_out: 100 };
+
+/// Measurements whose truth is known.
+pub struct Set {
+    pub measurements: Measurements,
+    pub split: Split,
+}
+
+/// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd ones; stiffnesses 18 % off
+/// nominal, each by itself, `EI_y` and `EI_z` too, although the problem declares them equal.
+pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
+    let mut arm = lunar();
+    for beam in arm.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
+        // A hair's breadth apart, so that each is drawn by itself.
+        beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
+    }
+    let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
+    let mut truth = Truth::parse(&format!("{given}{DRAWN}"), Path::new("truth.toml"), &arm).unwrap();
+    truth.effects = effects.to_vec();
+    truth.poses.held_out = flexcal::rig::HeldOutRows::AllBut(size.identification);
+    let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();
+    let rows = simulated.rows;
+    let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
+    Set { measurements: table(&rows), split: Split { identification, held_out } }
+}
+
+fn table(rows: &[Row]) -> Measurements {
+    let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
+    let configurations: Vec<f64> = rows.iter().flat_map(|row| row.conditions.configuration.clone()).collect();
+    Measurements {
+        files: vec![PathBuf::from("rig.csv")],
+        origin: (2_u32..).take(rows.len()).map(|line| (0, line)).collect(),
+        joints: configurations.len() / rows.len(),
+        configurations,
+        positions: rows.iter().map(|row| row.position).collect(),
+        sigma: None,
+        payload: of(|row| row.conditions.payload),
+        hoist: of(|row| row.conditions.hoist),
+        temperature: of(|row| row.conditions.temperature),
+        time: rows.iter().map(|row| row.conditions.time).collect(),
+        time_measured: true,
+        approach: Some(rows.iter().flat_map(|row| row.conditions.approach.clone()).collect()),
+        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
+        target: None,
+        marked_held_out: None,
+    }
+}
+
+/// An effect of the catalogue with its strengths in SI units.
+pub fn catalogued(effect: &Effect, values: &[f64]) -> TrueEffect {
+    TrueEffect::new(Cause::Catalogued(effect.clone()), values, &lunar().joints).unwrap()
+}
+
+/// A bump or step of a joint's coordinate; height, centre, width in degrees.
+pub fn outside(joint: usize, shape: Shape, values: [f64; 3]) -> TrueEffect {
+    TrueEffect::new(Cause::Outside { joint, shape }, &values.map(f64::to_radians), &lunar().joints).unwrap()
+}

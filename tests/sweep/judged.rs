@@ -1,0 +1,182 @@
+//! One set through the loop, and what the loop makes of it beside the truth.
+
+use flexcal::diagnosis::{Closure, Verdict, close};
+use flexcal::effect;
+use flexcal::problem::{Effect, EffectDeclaration, Problem};
+use flexcal::study::{Identification, Options, identify};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+use crate::bench::{NOISE, SIGMA, Set, Size, measured};
+use crate::common::made::model_of;
+use crate::families::{Lacking, declared};
+
+/// Probability by chance above which an effect is not distinguishable, even for one who knows it.
+pub const DISTINGUISHABLE: f64 = 1e-4;
+
+/// Where the loop has a true effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Among the effects that were found.
+    Found,
+    /// Among the alternatives to one of them.
+    Alternative,
+    /// Neither, though others were found.
+    Confused,
+    /// Nothing was found.
+    Missed,
+}
+
+/// A set after the loop.
+pub struct Judged {
+    pub closure: Closure,
+    /// One per true effect.
+    pub places: Vec<Place>,
+    /// Whether the first effect found is the true one.
+    pub first: bool,
+    /// For each true effect: probability by chance of what the fit gains when it is declared after all others.
+    pub chance: Vec<f64>,
+    /// Held-out rms of the position error over that of the noise: before, after, and with the true effects declared.
+    pub before: f64,
+    pub after: f64,
+    pub best: f64,
+}
+
+impl Judged {
+    /// Runs the loop on one set.
+    pub fn of(lacking: &[Lacking], size: Size, seed: u64) -> Self {
+        let on_the_rig: Vec<_> = lacking.iter().filter_map(Lacking::on_the_rig).collect();
+        let set = measured(&on_the_rig, size, seed);
+        let problem = declared(lacking);
+        let closure = close(&problem, &set.measurements, &set.split, &Options::default()).unwrap();
+        let all: Vec<Effect> = lacking.iter().map(|one| one.effect.clone()).collect();
+        let full = Squares::of(&problem, &all, &set);
+        let without = |k: usize| {
+            let others: Vec<Effect> =
+                all.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, effect)| effect.clone()).collect();
+            Squares::of(&problem, &others, &set).chance_beside(&full)
+        };
+        let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
+        let others: Vec<&Effect> = closure.effects.iter().flat_map(|found| &found.alternatives).collect();
+        let place = |truth: &Effect| match () {
+            () if found.iter().any(|effect| is_the_same(effect, truth)) => Place::Found,
+            () if others.iter().any(|effect| is_the_same(effect, truth)) => Place::Alternative,
+            () if found.is_empty() => Place::Missed,
+            () => Place::Confused,
+        };
+        let ratio = |found: &Identification| found.fitted.held_out.rms.norm / NOISE;
+        Self {
+            places: all.iter().map(place).collect(),
+            first: found.first().is_some_and(|effect| all.iter().any(|truth| is_the_same(effect, truth))),
+            chance: (0..all.len()).map(without).collect(),
+            before: ratio(&closure.before.fit),
+            after: ratio(&closure.after),
+            best: full.held_out / NOISE,
+            closure,
+        }
+    }
+
+    /// One line of figures.
+    pub fn line(&self, name: &str, size: Size, seed: u64) -> String {
+        let names = |effects: &mut dyn Iterator<Item = &Effect>| effects.map(named).collect::<Vec<_>>().join(" + ");
+        let closure = &self.closure;
+        let cause = closure.unexplained.as_ref().map_or_else(String::new, |left| {
+            format!("{} {} p {:.1e}", left.place, left.depends_on.join(" "), left.p_value)
+        });
+        let failed: Vec<String> = closure
+            .findings
+            .checks
+            .iter()
+            .filter(|check| check.failed())
+            .map(|check| format!("{} {}", check.name(), check.about().unwrap_or_default()))
+            .collect();
+        let p: Vec<String> = self.chance.iter().map(|p| format!("{p:.1e}")).collect();
+        let best_p = closure.before.ranking.iter().map(|ranked| ranked.p_value).fold(1.0, f64::min);
+        let verdict = match closure.verdict {
+            Verdict::NothingFound => "nothing",
+            Verdict::Explained => "explained",
+            Verdict::Unexplained => "unexplained",
+        };
+        format!(
+            "{name};{};{seed};{:?};{};{};{verdict};{};{};{};{};{:.3};{:.3};{:.3};{:.2e};{:.1e}",
+            size.identification,
+            self.places,
+            u8::from(self.first),
+            p.join(" "),
+            names(&mut closure.effects.iter().map(|found| &found.effect)),
+            names(&mut closure.effects.iter().flat_map(|found| &found.alternatives)),
+            cause,
+            failed.join(", "),
+            self.before,
+            self.after,
+            self.best,
+            best_p,
+            closure.effects.iter().map(|found| found.p_value).fold(1.0, f64::max),
+        )
+    }
+}
+
+/// Sum of squares of a fit with some effects declared, and what it is compared with.
+struct Squares {
+    sum: f64,
+    freedom: f64,
+    parameters: usize,
+    held_out: f64,
+}
+
+impl Squares {
+    /// The best that one who knows the arm can do: `EI_y` and `EI_z` are fitted apart.
+    fn of(problem: &Problem, effects: &[Effect], set: &Set) -> Self {
+        let mut problem = problem.clone();
+        for beam in problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
+            beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
+        }
+        let location = problem.data.location.clone();
+        let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
+        problem.effects = effects.iter().map(declare).collect();
+        let found = identify(&problem, &set.measurements, &set.split, &Options::default()).unwrap();
+        let errors = found.fitted.identification;
+        let model = model_of(&problem, &set.measurements);
+        let pull = |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
+        let priors = found.x.iter().enumerate().map(pull);
+        let given: f64 = found.estimates.iter().map(|estimate| estimate.identified).sum();
+        Self {
+            sum: errors.n as f64 * (errors.rms.norm / SIGMA).powi(2) + priors.sum::<f64>(),
+            freedom: found.coordinates as f64 - given,
+            parameters: found.unknowns.len(),
+            held_out: found.fitted.held_out.rms.norm,
+        }
+    }
+
+    /// F test of what `full` has more.
+    fn chance_beside(&self, full: &Self) -> f64 {
+        let more = full.parameters.saturating_sub(self.parameters).max(1) as f64;
+        let f = (self.sum - full.sum).max(0.0) / more / (full.sum / full.freedom);
+        FisherSnedecor::new(more, full.freedom).unwrap().sf(f)
+    }
+}
+
+/// Whether an effect that was named is the true one: family and place, orders among others, times within a few poses.
+pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
+    match (named, truth) {
+        (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
+            joint == own && wanted.iter().all(|order| orders.contains(order))
+        }
+        (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => (at_time - own).abs() < 900.0,
+        _ => named == truth,
+    }
+}
+
+/// Name, place, orders.
+pub fn named(effect: &Effect) -> String {
+    let orders = match effect {
+        Effect::JointHarmonic { orders, .. } => format!("{orders:?}"),
+        _ => String::new(),
+    };
+    format!("{} {}{orders}", effect::name(effect), effect::place(effect)).trim().to_owned()
+}
+
+/// What a set lacks, with strengths.
+pub fn name(lacking: &[Lacking]) -> String {
+    let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
+    lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
+}

@@ -1,0 +1,123 @@
+//! A representative part of the sweep, and the cases of `tests/cases`.
+
+use flexcal::diagnosis::{Verdict, close};
+use flexcal::measurement::Split;
+use flexcal::problem::Effect;
+use flexcal::rig::Shape;
+use flexcal::study::Options;
+use rayon::prelude::*;
+
+use crate::bench::{NOISE, SMALL, lunar};
+use crate::common::arms::measured as read;
+use crate::families::{Lacking, catalogue, pairs};
+use crate::judged::{DISTINGUISHABLE, Judged, Place, is_the_same, name};
+use crate::outside::Left;
+
+/// Sets of noise alone.
+const QUIET: u64 = 16;
+
+#[test]
+fn noise_alone_says_nothing() {
+    let one = |seed| (seed, Judged::of(&[], SMALL, seed));
+    let all: Vec<(u64, Judged)> = (600..600 + QUIET).into_par_iter().map(one).collect();
+    let wrong: Vec<String> = all
+        .iter()
+        .filter(|(_, judged)| judged.closure.verdict != Verdict::NothingFound)
+        .map(|(seed, judged)| judged.line("noise alone", SMALL, *seed))
+        .collect();
+    // At a rate of 5 % four or more of 16 come up once in 140 times.
+    assert!(wrong.len() <= 3, "{wrong:#?}");
+}
+
+/// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and named or alternatives.
+fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> (usize, usize, usize) {
+    let one = |(k, kind): (usize, &Vec<Lacking>)| {
+        let seed = seed + k as u64;
+        let judged = Judged::of(kind, SMALL, seed);
+        println!("{}", judged.line(&name(kind), SMALL, seed));
+        assert!(judged.after < judged.before + 1.0, "{}: {} from {}", name(kind), judged.after, judged.before);
+        let shown = judged.places.iter().zip(&judged.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
+        let places: Vec<Place> = shown.map(|(place, _)| *place).collect();
+        let named = places.iter().filter(|place| **place == Place::Found).count();
+        let stated = places.iter().filter(|place| matches!(place, Place::Found | Place::Alternative)).count();
+        (places.len(), named, stated)
+    };
+    let add = |a: (usize, usize, usize), b: (usize, usize, usize)| (a.0 + b.0, a.1 + b.1, a.2 + b.2);
+    kinds.par_iter().enumerate().map(one).reduce(|| (0, 0, 0), add)
+}
+
+#[test]
+fn one_effect_is_named() {
+    let every_third: Vec<Vec<Lacking>> = catalogue().into_iter().step_by(3).map(|one| vec![one]).collect();
+    let (shown, named, stated) = named_of(&every_third, 700);
+    println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
+    assert!(shown >= 10);
+    assert!(10 * named >= 8 * shown && 10 * stated >= 9 * shown, "{named} and {stated} of {shown}");
+}
+
+#[test]
+fn two_effects_are_both_named() {
+    let (shown, named, stated) = named_of(&pairs()[..4], 800);
+    println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
+    assert!(shown >= 6);
+    assert!(stated + 1 >= shown, "{named} and {stated} of {shown}");
+}
+
+#[test]
+fn what_no_catalogue_holds_is_located_and_corrected() {
+    let kinds = [(2, Shape::Bump, [0.06, 20.0, 8.0]), (3, Shape::Step, [0.05, -70.0, 6.0])];
+    kinds.into_par_iter().for_each(|kind| {
+        let left = Left::of(kind, SMALL, 900);
+        let line = left.line(kind, SMALL, 900);
+        println!("{line}");
+        assert_eq!(left.closure.verdict, Verdict::Unexplained, "{line}");
+        assert!(left.located, "{line}");
+        assert!(left.corrected.is_some_and(|corrected| 2.0 * corrected < left.before), "{line}");
+    });
+}
+
+/// A case of `tests/cases` through the loop: these effects, and no more than `limit` times the noise on held-out poses.
+fn case(file: &str, effects: &[Effect], limit: f64) {
+    let problem = lunar();
+    let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);
+    let split = Split::new(&problem, &measurements).unwrap();
+    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
+    let after = closure.after.fitted.held_out.rms.norm / NOISE;
+    println!("{file}: {:?}, {found:?}, {after:.3} times the noise", closure.verdict);
+    assert_eq!(found.len(), effects.len(), "{file}: {found:?}");
+    for effect in effects {
+        assert!(found.iter().any(|found| is_the_same(found, effect)), "{file}: {found:?}");
+    }
+    let verdict = if effects.is_empty() { Verdict::NothingFound } else { Verdict::Explained };
+    assert_eq!(closure.verdict, verdict, "{file}");
+    assert!(after < limit, "{file}: {after} times the noise");
+}
+
+#[test]
+fn cases_without_an_effect() {
+    case("a-none", &[], 1.6);
+    case("h-none-large", &[], 1.15);
+}
+
+#[test]
+fn cases_with_effects() {
+    case("b-joint-harmonic", &[Effect::JointHarmonic { joint: 2, orders: vec![1] }], 1.6);
+    case("c-link-thermal-bending", &[Effect::LinkThermalBending { link: "B".to_owned() }], 1.6);
+    case("d-backlash", &[Effect::Backlash { joint: 3 }], 1.6);
+    case("e-payload-mass", &[Effect::PayloadMass], 1.6);
+    case("f-two", &[Effect::GearRatio { joint: 3 }, Effect::TrackerDrift], 1.6);
+}
+
+#[test]
+fn a_case_of_what_no_catalogue_holds() {
+    let problem = lunar();
+    let measurements = read(&problem, &["tests/cases/g-not-in-catalogue.csv"]);
+    let split = Split::new(&problem, &measurements).unwrap();
+    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let left = closure.unexplained.unwrap();
+    assert_eq!((left.place.as_str(), left.depends_on), ("joint 2", vec!["q2".to_owned()]));
+    let (before, after) = (closure.before.fit.fitted.held_out, left.correction.unwrap().held_out);
+    println!("g-not-in-catalogue: {:.4} mm, corrected {:.4} mm", before.rms.norm * 1e3, after.rms.norm * 1e3);
+    assert!(2.0 * after.rms.norm < before.rms.norm);
+}
