@@ -98,13 +98,13 @@ pub fn close(
         rounds.note(&without);
         fitted = rounds.run(without)?;
     } else if let Some(generic) = unexplained::strongest(&fitted, &data, LEVEL) {
-        // Effects that only stood in for it leave, and what it hid is looked for.
+        // Effects that only stood in for it leave.
         rounds.generics.push(generic);
         let without = rounds.without_insignificant(fitted)?;
         if rounds.is_new(&without) {
             rounds.note(&without);
         }
-        fitted = rounds.run(without)?;
+        fitted = without;
     }
     let fitted = rounds.settled(fitted)?;
     let findings = check_fit(&fitted, &data);
