@@ -13,6 +13,8 @@ pub(super) const LEAVING: f64 = 0.05;
 const RIVAL: f64 = 10.0;
 /// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.
 const OVERWHELMING: f64 = 1e-12;
+/// Poses beyond which rivals are not fitted one by one, nor effects: the linear neighbourhood of so many decides as well.
+pub(super) const MOST_REFITTED: usize = 1000;
 /// Effects that a round adds at most.
 const MOST: usize = 100;
 
@@ -28,6 +30,7 @@ pub(super) struct Pick {
 pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
     let mut picks: Vec<Pick> = Vec::new();
     let without = scan.linear.cross_validate(&data.block);
+    let many = data.rows().len() > MOST_REFITTED;
     while picks.len() < MOST {
         let ranking = scan.ranking();
         let mut standing = ranking.iter().filter(|tried| tried.corrected < LEVEL && tried.criterion < 0.0);
@@ -49,7 +52,7 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
             .collect();
         let p = best.corrected;
         let effect = scan.effects[best.index].clone();
-        let alone = rivals.iter().all(|rival| same_family(rival, &effect)) && p < OVERWHELMING;
+        let alone = many || rivals.iter().all(|rival| same_family(rival, &effect)) && p < OVERWHELMING;
         if !picks.is_empty() && !alone {
             break;
         }

@@ -5,15 +5,13 @@ use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::generic::Generic;
 use super::super::trace::{Scan, tries};
-use super::pick::{LEAVING, Pick, pick};
+use super::pick::{LEAVING, MOST_REFITTED, Pick, pick};
 use super::retest::{Retested, retest};
 use crate::problem::Effect;
 use crate::study::{ErrorSummary, IdentifyError, Options};
 
 /// Rounds after which the loop ends whatever is left.
 const MOST_ROUNDS: usize = 24;
-/// Poses beyond which rivals are not fitted one by one: the linear neighbourhood of so many decides as well.
-const MOST_REFITTED: usize = 1000;
 /// Steps of a fit to so many poses before the last: what curved valleys still hide decides nothing.
 const FEW_STEPS: u64 = 12;
 /// Rivals that are fitted to decide between them.
