@@ -16,7 +16,6 @@ pub(super) struct Fitted {
     pub problem: Problem,
     pub model: Model,
     pub found: Identification,
-    placement: Placement,
     /// Parameters that were fitted to the identification rows and rest on no bound.
     pub unknowns: Vec<usize>,
     /// 1 σ of a coordinate in rows without one of their own [m].
@@ -38,7 +37,7 @@ impl Fitted {
             Noise::Estimated(sigma) => sigma,
             Noise::Declared | Noise::Unknown => problem.data.position_sigma.unwrap_or(1e-3),
         };
-        Ok(Self { problem, model, found, placement, unknowns, sigma })
+        Ok(Self { problem, model, found, unknowns, sigma })
     }
 
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
@@ -65,7 +64,7 @@ impl Fitted {
 
     /// The poses of some rows.
     pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
-        self.placement.poses(data.measurements, rows, self.sigma)
+        Placement::of(data.measurements).poses(data.measurements, rows, self.sigma)
     }
 
     /// Residuals of some rows, measuring frame [m].
@@ -187,7 +186,7 @@ const UNSEEN: f64 = 1e-12;
 
 impl Normal {
     /// Of columns, shape = (3 N, n), with priors on the first of them, and the gradient g.
-    fn new(columns: &DMatrix<f64>, priors: &[Option<f64>], gradient: &DVector<f64>) -> Self {
+    pub fn new(columns: &DMatrix<f64>, priors: &[Option<f64>], gradient: &DVector<f64>) -> Self {
         let mut matrix = columns.tr_mul(columns);
         for (j, sigma) in priors.iter().enumerate() {
             if let Some(sigma) = sigma {

@@ -5,6 +5,7 @@
 //! - `closing`: rounds of fit, trace, add, test again; [`close`] tells the whole story.
 //! - `unexplained`: structure that no effect explains, its place, and a correction without a cause.
 
+mod apart;
 mod candidates;
 mod checks;
 mod closing;
@@ -15,6 +16,7 @@ mod trace;
 mod tracing;
 mod unexplained;
 
+pub use apart::Apart;
 pub use checks::{Check, Driver, Findings, Outcome, Remainder, Sequence, Test, Untestable, check};
 pub use closing::{Closure, Found, Interval, Step, Verdict, close};
 pub use tracing::{Ranked, Trace, trace};

@@ -1,5 +1,6 @@
 //! What the residual of one fit points to.
 
+use super::apart::{Apart, apart, shuffled};
 use super::candidates::Candidates;
 use super::checks::{Findings, Remainder, check};
 use super::closing::LEVEL;
@@ -33,6 +34,8 @@ pub struct Ranked {
     pub cross_validated: Option<f64>,
     /// Entries of the ranking that it is hard to tell from, with the largest principal angle between them [rad].
     pub alike: Vec<(Effect, f64)>,
+    /// A pose that would tell it from the first of those.
+    pub apart: Option<Apart>,
 }
 
 /// What the residual of the declared problem's fit points to.
@@ -85,6 +88,11 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let looked_at = best.iter().take(LOOKED_AT).filter(|tried| tried.corrected < LEVEL).count();
     let rms = |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
     let without = scan.linear.cross_validate(&data.block);
+    let poses = shuffled(data);
+    let looked: Vec<Effect> = best.iter().take(LOOKED_AT).map(|tried| scan.effects[tried.index].clone()).collect();
+    let all: Vec<usize> = (0..poses.len()).collect();
+    let elsewhere = Data { measurements: &poses, ..data.clone() };
+    let there = (looked_at > 0).then(|| fitted.library_of(&elsewhere, &all, &looked, &[]));
     let ranked = |(place, tried): (usize, &Tried)| {
         let close = place < looked_at;
         let cross_validated = without.filter(|_| close).and_then(|without| {
@@ -97,13 +105,19 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             let angle = scan.angle(tried.index, other.index).filter(|angle| *angle < ALIKE)?;
             Some((scan.effects[other.index].clone(), angle))
         };
+        let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
+        let own = &scan.effects[tried.index];
+        let pair = alike.first().zip(there.as_ref());
+        let apart =
+            pair.and_then(|((other, _), there)| apart(fitted, &library, there, &poses, (own, other)));
         Ranked {
             effect: scan.effects[tried.index].clone(),
             p_value: tried.corrected,
             f: (tried.gain.f, tried.gain.freedom),
             gain: rms(scan.linear.squares()) - rms(scan.linear.squares() - tried.gain.squares),
             cross_validated,
-            alike: alike.filter_map(angle).collect(),
+            alike,
+            apart,
         }
     };
     let ranking = best.iter().enumerate().map(ranked).collect();

@@ -137,7 +137,7 @@ pub fn close(
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
 fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
     let added = rounds.added(fitted);
-    if added.len() < 2 {
+    if added.len() < 2 || rounds.has_many_poses() {
         return Ok(None);
     }
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;

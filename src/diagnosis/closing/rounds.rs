@@ -70,6 +70,11 @@ impl Rounds<'_> {
         Ok(fitted)
     }
 
+    /// Whether there are so many poses that the linear neighbourhood decides.
+    pub fn has_many_poses(&self) -> bool {
+        self.data.rows().len() > MOST_REFITTED
+    }
+
     /// Fits on until it converges, if the rounds stopped before that.
     pub fn settled(&self, fitted: Fitted) -> Result<Fitted, IdentifyError> {
         if fitted.found.termination.converged() {
@@ -102,8 +107,7 @@ impl Rounds<'_> {
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        let many = self.data.rows().len() > MOST_REFITTED;
-        let options = Options { max_steps: many.then_some(FEW_STEPS), ..fitted.onwards(self.options) };
+        let options = Options { max_steps: self.has_many_poses().then_some(FEW_STEPS), ..fitted.onwards(self.options) };
         Fitted::new(fitted.with_effects(&effects), self.data, &options)
     }
 
@@ -112,7 +116,7 @@ impl Rounds<'_> {
         let present = self.added(fitted);
         match picks {
             [] => Ok(None),
-            [Pick { effect, rivals }] if !rivals.is_empty() && self.data.rows().len() <= MOST_REFITTED => {
+            [Pick { effect, rivals }] if !rivals.is_empty() && !self.has_many_poses() => {
                 let mut best: Option<(f64, Fitted)> = None;
                 for candidate in std::iter::once(effect).chain(rivals.iter().take(MOST_RIVALS)) {
                     let next = self.fit(fitted, &joined(&present, candidate))?;
@@ -145,9 +149,16 @@ impl Rounds<'_> {
     pub fn without_insignificant(&self, mut fitted: Fitted) -> Result<Fitted, IdentifyError> {
         loop {
             let added = self.added(&fitted);
-            let worst = self.tested(&fitted).into_iter().max_by(|a, b| a.p.total_cmp(&b.p));
-            let Some(worst) = worst.filter(|worst| worst.p >= LEAVING) else { return Ok(fitted) };
-            let kept: Vec<Effect> = added.iter().flat_map(parts).filter(|part| *part != worst.effect).collect();
+            let mut leaving: Vec<Retested> =
+                self.tested(&fitted).into_iter().filter(|tested| tested.p >= LEAVING).collect();
+            leaving.sort_by(|a, b| b.p.total_cmp(&a.p));
+            // One by one, for what one loses another may gain; with many poses all at once.
+            leaving.truncate(if self.has_many_poses() { leaving.len() } else { 1 });
+            if leaving.is_empty() {
+                return Ok(fitted);
+            }
+            let stays = |part: &Effect| leaving.iter().all(|leaving| leaving.effect != *part);
+            let kept: Vec<Effect> = added.iter().flat_map(parts).filter(stays).collect();
             fitted = self.fit(&fitted, &kept)?;
         }
     }

@@ -29,7 +29,7 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
         Block::heading("What the declared problem leaves"),
         Block::list(findings::all(&closure.before.findings)),
     ];
-    blocks.extend(trace::ranking(&closure.before, SHOWN));
+    blocks.extend(trace::ranking(problem, &closure.before, SHOWN));
     blocks.extend(rounds(closure));
     blocks.extend(parts::found(closure));
     blocks.push(Block::heading("What remains"));

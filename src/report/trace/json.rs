@@ -39,6 +39,21 @@ struct RankedEntry<'a> {
     /// The same on poses left out in turn.
     cross_validated_gain_mm: Option<f64>,
     alike: Vec<AlikeEntry<'a>>,
+    /// A pose that would tell it from the first of those.
+    told_apart: Option<ApartEntry<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct ApartEntry<'a> {
+    from: effect::Entry<'a>,
+    /// Configuration [rad] or [m].
+    q: &'a [f64],
+    payload_kg: Option<f64>,
+    #[serde(rename = "hoist_N")]
+    hoist: Option<f64>,
+    #[serde(rename = "temperature_C")]
+    temperature: Option<f64>,
+    difference_mm: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -70,6 +85,14 @@ impl<'a> From<&'a Ranked> for RankedEntry<'a> {
             alike: alike
                 .map(|(effect, angle)| AlikeEntry { effect: effect::Entry(effect), angle_deg: angle.to_degrees() })
                 .collect(),
+            told_apart: ranked.apart.as_ref().map(|apart| ApartEntry {
+                from: effect::Entry(&apart.other),
+                q: &apart.configuration,
+                payload_kg: apart.payload,
+                hoist: apart.hoist,
+                temperature: apart.temperature,
+                difference_mm: apart.difference * 1e3,
+            }),
         }
     }
 }

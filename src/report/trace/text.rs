@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::super::document::{Block, Point, to_text};
 use super::super::quantity::number;
 use super::super::{effect, findings};
-use crate::diagnosis::{Ranked, Trace};
-use crate::problem::Problem;
+use crate::diagnosis::{Apart, Ranked, Trace};
+use crate::problem::{JointKind, Problem};
 use crate::study::Identification;
 
 /// Candidates that fit on a screen.
@@ -21,7 +21,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
         Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
         Block::list(findings::all(&trace.findings)),
     ];
-    blocks.extend(ranking(trace, SHOWN));
+    blocks.extend(ranking(problem, trace, SHOWN));
     blocks.extend(not_seen(trace));
     to_text(&blocks)
 }
@@ -41,7 +41,7 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
 }
 
 /// The candidates that stand out, at most so many of them, and how to read them.
-pub(in crate::report) fn ranking(trace: &Trace, most: usize) -> Vec<Block> {
+pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize) -> Vec<Block> {
     let all: Vec<&Ranked> = trace.ranking.iter().filter(|ranked| ranked.p_value < trace.level).collect();
     let Some(first) = trace.ranking.first() else {
         return vec![Block::heading("What could explain it"), Block::Text("There is no candidate to try.".to_owned())];
@@ -59,7 +59,7 @@ pub(in crate::report) fn ranking(trace: &Trace, most: usize) -> Vec<Block> {
             )),
         ];
     }
-    let shown = all.iter().take(most).map(|ranked| point(ranked)).collect();
+    let shown = all.iter().take(most).map(|ranked| point(problem, ranked)).collect();
     let mut notes = format!(
         "{} candidates were tried one by one; p is the probability that chance alone does as well, corrected for their \
          number, and below {} it stands out. One cause makes its neighbours stand out, too: the first is the best \
@@ -72,14 +72,14 @@ pub(in crate::report) fn ranking(trace: &Trace, most: usize) -> Vec<Block> {
     if all.iter().take(most).any(|ranked| !ranked.alike.is_empty()) {
         notes.push_str(
             " The angle between two effects says how alike they are on these poses once all parameters have been fitted: \
-             at 0° nothing tells them apart, at 90° they have nothing in common. Other poses may tell them apart; which \
-             ones is not worked out here.",
+             at 0° nothing tells them apart, at 90° they have nothing in common. A pose where they would differ is one \
+             within the ranges that were measured.",
         );
     }
     vec![Block::heading("What could explain it, best first"), Block::Ranking(shown), Block::Text(notes)]
 }
 
-fn point(ranked: &Ranked) -> Point {
+fn point(problem: &Problem, ranked: &Ranked) -> Point {
     let mm = |gain: f64| number(gain * 1e3, 4);
     let mut gain = format!(
         "{}; would take {} mm off the rms error of the identification poses",
@@ -100,7 +100,27 @@ fn point(ranked: &Ranked) -> Point {
         };
         details.push(format!("hard to tell from: {}{more}", named.collect::<Vec<_>>().join("; ")));
     }
+    if let Some(apart) = &ranked.apart {
+        let other = crate::effect::describe(&apart.other);
+        details.push(format!("“{other}” would differ by {} mm at {}", mm(apart.difference), pose(problem, apart)));
+    }
     Point { text: effect::both(&ranked.effect), details }
+}
+
+/// A pose in words: joints, payload, hoist, temperature.
+fn pose(problem: &Problem, apart: &Apart) -> String {
+    let joints = problem.joints.iter().zip(&apart.configuration).enumerate();
+    let mut words: Vec<String> = joints
+        .filter_map(|(index, (joint, q))| match joint.kind {
+            JointKind::Revolute => Some(format!("q{} {}°", index + 1, number(q.to_degrees(), 1))),
+            JointKind::Prismatic => Some(format!("q{} {} mm", index + 1, number(q * 1e3, 1))),
+            JointKind::Fixed => None,
+        })
+        .collect();
+    words.extend(apart.payload.map(|mass| format!("payload {} kg", number(mass, 2))));
+    words.extend(apart.hoist.map(|force| format!("hoist {} N", number(force, 1))));
+    words.extend(apart.temperature.map(|degrees| format!("{} °C", number(degrees, 1))));
+    words.join(", ")
 }
 
 /// What these data can say nothing about.
