@@ -9,7 +9,9 @@ use crate::problem::{Effect, Equilibrium};
 pub(super) const FAMILY: Family = Family {
     name: "deflected-equilibrium",
     terms: |effect, _| match effect {
-        Effect::DeflectedEquilibrium => vec![Term::constant("lambda", Slot::Arm(ArmField::Mixing), 1.0).never_negative()],
+        Effect::DeflectedEquilibrium => {
+            vec![Term::constant("lambda", Slot::Arm(ArmField::Mixing), 1.0).never_negative()]
+        }
         _ => Vec::new(),
     },
     candidates: |problem, conditions| {

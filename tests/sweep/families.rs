@@ -43,7 +43,9 @@ impl Lacking {
 /// The declared problem without these effects.
 pub fn declared(lacking: &[Lacking]) -> Problem {
     let mut problem = lunar();
-    lacking.iter().for_each(|one| one.leave_out(&mut problem));
+    for one in lacking {
+        one.leave_out(&mut problem);
+    }
     problem
 }
 

@@ -65,7 +65,8 @@ fn three_effects() {
 #[ignore = "minutes"]
 fn what_no_catalogue_holds() {
     for (size, first) in [(SMALL, 400), (LARGE, 420)] {
-        let all: Vec<_> = KINDS.iter().flat_map(|kind| (first..first + sets(4)).map(move |seed| (*kind, seed))).collect();
+        let all: Vec<_> =
+            KINDS.iter().flat_map(|kind| (first..first + sets(4)).map(move |seed| (*kind, seed))).collect();
         all.into_par_iter().for_each(|(kind, seed)| println!("{}", Left::of(kind, size, seed).line(kind, size, seed)));
     }
 }

@@ -43,9 +43,8 @@ impl Left {
         let set = measured(&[outside(joint, shape, values)], size, seed);
         let closure = close(&lunar(), &set.measurements, &set.split, &Options::default()).unwrap();
         let left = closure.unexplained.as_ref();
-        let located = left.is_some_and(|left| {
-            left.place == format!("joint {joint}") && left.depends_on == [format!("q{joint}")]
-        });
+        let located =
+            left.is_some_and(|left| left.place == format!("joint {joint}") && left.depends_on == [format!("q{joint}")]);
         let correction = left.and_then(|left| left.correction.as_ref());
         Self {
             located,

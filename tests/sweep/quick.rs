@@ -2,9 +2,9 @@
 
 use flexcal::diagnosis::{Verdict, close};
 use flexcal::measurement::Split;
-use flexcal::problem::Effect;
+use flexcal::problem::{Effect, EffectDeclaration};
 use flexcal::rig::Shape;
-use flexcal::study::Options;
+use flexcal::study::{Options, identify};
 use rayon::prelude::*;
 
 use crate::bench::{NOISE, SMALL, lunar};
@@ -14,7 +14,7 @@ use crate::judged::{DISTINGUISHABLE, Judged, Place, is_the_same, name};
 use crate::outside::Left;
 
 /// Sets of noise alone.
-const QUIET: u64 = 16;
+const QUIET: u64 = 12;
 
 #[test]
 fn noise_alone_says_nothing() {
@@ -25,8 +25,8 @@ fn noise_alone_says_nothing() {
         .filter(|(_, judged)| judged.closure.verdict != Verdict::NothingFound)
         .map(|(seed, judged)| judged.line("noise alone", SMALL, *seed))
         .collect();
-    // At a rate of 5 % four or more of 16 come up once in 140 times.
-    assert!(wrong.len() <= 3, "{wrong:#?}");
+    // At a rate of 5 % three or more of 12 come up once in 50 times.
+    assert!(wrong.len() <= 2, "{wrong:#?}");
 }
 
 /// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and named or alternatives.
@@ -48,19 +48,18 @@ fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> (usize, usize, usize) {
 
 #[test]
 fn one_effect_is_named() {
-    let every_third: Vec<Vec<Lacking>> = catalogue().into_iter().step_by(3).map(|one| vec![one]).collect();
-    let (shown, named, stated) = named_of(&every_third, 700);
+    let every_fifth: Vec<Vec<Lacking>> = catalogue().into_iter().step_by(5).map(|one| vec![one]).collect();
+    let (shown, named, stated) = named_of(&every_fifth, 700);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
-    assert!(shown >= 10);
+    assert!(shown >= 7);
     assert!(10 * named >= 8 * shown && 10 * stated >= 9 * shown, "{named} and {stated} of {shown}");
 }
 
 #[test]
 fn two_effects_are_both_named() {
-    let (shown, named, stated) = named_of(&pairs()[..4], 800);
+    let (shown, named, stated) = named_of(&pairs()[..2], 800);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
-    assert!(shown >= 6);
-    assert!(stated + 1 >= shown, "{named} and {stated} of {shown}");
+    assert!(shown == 4 && stated == 4 && named >= 3, "{named} and {stated} of {shown}");
 }
 
 #[test]
@@ -76,37 +75,47 @@ fn what_no_catalogue_holds_is_located_and_corrected() {
     });
 }
 
-/// A case of `tests/cases` through the loop: these effects, and no more than `limit` times the noise on held-out poses.
-fn case(file: &str, effects: &[Effect], limit: f64) {
-    let problem = lunar();
+/// A case of `tests/cases` through the loop: these effects and no others, the held-out rms of a fit for which they are
+/// declared, and that below `limit_mm`.
+fn case(file: &str, effects: &[Effect], limit_mm: f64) {
+    let mut problem = lunar();
     let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);
     let split = Split::new(&problem, &measurements).unwrap();
     let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let location = problem.data.location.clone();
+    problem.effects =
+        effects.iter().map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() }).collect();
+    let known = identify(&problem, &measurements, &split, &Options::default()).unwrap().fitted.held_out.rms.norm;
     let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
-    let after = closure.after.fitted.held_out.rms.norm / NOISE;
-    println!("{file}: {:?}, {found:?}, {after:.3} times the noise", closure.verdict);
+    let after = closure.after.fitted.held_out.rms.norm;
+    println!(
+        "{file}: {:?}, {found:?}, {:.3} times the noise, {:.3} with the truth declared",
+        closure.verdict,
+        after / NOISE,
+        known / NOISE
+    );
     assert_eq!(found.len(), effects.len(), "{file}: {found:?}");
     for effect in effects {
         assert!(found.iter().any(|found| is_the_same(found, effect)), "{file}: {found:?}");
     }
     let verdict = if effects.is_empty() { Verdict::NothingFound } else { Verdict::Explained };
     assert_eq!(closure.verdict, verdict, "{file}");
-    assert!(after < limit, "{file}: {after} times the noise");
+    assert!(after < 1.01 * known && after < limit_mm * 1e-3, "{file}: {after} m, {known} m with the truth declared");
 }
 
 #[test]
 fn cases_without_an_effect() {
-    case("a-none", &[], 1.6);
-    case("h-none-large", &[], 1.15);
+    case("a-none", &[], 0.14);
+    case("h-none-large", &[], 0.10);
 }
 
 #[test]
 fn cases_with_effects() {
-    case("b-joint-harmonic", &[Effect::JointHarmonic { joint: 2, orders: vec![1] }], 1.6);
-    case("c-link-thermal-bending", &[Effect::LinkThermalBending { link: "B".to_owned() }], 1.6);
-    case("d-backlash", &[Effect::Backlash { joint: 3 }], 1.6);
-    case("e-payload-mass", &[Effect::PayloadMass], 1.6);
-    case("f-two", &[Effect::GearRatio { joint: 3 }, Effect::TrackerDrift], 1.6);
+    case("b-joint-harmonic", &[Effect::JointHarmonic { joint: 2, orders: vec![1] }], 0.14);
+    case("c-link-thermal-bending", &[Effect::LinkThermalBending { link: "B".to_owned() }], 0.14);
+    case("d-backlash", &[Effect::Backlash { joint: 3 }], 0.14);
+    case("e-payload-mass", &[Effect::PayloadMass], 0.14);
+    case("f-two", &[Effect::GearRatio { joint: 3 }, Effect::TrackerDrift], 0.14);
 }
 
 #[test]
