@@ -4,6 +4,8 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use flexcal::report::Page;
+
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
@@ -21,6 +23,15 @@ pub fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, WriteErro
     file.write_all(text.as_bytes()).and_then(|()| file.flush()).map_err(failed)?;
     file.persist(&path).map_err(|error| failed(error.error))?;
     Ok(path)
+}
+
+/// Writes a page as `report.html` in `folder`, and its figures in `figures` beside it.
+pub fn write_page(folder: &Path, page: &Page) -> Result<(), WriteError> {
+    for (name, figure) in &page.figures {
+        write(&folder.join("figures"), name, figure)?;
+    }
+    write(folder, "report.html", &page.html)?;
+    Ok(())
 }
 
 /// Prints to standard output; a closed pipe ends the printing quietly.

@@ -1,0 +1,122 @@
+//! Residual vectors over the workspace.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+use super::frame::{
+    ACCENT, Area, Axis, BELOW, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, legend, line, px, radius, range,
+    with_margin, write,
+};
+use super::{Figure, thinned};
+use crate::picture::{Picture, Residual};
+use crate::report::quantity::number;
+
+/// Poses that are drawn at most.
+const MOST: usize = 400;
+/// Length of a long arrow as a part of the width.
+const LONG: f64 = 0.09;
+/// Heights of a view as shown.
+const LEAST: f64 = 150.0;
+const GREATEST: f64 = 330.0;
+
+/// Residuals from above and from the side, at their measured positions.
+pub fn vectors(picture: &Picture) -> Figure {
+    let finite = |residual: &&Residual| residual.error.norm().is_finite();
+    let all: Vec<&Residual> = picture.residuals.iter().filter(finite).collect();
+    let step = every(all.len(), MOST);
+    let shown: Vec<&Residual> = all.into_iter().step_by(step).collect();
+    let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
+    let across = extent(0);
+    let width = f64::from(WIDTH - LEFT - 12);
+    let views = [1, 2].map(|axis| View::new(axis, extent(axis), (across.1 - across.0) / width));
+    let mut lengths: Vec<f64> = shown.iter().map(|residual| residual.error.norm()).collect();
+    lengths.sort_by(f64::total_cmp);
+    let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
+    // A scale of 1, 2 or 5 times a power of ten.
+    let bar = rounded(long);
+    let larger = LONG * (across.1 - across.0) / bar;
+    let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
+    let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
+        legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
+        let length = px(i32::try_from((LONG * width).round() as i64).unwrap_or_default());
+        let end = px(WIDTH - 12);
+        area.draw(&PathElement::new(vec![(end - length, px(10)), (end, px(10))], line(INK, 1.6)))?;
+        write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
+        let (_, body) = area.split_vertically(px(22));
+        let mut rest = body;
+        for view in &views {
+            let (panel, below) = rest.split_vertically(px(view.height + BELOW + 8));
+            rest = below;
+            view.draw(&panel, across, &shown, larger)?;
+        }
+        Ok(())
+    });
+    Figure {
+        name: "residual-vectors".to_owned(),
+        title: "What is left, over the workspace".to_owned(),
+        caption: format!(
+            "Each stroke starts at a measured position (dot) and points to where the arm was found to be off, drawn {} times \
+             too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
+             structure; a tangle is noise.{}",
+            short(larger),
+            thinned(step)
+        ),
+        svg,
+    }
+}
+
+/// 1, 2 or 5 times the power of ten below.
+fn rounded(value: f64) -> f64 {
+    let power = 10.0_f64.powf(value.log10().floor());
+    [5.0, 2.0, 1.0].map(|part| part * power).into_iter().find(|round| *round <= value * 1.001).unwrap_or(power)
+}
+
+/// Two digits that count, without an exponent.
+fn short(value: f64) -> String {
+    let digits = 1 - value.abs().max(1e-12).log10().floor() as i32;
+    if digits < 0 {
+        let power = 10.0_f64.powi(-digits);
+        return number((value / power).round() * power, 0);
+    }
+    let text = number(value, digits.unsigned_abs() as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Positions projected on x and one other axis, to the same scale where room allows.
+struct View {
+    axis: usize,
+    range: (f64, f64),
+    /// Of the drawing between the axes, as shown.
+    height: i32,
+}
+
+impl View {
+    fn new(axis: usize, (low, high): (f64, f64), per_pixel: f64) -> Self {
+        let wanted = (high - low) / per_pixel;
+        let height = wanted.clamp(LEAST, GREATEST);
+        let middle = 0.5 * (low + high);
+        // A low view keeps the scale and gets air; a high one is pressed together.
+        let half = if wanted < LEAST { 0.5 * LEAST * per_pixel } else { 0.5 * (high - low) };
+        #[expect(clippy::cast_possible_truncation, reason = "between the two heights")]
+        let height = height.round() as i32;
+        Self { axis, range: (middle - half, middle + half), height }
+    }
+
+    fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&Residual], larger: f64) -> Result<(), Failure> {
+        let label = if self.axis == 1 { "y [m]" } else { "z [m]" };
+        let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
+        let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;
+        let inside = |value: f64, (low, high): (f64, f64)| value.clamp(low, high);
+        for residual in shown {
+            let colour = if residual.held_out { ACCENT } else { FAINT };
+            let from = (residual.position.x, residual.position[self.axis]);
+            let to = (
+                inside(from.0 + larger * residual.error.x, across),
+                inside(from.1 + larger * residual.error[self.axis], self.range),
+            );
+            chart.draw_series([PathElement::new(vec![from, to], line(colour, 1.2))])?;
+            chart.draw_series([Circle::new(from, radius(1.5), colour.filled())])?;
+        }
+        Ok(())
+    }
+}
