@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::figures::{self, Figure};
+use super::figures::{self, Figure, capital, power_of_ten};
 use crate::diagnosis::{Closure, Found, Trace, Unexplained};
 use crate::effect;
 use crate::picture::Picture;
@@ -21,15 +21,10 @@ fn chance(p: f64) -> String {
     if p < 1e-300 {
         "p < 10⁻³⁰⁰".to_owned()
     } else if p < 1e-3 {
-        let digits: String = format!("{:.0}", -p.log10().floor()).chars().filter_map(raised).collect();
-        format!("p ≈ 10⁻{digits}")
+        format!("p ≈ {}", power_of_ten(p.log10().floor()))
     } else {
         format!("p = {p:.3}")
     }
-}
-
-fn raised(digit: char) -> Option<char> {
-    "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize)
 }
 
 fn value(estimate: &Estimate) -> String {
@@ -56,9 +51,9 @@ fn one(found: &Found) -> Markup {
     let others: Vec<String> = found.alternatives.iter().map(named).collect();
     html! {
         div.found {
-            h3 { (effect::describe(&found.effect)) }
-            p { code { (named(&found.effect)) } ", " (chance(found.p_value)) ", held out then "
-                (number(found.held_out_after.mean.norm * 1e3, 3)) " mm" }
+            h3 { (capital(&effect::describe(&found.effect))) }
+            p { code { (named(&found.effect)) } ", " (chance(found.p_value)) "; once it was in the model, held-out poses were off by "
+                (number(found.held_out_after.mean.norm * 1e3, 3)) " mm on average" }
             table {
                 @for estimate in &found.estimates {
                     tr { td.l { code { (estimate.name) } } td { (value(estimate)) } }
@@ -104,6 +99,34 @@ pub(super) fn figures(closure: &Closure, picture: &Picture) -> Vec<Figure> {
         )
     }));
     all
+}
+
+/// What each round of the loop came to.
+pub(super) fn rounds(closure: &Closure) -> Markup {
+    let first = &closure.before.fit.fitted;
+    let line = |round: usize, effects: &[Effect], fitted: f64, held_out: f64| {
+        let names: Vec<String> = effects.iter().map(named).collect();
+        html! {
+            tr {
+                td.l { (round) }
+                td.l.w { (if names.is_empty() { "as declared".to_owned() } else { names.join(", ") }) }
+                td { (number(fitted * 1e3, 3)) }
+                td { (number(held_out * 1e3, 3)) }
+            }
+        }
+    };
+    html! {
+        h3 { "Rounds" }
+        table {
+            thead { tr { th.l { "round" } th.l { "effects in the model" } th { "fitted [mm]" } th { "held out [mm]" } } }
+            tbody {
+                (line(0, &[], first.identification.mean.norm, first.held_out.mean.norm))
+                @for (k, step) in closure.steps.iter().enumerate() {
+                    (line(k + 1, &step.effects, step.identification.mean.norm, step.held_out.mean.norm))
+                }
+            }
+        }
+    }
 }
 
 /// What could not be looked for.

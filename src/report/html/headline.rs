@@ -104,18 +104,24 @@ pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
     let digits = decimals((gain.high - gain.low) * 1e3, 4).max(2);
     let shown = |value: f64| number(value * 1e3, digits).replace('-', "−");
     let verdict = match closure.verdict {
-        Verdict::NothingFound => "nothing found: no effect, no structure",
-        Verdict::Explained => "explained: what is left passes the checks",
-        Verdict::Unexplained => "unexplained: structure is left",
+        Verdict::NothingFound => "nothing found",
+        Verdict::Explained => "explained",
+        Verdict::Unexplained => "structure is left",
+    };
+    let meaning = match closure.verdict {
+        Verdict::NothingFound => "No effect stands out of the residual, and it has no structure.",
+        Verdict::Explained => "What is left after the loop passes every check of structure.",
+        Verdict::Unexplained => "What is left after the loop still has structure.",
     };
     let corrected = closure.unexplained.as_ref().and_then(|left| left.correction.as_ref());
     html! {
         (change(first.mean.norm, last.mean.norm, &format!("{} held-out poses, before and after the loop", last.n)))
         p {
             "Gain " b { (shown(gain.value)) " mm" } ", 95 % interval " (shown(gain.low)) " to " (shown(gain.high)) " mm. "
-            "Before: the declared model as identified; the nominal arm had " (mm(fit.registered.held_out.mean.norm)) " mm."
+            "Before: the declared model as identified; the nominal arm had " (mm(fit.registered.held_out.mean.norm)) " mm. "
+            (meaning)
             @if let Some(correction) = corrected {
-                " With the empirical correction: " (mm(correction.held_out.mean.norm)) " mm."
+                " With the empirical correction the error is " (mm(correction.held_out.mean.norm)) " mm."
             }
         }
         (distrust(after))

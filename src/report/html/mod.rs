@@ -89,8 +89,10 @@ pub fn closure_page(problem: &Problem, closure: &Closure, picture: &Picture) -> 
         }))
         (section("Errors before and after", &figures.show([figures::errors(picture), figures::vectors(picture)])))
         (section("What pointed there", &html! {
-            (figures.show(figures::ranking(&closure.before)))
-            (effects::absent(&closure.before))
+            div.columns {
+                (figures.show(figures::ranking(&closure.before)))
+                div { (effects::rounds(closure)) (effects::absent(&closure.before)) }
+            }
         }))
         (section("What is left", &html! {
             (figures.show(figures::histogram(picture).into_iter().chain(figures::order(picture))))

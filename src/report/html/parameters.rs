@@ -16,12 +16,12 @@ const MOST: usize = 6;
 /// Nominal, estimate, change and standard error of every free parameter, with the change drawn in standard errors.
 pub(super) fn table(found: &Identification) -> Markup {
     html! {
-        p { "Bars: the change from nominal in units of its standard error, up to ten either way; pale: one standard error "
-            "about it. Identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations." }
+        p { "Bars: the change from nominal in units of its standard error, up to ten either way (changes beyond that rest at the end; "
+            "an orange mark there is a bound), with one standard error about it. Identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations." }
         div.scroll { table {
             thead { tr {
-                th.l { "parameter" } th { "nominal" } th { "estimate" } th { "change" } th { "± 1 σ" } th.l { "unit" }
-                th.l { "change / σ" } th.l { "identified" }
+                th.l { "parameter" } th.o { "nominal" } th { "estimate" } th.o { "change" } th { "± 1 σ" } th.l { "unit" }
+                th.l { "change / σ" } th.l.o { "identified" }
             } }
             tbody { @for estimate in &found.estimates { (row(estimate)) } }
         } }
@@ -40,13 +40,13 @@ fn row(estimate: &Estimate) -> Markup {
     html! {
         tr {
             td.l { (estimate.name) }
-            td { (show(estimate.nominal, digits.min(PLAIN))) }
+            td.o { (show(estimate.nominal, digits.min(PLAIN))) }
             td { (show(estimate.estimate, digits)) }
-            td { (show(estimate.estimate - estimate.nominal, digits)) }
+            td.o { (show(estimate.estimate - estimate.nominal, digits)) }
             td { (error.map_or_else(|| "–".to_owned(), |error| number(error, digits))) }
             td.l { (unit.symbol) }
             td.l { (bar(estimate)) }
-            td.l.q { (verdict(estimate)) }
+            td.l.q.o { (verdict(estimate)) }
         }
     }
 }
@@ -69,7 +69,7 @@ fn bar(estimate: &Estimate) -> Markup {
             } @else if let Some(change) = change {
                 @let (from, to) = (place(change - 1.0), place(change + 1.0));
                 b style=(format!("left:{from:.1}%;width:{:.1}%", to - from)) {}
-                b.at.out[change.abs() > REACH] style=(format!("left:{:.1}%", place(change))) {}
+                b.at style=(format!("left:{:.1}%", place(change))) {}
             }
         }
     }
@@ -97,16 +97,16 @@ pub(super) fn comparison_table(comparison: &Comparison) -> Markup {
         html! {
             tr {
                 td.l { (name) } td.l { (solver) }
-                td { (mm(errors.0.mean.norm)) } td { (mm(errors.1.mean.norm)) } td { (mm(errors.1.rms.norm)) } td { (mm(errors.1.max.norm)) }
-                td { (steps) } td.l.q { (end) }
+                td.o { (mm(errors.0.mean.norm)) } td { (mm(errors.1.mean.norm)) } td.o { (mm(errors.1.rms.norm)) } td.o { (mm(errors.1.max.norm)) }
+                td.o { (steps) } td.l.q.o { (end) }
             }
         }
     };
     html! {
         div.scroll { table {
             thead { tr {
-                th.l { "strategy" } th.l { "solver" } th { "fitted, mean [mm]" } th { "held out, mean [mm]" } th { "rms [mm]" }
-                th { "largest [mm]" } th { "steps" } th.l { "ended" }
+                th.l { "strategy" } th.l { "solver" } th.o { "fitted, mean [mm]" } th { "held out [mm]" } th.o { "rms [mm]" }
+                th.o { "largest [mm]" } th.o { "steps" } th.l.o { "ended" }
             } }
             tbody {
                 @for found in &comparison.strategies {

@@ -35,7 +35,7 @@ p{margin:8px 0;max-width:72ch}
 .big .unit{font-size:20px;font-weight:500;letter-spacing:0;color:var(--muted)}
 .under{color:var(--muted);margin:4px 0 22px}
 .note{border-left:3px solid var(--warm);padding:2px 0 2px 14px;margin:16px 0}
-dl.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:14px 24px;margin:22px 0 0}
+dl.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:14px 24px;margin:22px 0 0}
 dl.facts dt{color:var(--muted);font-size:13px}
 dl.facts dd{margin:0;font-weight:600}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr));gap:36px 40px;align-items:start;margin:16px 0}
@@ -50,6 +50,7 @@ th{text-align:right;font-weight:500;color:var(--muted);font-size:13px;padding:4p
 td{text-align:right;padding:3px 10px;border-bottom:1px solid var(--grid);white-space:nowrap}
 th.l,td.l{text-align:left}
 th:first-child,td:first-child{padding-left:0}
+td.w{white-space:normal}
 td.q{color:var(--muted)}
 .bar{display:block;width:150px;height:14px;position:relative}
 .bar i,.bar b,.bar u{position:absolute;display:block}
@@ -59,7 +60,7 @@ td.q{color:var(--muted)}
 .bar b.at{opacity:1;width:4px;margin-left:-2px}
 .bar b.out{background:var(--warm)}
 ul.plain{list-style:none;padding:0;margin:10px 0}
-ul.plain li{padding:5px 0 5px 26px;position:relative;max-width:80ch}
+ul.plain li{padding:3px 0 3px 24px;position:relative;max-width:80ch;font-size:14px;line-height:1.45}
 ul.plain li::before{position:absolute;left:2px;font-weight:700}
 li.pass::before{content:'\\2713';color:var(--muted)}
 li.fail::before{content:'\\2717';color:var(--warm)}
@@ -70,7 +71,7 @@ li.skip{color:var(--muted)}
 .found p{margin:3px 0}
 code{font:13px ui-monospace,SFMono-Regular,Menlo,Consolas,monospace}
 footer{margin-top:56px;padding-top:14px;border-top:1px solid var(--grid);font-size:13px;color:var(--muted)}
-@media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:90px}}
+@media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:64px}td,th{padding:3px 6px}th{white-space:normal}.o{display:none}.scroll{overflow-x:auto}}
 @media print{@page{margin:14mm}body{font-size:11pt}main{max-width:none;padding:0}.grid{grid-template-columns:1fr 1fr;gap:18px 22px}h2{margin-top:26px;break-after:avoid}.big{font-size:34px}.scroll{overflow:visible}table{font-size:8.5pt}td,th{padding:2px 6px}tr{break-inside:avoid}figcaption{font-size:9pt}.bar{width:80px}}
 ";
 

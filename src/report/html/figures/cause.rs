@@ -47,6 +47,12 @@ pub fn cause(cause: &Cause, name: String, lead: &str) -> Figure {
     Figure { name, title: cause.title.clone(), caption: format!("{lead} {}{}", reading(cause), thinned(step)), svg }
 }
 
+/// With a capital letter.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// What a point is.
 fn reading(cause: &Cause) -> &'static str {
     match cause.ordinate {

@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::Figure;
-use super::frame::{ACCENT, GRID, MUTED, WARM, WIDTH, figure, px, write};
+use super::frame::{ACCENT, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
 use crate::picture::Correlations;
 
 /// Parameters that are drawn at most.
@@ -27,16 +27,14 @@ pub fn correlation(correlations: &Correlations) -> Option<Figure> {
     shown.truncate(MOST);
     shown.sort_unstable();
     let count = i32::try_from(shown.len()).unwrap_or(1);
-    let cell = ((WIDTH - NAMES - 8) / count).clamp(8, 26);
+    let cell = ((WIDTH - NAMES - 4) / count).clamp(9, 26);
     let height = 8 + cell * count + 40;
-    // Names in every row where they fit, else in every other.
-    let naming = if cell >= 12 { 1 } else { 2 };
+    let letters = f64::from(cell).min(TEXT);
     let svg = figure((WIDTH, height), "Correlations of the parameters", |area| {
         for (row, &i) in (0..).zip(&shown) {
             let top = 8 + cell * row;
-            if row % naming == 0 {
-                write(area, &correlations.names[i], (NAMES - 6, top + cell / 2), MUTED, HPos::Right)?;
-            }
+            let place = (NAMES - 6, top + cell / 2);
+            write_sized(area, &correlations.names[i], place, (MUTED, letters), HPos::Right)?;
             for (column, &j) in (0..).zip(&shown) {
                 let left = NAMES + cell * column;
                 let value = matrix[(i, j)];
@@ -64,13 +62,12 @@ pub fn correlation(correlations: &Correlations) -> Option<Figure> {
     let left_out = all - shown.len();
     let part =
         if left_out > 0 { format!(" Of {all} parameters the {MOST} that go together most.") } else { String::new() };
-    let names = if naming > 1 { " Every other row is named." } else { "" };
     Some(Figure {
         name: "correlations".to_owned(),
         title: "Which estimates go together".to_owned(),
         caption: format!(
             "Correlation of every pair of estimates, columns in the order of the rows. Deep colours off the diagonal: only the \
-             sum (orange) or the difference (blue) of two parameters is well known, so do not read much into either alone.{part}{names}"
+             sum (orange) or the difference (blue) of two parameters is well known, so do not read much into either alone.{part}"
         ),
         svg,
     })

@@ -57,7 +57,7 @@ pub fn errors(picture: &Picture) -> Figure {
         legend(area, &entries)?;
         let (_, body) = area.split_vertically(px(22));
         let mut rest = body;
-        for (axis, label) in ["|x| [mm]", "|y| [mm]", "|z| [mm]", "norm [mm]"].into_iter().enumerate() {
+        for (axis, label) in ["|Δx| [mm]", "|Δy| [mm]", "|Δz| [mm]", "norm [mm]"].into_iter().enumerate() {
             let last = axis == 3;
             let (panel, below) = rest.split_vertically(px(if last { PANEL + 34 } else { PANEL }));
             rest = below;

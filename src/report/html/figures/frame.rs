@@ -107,8 +107,8 @@ impl<'a> Axis<'a> {
             return Vec::new();
         }
         if self.logarithmic && high - low >= 1.0 {
-            let parts: &[f64] = if high - low > 3.0 { &[1.0] } else { &[1.0, 3.0] };
-            let every = ((high - low) / self.numbers as f64).ceil().max(1.0);
+            let parts: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 3.0] };
+            let every = ((high - low) / self.numbers as f64).floor().max(1.0);
             let decades = (0..=64).map(|k| (low / every).floor() * every + f64::from(k) * every);
             let all = decades.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
             return all.filter(|tick| (low - 1e-9..=high + 1e-9).contains(tick)).collect();
@@ -124,7 +124,7 @@ impl<'a> Axis<'a> {
             let plain = 10.0_f64.powf(value);
             let exponent = value.floor();
             if !(-4.0..5.0).contains(&exponent) {
-                return format!("{plain:.0e}");
+                return power_of_ten(value.round());
             }
             let decimals = if exponent < 0.0 { -exponent } else { 0.0 };
             return crate::report::quantity::number(plain, whole(decimals));
@@ -134,11 +134,26 @@ impl<'a> Axis<'a> {
     }
 }
 
+/// 10⁻⁶ for −6.
+pub fn power_of_ten(exponent: f64) -> String {
+    let raised = |digit: char| match digit {
+        '-' => Some('⁻'),
+        digit => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize),
+    };
+    format!("10{}", format!("{exponent:.0}").chars().filter_map(raised).collect::<String>())
+}
+
 /// A small number without its fraction.
 fn whole(value: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=12")]
     let whole = value.clamp(0.0, 12.0) as usize;
     whole
+}
+
+/// Numbers at round places of a range, about `count`, each in words.
+pub fn round_numbers(range: (f64, f64), count: usize) -> Vec<(f64, String)> {
+    let axis = Axis::linear(range, "").numbers(count);
+    axis.ticks().into_iter().map(|tick| (tick, axis.number(tick))).collect()
 }
 
 /// 1, 2 or 5 times a power of ten, about `count` to a range.
@@ -194,7 +209,18 @@ fn font(colour: RGBColor, size: f64) -> TextStyle<'static> {
 
 /// Writes text at a place in pixels as shown.
 pub fn write(area: &Area, text: &str, at: (i32, i32), colour: RGBColor, side: HPos) -> Result<(), Failure> {
-    let style = font(colour, TEXT).pos(Pos::new(side, VPos::Center));
+    write_sized(area, text, at, (colour, TEXT), side)
+}
+
+/// The same in letters of some size as shown.
+pub fn write_sized(
+    area: &Area,
+    text: &str,
+    at: (i32, i32),
+    (colour, size): (RGBColor, f64),
+    side: HPos,
+) -> Result<(), Failure> {
+    let style = font(colour, size).pos(Pos::new(side, VPos::Center));
     area.draw_text(text, &style, (px(at.0), px(at.1)))
 }
 

@@ -11,10 +11,10 @@ mod spectrum;
 mod strategies;
 mod vectors;
 
-pub use cause::cause;
+pub use cause::{capital, cause};
 pub use correlation::correlation;
 pub use errors::errors;
-pub use frame::{ACCENT, FAINT, GRID, INK, MUTED, WARM};
+pub use frame::{ACCENT, FAINT, GRID, INK, MUTED, WARM, power_of_ten};
 pub use histogram::histogram;
 pub use order::order;
 pub use ranking::ranking;

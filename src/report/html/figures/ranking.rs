@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::Figure;
-use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, write};
+use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
 use crate::diagnosis::{Ranked, Trace};
 use crate::effect;
 use crate::problem::Effect;
@@ -48,16 +48,10 @@ pub fn ranking(trace: &Trace) -> Option<Figure> {
     #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
     let place = |value: f64| px(NAMES) + (value / most * room * f64::from(px(1))).round() as i32;
     let svg = figure((WIDTH, bottom + BELOW), "Candidate effects by evidence", |area| {
-        for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
-            let at = place(part * most);
+        for (value, number) in round_numbers((0.0, most), 5) {
+            let at = place(value);
             area.draw(&PathElement::new(vec![(at, px(top)), (at, px(bottom))], line(GRID, 1.0)))?;
-            write(
-                area,
-                &number(part * most, usize::from(most < 20.0)),
-                (at / px(1), bottom + 10),
-                MUTED,
-                HPos::Center,
-            )?;
+            write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
         }
         for (k, ranked) in (0..).zip(&shown) {
             let y = top + ROW * k + ROW / 2;

@@ -26,9 +26,12 @@ pub fn vectors(picture: &Picture) -> Figure {
     let step = every(all.len(), MOST);
     let shown: Vec<&Residual> = all.into_iter().step_by(step).collect();
     let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
-    let across = extent(0);
     let width = f64::from(WIDTH - LEFT - 12);
-    let views = [1, 2].map(|axis| View::new(axis, extent(axis), (across.1 - across.0) / width));
+    let size = |(low, high): (f64, f64)| high - low;
+    // One scale for all: strokes keep their directions.
+    let per_pixel = (size(extent(0)) / width).max(size(extent(1)) / GREATEST).max(size(extent(2)) / GREATEST);
+    let across = about(extent(0), width * per_pixel);
+    let views = [1, 2].map(|axis| View::new(axis, extent(axis), per_pixel));
     let mut lengths: Vec<f64> = shown.iter().map(|residual| residual.error.norm()).collect();
     lengths.sort_by(f64::total_cmp);
     let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
@@ -55,7 +58,7 @@ pub fn vectors(picture: &Picture) -> Figure {
         name: "residual-vectors".to_owned(),
         title: "What is left, over the workspace".to_owned(),
         caption: format!(
-            "Each stroke starts at a measured position (dot) and points to where the arm was found to be off, drawn {} times \
+            "Each stroke starts at a measured position (dot) and shows the residual measured − predicted there, drawn {} times \
              too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
              structure; a tangle is noise.{}",
             short(larger),
@@ -82,7 +85,13 @@ fn short(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Positions projected on x and one other axis, to the same scale where room allows.
+/// A range of some width about the middle of another.
+fn about((low, high): (f64, f64), width: f64) -> (f64, f64) {
+    let middle = 0.5 * (low + high);
+    (middle - 0.5 * width, middle + 0.5 * width)
+}
+
+/// Positions projected on x and one other axis.
 struct View {
     axis: usize,
     range: (f64, f64),
@@ -91,15 +100,11 @@ struct View {
 }
 
 impl View {
-    fn new(axis: usize, (low, high): (f64, f64), per_pixel: f64) -> Self {
-        let wanted = (high - low) / per_pixel;
-        let height = wanted.clamp(LEAST, GREATEST);
-        let middle = 0.5 * (low + high);
-        // A low view keeps the scale and gets air; a high one is pressed together.
-        let half = if wanted < LEAST { 0.5 * LEAST * per_pixel } else { 0.5 * (high - low) };
+    fn new(axis: usize, range: (f64, f64), per_pixel: f64) -> Self {
+        let height = ((range.1 - range.0) / per_pixel).max(LEAST).round();
         #[expect(clippy::cast_possible_truncation, reason = "between the two heights")]
-        let height = height.round() as i32;
-        Self { axis, range: (middle - half, middle + half), height }
+        let shown = height as i32;
+        Self { axis, range: about(range, height * per_pixel), height: shown }
     }
 
     fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&Residual], larger: f64) -> Result<(), Failure> {
