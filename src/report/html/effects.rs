@@ -88,8 +88,11 @@ fn unexplained(left: &Unexplained) -> Markup {
 /// The residual against the cause of each effect, and of structure without one.
 pub(super) fn figures(closure: &Closure, picture: &Picture) -> Vec<Figure> {
     let causes = picture.causes.iter().enumerate();
-    let mut all: Vec<Figure> =
-        causes.map(|(k, cause)| figures::cause(cause, format!("effect-{}", k + 1), "Found by the loop.")).collect();
+    let mut all: Vec<Figure> = causes
+        .map(|(k, cause)| {
+            figures::cause(cause, format!("effect-{}", k + 1), "Found by the loop; the line is the fitted law.")
+        })
+        .collect();
     let known = closure.unexplained.is_some();
     all.extend(picture.trend.iter().filter(|_| known).map(|trend| {
         figures::cause(

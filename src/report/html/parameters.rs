@@ -21,7 +21,7 @@ pub(super) fn table(found: &Identification) -> Markup {
         div.scroll { table {
             thead { tr {
                 th.l { "parameter" } th.o { "nominal" } th { "estimate" } th.o { "change" } th { "± 1 σ" } th.l { "unit" }
-                th.l { "change / σ" } th.l.o { "identified" }
+                th.l.o { "change / σ" } th.l.o { "identified" }
             } }
             tbody { @for estimate in &found.estimates { (row(estimate)) } }
         } }
@@ -45,7 +45,7 @@ fn row(estimate: &Estimate) -> Markup {
             td.o { (show(estimate.estimate - estimate.nominal, digits)) }
             td { (error.map_or_else(|| "–".to_owned(), |error| number(error, digits))) }
             td.l { (unit.symbol) }
-            td.l { (bar(estimate)) }
+            td.l.o { (bar(estimate)) }
             td.l.q.o { (verdict(estimate)) }
         }
     }

@@ -35,7 +35,7 @@ p{margin:8px 0;max-width:72ch}
 .big .unit{font-size:20px;font-weight:500;letter-spacing:0;color:var(--muted)}
 .under{color:var(--muted);margin:4px 0 22px}
 .note{border-left:3px solid var(--warm);padding:2px 0 2px 14px;margin:16px 0}
-dl.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:14px 24px;margin:22px 0 0}
+dl.facts{max-width:1000px;display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,150px),1fr));gap:14px 24px;margin:22px 0 0}
 dl.facts dt{color:var(--muted);font-size:13px}
 dl.facts dd{margin:0;font-weight:600}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr));gap:36px 40px;align-items:start;margin:16px 0}

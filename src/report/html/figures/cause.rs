@@ -29,7 +29,8 @@ pub fn cause(cause: &Cause, name: String, lead: &str) -> Figure {
     let y = with_margin((heights.0 * up.factor, heights.1 * up.factor), 0.06);
     let svg = figure((WIDTH, HEIGHT), &cause.title, |area| {
         let held_out = points.iter().any(|(_, held_out)| *held_out);
-        let entries = [("fitted pose", FAINT, true), ("held-out pose", INK, true), ("fitted law", ACCENT, true)];
+        let law = if matches!(cause.ordinate, Ordinate::Place { .. }) { "correction" } else { "fitted law" };
+        let entries = [("fitted pose", FAINT, true), ("held-out pose", INK, true), (law, ACCENT, true)];
         let kept: Vec<_> = entries.into_iter().filter(|(name, ..)| held_out || *name != "held-out pose").collect();
         legend(area, &kept)?;
         let (_, body) = area.split_vertically(px(20));
@@ -44,7 +45,7 @@ pub fn cause(cause: &Cause, name: String, lead: &str) -> Figure {
         chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
         Ok(())
     });
-    Figure { name, title: cause.title.clone(), caption: format!("{lead} {}{}", reading(cause), thinned(step)), svg }
+    Figure { name, title: capital(&cause.title), caption: format!("{lead} {}{}", reading(cause), thinned(step)), svg }
 }
 
 /// With a capital letter.
@@ -57,15 +58,14 @@ pub fn capital(text: &str) -> String {
 fn reading(cause: &Cause) -> &'static str {
     match cause.ordinate {
         Ordinate::Joint { .. } | Ordinate::Place { .. } => {
-            "Each dot is the error of this coordinate as one pose alone measures it, all other parameters as fitted; the line \
-             is the law. Poses that hardly feel the coordinate are left out."
+            "Each dot is the error of this coordinate as one pose alone measures it, all other parameters as fitted. Poses that hardly feel the coordinate are left out."
         }
         Ordinate::Displacement => {
             "Each dot is the residual of one pose along the direction in which the effect moves it, all other parameters as \
-             fitted; the line is the law."
+             fitted."
         }
         Ordinate::Curvature(_) | Ordinate::Strain(_) | Ordinate::Mass => {
-            "Each dot is the effect's size as one pose alone measures it, all other parameters as fitted; the line is the law. \
+            "Each dot is the effect's size as one pose alone measures it, all other parameters as fitted. \
              Poses that hardly feel it are left out."
         }
     }

@@ -91,6 +91,12 @@ fn about((low, high): (f64, f64), width: f64) -> (f64, f64) {
     (middle - 0.5 * width, middle + 0.5 * width)
 }
 
+/// The part of the way from a value in a range to another that stays in it.
+fn inside(from: f64, to: f64, (low, high): (f64, f64)) -> f64 {
+    let edge = if to > high { high } else { low };
+    if (low..=high).contains(&to) { 1.0 } else { ((edge - from) / (to - from)).clamp(0.0, 1.0) }
+}
+
 /// Positions projected on x and one other axis.
 struct View {
     axis: usize,
@@ -111,14 +117,13 @@ impl View {
         let label = if self.axis == 1 { "y [m]" } else { "z [m]" };
         let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
         let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;
-        let inside = |value: f64, (low, high): (f64, f64)| value.clamp(low, high);
         for residual in shown {
             let colour = if residual.held_out { ACCENT } else { FAINT };
             let from = (residual.position.x, residual.position[self.axis]);
-            let to = (
-                inside(from.0 + larger * residual.error.x, across),
-                inside(from.1 + larger * residual.error[self.axis], self.range),
-            );
+            let end = (from.0 + larger * residual.error.x, from.1 + larger * residual.error[self.axis]);
+            // A stroke that would leave the view ends at its edge.
+            let part = inside(from.0, end.0, across).min(inside(from.1, end.1, self.range));
+            let to = (from.0 + part * (end.0 - from.0), from.1 + part * (end.1 - from.1));
             chart.draw_series([PathElement::new(vec![from, to], line(colour, 1.2))])?;
             chart.draw_series([Circle::new(from, radius(1.5), colour.filled())])?;
         }
