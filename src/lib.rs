@@ -9,7 +9,7 @@
 //! - [`fit`], [`solver`]: least squares over many small items, which know no arms.
 //! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`diagnosis`]: what structure
 //!   the residual still has, and the loop that adds what it points to; [`campaign`]: many fits where the truth is known;
-//!   [`report`] writes it down.
+//!   [`picture`] gathers what its figures show; [`report`] writes it down.
 //! - [`design`]: which poses to measure, and what they will tell.
 //! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
 //!   the model.
@@ -42,6 +42,7 @@ pub mod measurement;
 pub mod model;
 pub mod paper;
 pub mod parameter;
+pub mod picture;
 pub mod problem;
 pub mod report;
 pub mod rig;

@@ -37,9 +37,11 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("design", &[GROUND, BELOW_STUDY, &["study"]]),
     // Many fits to what model or rig measure.
     ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
-    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "report", "rig", "cli"]]),
+    // What figures show, as numbers.
+    ("picture", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
+    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture"]]),
+    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture", "report", "rig"]]),
+    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture", "report", "rig", "cli"]]),
 ];
 const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
 

@@ -6,7 +6,7 @@ use std::{fs, io};
 
 use clap::Args;
 use flexcal::study::Options;
-use flexcal::{diagnosis, report};
+use flexcal::{diagnosis, picture, report};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -19,14 +19,14 @@ use super::{Outcome, diagnostic, output};
   flexcal loop problems/ur10-ipa --data session_A.csv session_B.csv session_C.csv
   flexcal identify out/lunar-sampler/problem.closed.toml
 
-Writes loop.json, problem.closed.toml (the problem with the effects that were found declared, a valid input again)
-and report.md.")]
+Writes loop.json, problem.closed.toml (the problem with the effects that were found declared, a valid input again),
+report.md and report.html, with its figures in figures/.")]
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
 }
 
-/// Closes the loop, writes `loop.json`, `problem.closed.toml` and `report.md`, and prints the story.
+/// Closes the loop, writes `loop.json`, `problem.closed.toml` and both reports, and prints the story.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
@@ -46,13 +46,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
         ("report.md", &report::loop_markdown(&problem, &closure)),
     ];
+    let shown = picture::of_closure(&problem, &measurements, &split, &closure)?;
+    let page = report::closure_page(&problem, &closure, &shown);
     output::write_all(&folder, &results)?;
+    output::write_page(&folder, &page)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::loop_text(&problem, &closure))?;
         let names = results.map(|(name, _)| name).join(", ");
-        output::print(&format!("\nWritten to {}: {names}\n", folder.display()))?;
+        output::print(&format!("\nWritten to {}: {names}, report.html\n", folder.display()))?;
     }
     if closure.after.is_trusted() {
         return Ok(Outcome::Done);

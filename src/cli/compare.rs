@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::{report, study};
+use flexcal::{picture, report, study};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -19,7 +19,7 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Compares, writes `compare.json`, and prints the tables.
+/// Compares, writes `compare.json` and `report.html`, and prints the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
@@ -31,7 +31,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
-    let path = output::write(&common.folder(&problem), "compare.json", &json)?;
+    let folder = common.folder(&problem);
+    let path = output::write(&folder, "compare.json", &json)?;
+    let shown = picture::of_comparison(&problem, &measurements, &split, &comparison)?;
+    output::write_page(&folder, &report::comparison_page(&problem, &comparison, &shown))?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use clap::{Args, ValueEnum};
-use flexcal::report;
 use flexcal::study::{self, Options, SolverChoice, Strategy};
+use flexcal::{picture, report};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -79,7 +79,7 @@ impl From<SolverArgument> for SolverChoice {
     }
 }
 
-/// Identifies, writes `estimate.json`, and prints the table.
+/// Identifies, writes `estimate.json` and `report.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
@@ -96,7 +96,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
-    let path = output::write(&common.folder(&problem), "estimate.json", &json)?;
+    let folder = common.folder(&problem);
+    let path = output::write(&folder, "estimate.json", &json)?;
+    let shown = picture::of_identification(&problem, &measurements, &split, &identification)?;
+    output::write_page(&folder, &report::identification_page(&problem, &identification, &shown))?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

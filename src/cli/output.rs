@@ -4,6 +4,8 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use flexcal::report::Page;
+
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {source}", path.display())]
@@ -38,6 +40,15 @@ pub fn write_all(path: &Path, texts: &[(&str, &str)]) -> Result<(), WriteError> 
     for (file, path) in files {
         file.persist(&path).map_err(|error| WriteError { path, source: error.error })?;
     }
+    Ok(())
+}
+
+/// Writes a page as `report.html` in `folder`, and its figures in `figures` beside it.
+pub fn write_page(folder: &Path, page: &Page) -> Result<(), WriteError> {
+    for (name, figure) in &page.figures {
+        write(&folder.join("figures"), name, figure)?;
+    }
+    write(folder, "report.html", &page.html)?;
     Ok(())
 }
 

@@ -51,7 +51,7 @@ pub(super) fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
 }
 
 /// How well a parameter is identified, in a word and a share.
-fn verdict(estimate: &Estimate) -> String {
+pub(super) fn verdict(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match (estimate.at_bound, estimate.fitted) {
         (Some(AtBound::Lower), _) => "at its lower bound".to_owned(),
@@ -91,12 +91,12 @@ pub(super) fn blind_text(found: &Identifiability, unknowns: &[String]) -> String
         unknowns.len()
     );
     for combination in blind {
-        let _ = writeln!(text, "  {}", words(combination, unknowns));
+        let _ = writeln!(text, "  {}", blind_words(combination, unknowns));
     }
     text
 }
 
-fn words(combination: &BlindCombination, unknowns: &[String]) -> String {
+pub(super) fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
     let name = |k: usize| unknowns[k].as_str();
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));

@@ -1,0 +1,29 @@
+//! Closes the loop on a problem and writes its report: `cargo run --example loop_report -- PROBLEM FOLDER [FILE…]`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use flexcal::diagnosis::close;
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::study::Options;
+use flexcal::{picture, report};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let [problem, folder, files @ ..] = &arguments[..] else { return Err("PROBLEM FOLDER [FILE…]".into()) };
+    let (problem, folder) = (Problem::read(Path::new(problem))?, Path::new(folder));
+    let files: Vec<PathBuf> = files.iter().map(PathBuf::from).collect();
+    let files = if files.is_empty() { &problem.data.files } else { &files };
+    let (measurements, _) = Measurements::read(files, &problem)?;
+    let split = Split::new(&problem, &measurements)?;
+    let closure = close(&problem, &measurements, &split, &Options::default())?;
+    let shown = picture::of_closure(&problem, &measurements, &split, &closure)?;
+    let page = report::closure_page(&problem, &closure, &shown);
+    fs::create_dir_all(folder.join("figures"))?;
+    for (name, figure) in &page.figures {
+        fs::write(folder.join("figures").join(name), figure)?;
+    }
+    Ok(fs::write(folder.join("report.html"), page.html)?)
+}

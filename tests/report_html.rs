@@ -1,0 +1,139 @@
+//! The report for people: whole, self-contained, the same every time, and with everything in it that was found.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod common;
+
+use common::arms::{measured, path};
+use common::made::part;
+use flexcal::diagnosis::close;
+use flexcal::measurement::{Measurements, Split};
+use flexcal::picture;
+use flexcal::problem::Problem;
+use flexcal::report::{self, Page};
+use flexcal::study::{ErrorSummary, Options, identify};
+use nalgebra::Vector3;
+
+/// Elements without an end.
+const VOID: [&str; 3] = ["meta", "link", "!DOCTYPE"];
+
+fn case(file: &str) -> (Problem, Measurements, Split) {
+    let problem = Problem::read(&path("tests/cases")).unwrap();
+    let measurements = measured(&problem, &[file]);
+    let split = Split::new(&problem, &measurements).unwrap();
+    (problem, measurements, split)
+}
+
+/// The first element that is not closed in its turn.
+fn badly_nested(text: &str) -> Option<String> {
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = text;
+    while let Some((_, after)) = rest.split_once('<') {
+        let (tag, next) = after.split_once('>')?;
+        rest = next;
+        let name = tag.trim_start_matches('/').split([' ', '\n', '/']).next().unwrap_or_default();
+        if tag.starts_with('/') {
+            if open.pop() != Some(name) {
+                return Some(tag.to_owned());
+            }
+        } else if !tag.ends_with('/') && !VOID.contains(&name) {
+            open.push(name);
+            if name == "style" {
+                rest = &rest[rest.find("</style>")?..];
+            }
+        }
+    }
+    open.pop().map(str::to_owned)
+}
+
+/// What every page and figure must be.
+fn check(page: &Page) {
+    assert_eq!(badly_nested(&page.html), None);
+    let namespace = "http://www.w3.org/2000/svg";
+    for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())]) {
+        let outside = text.replace(namespace, "");
+        for reference in ["http:", "https:", "//", "<script", "@import", "url(", "NaN", "inf\""] {
+            assert!(!outside.contains(reference), "{name} has {reference}");
+        }
+    }
+    assert!(page.figures.len() >= 5);
+    for (name, figure) in &page.figures {
+        assert_eq!(badly_nested(figure), None, "{name}");
+        assert!(figure.starts_with("<svg ") && figure.contains("aria-label=\""), "{name}");
+        // Labels carry their units; places on a map of residuals and states are words.
+        let labelled =
+            figure.matches('[').count() - figure.matches("[fill=").count() - figure.matches("[stroke=").count();
+        assert!(labelled >= 1, "{name} has no axis with a unit");
+    }
+    assert_eq!(page.html.matches("<figure ").count(), page.figures.len());
+    assert_eq!(page.html.matches("<figcaption>").count(), page.figures.len());
+}
+
+#[test]
+fn a_closed_loop_shows_what_it_found() {
+    let (problem, mut measurements, split) = case("tests/cases/a-none.csv");
+    for row in 0..measurements.len() {
+        let hours = measurements.time[row] / 3600.0;
+        measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
+    }
+    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let shown = picture::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    let page = report::closure_page(&problem, &closure, &shown);
+    check(&page);
+    assert!(closure.effects.iter().any(|found| flexcal::effect::name(&found.effect) == "tracker-drift"));
+    assert_eq!(shown.causes.len(), closure.effects.len());
+    for found in &closure.effects {
+        assert!(page.html.contains(flexcal::effect::name(&found.effect)));
+        for estimate in &found.estimates {
+            assert!(page.html.contains(&estimate.name), "{}", estimate.name);
+        }
+    }
+    // Each pose's own measurement of the drift lies about the fitted line.
+    let cause = &shown.causes[0];
+    let (first, last) = (cause.curve[0], cause.curve[cause.curve.len() - 1]);
+    let slope = (last.1 - first.1) / (last.0 - first.0);
+    assert!((slope * 3600.0 / 0.707e-3 - 1.0).abs() < 0.25, "{slope}");
+    let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
+    assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
+    let again = report::closure_page(&problem, &closure, &shown);
+    assert_eq!(page, again);
+    let other = picture::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    assert_eq!(report::closure_page(&problem, &closure, &other).html, page.html);
+}
+
+#[test]
+fn the_picture_holds_the_errors_that_the_tables_sum_up() {
+    let (problem, measurements, split) = case("tests/cases/a-none.csv");
+    let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
+    let shown = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let close = |errors: &[Vector3<f64>], summary: &ErrorSummary| {
+        let ratio = ErrorSummary::of(errors).rms.norm / summary.rms.norm;
+        assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+    };
+    close(&shown.states[0].errors, &found.registered.held_out);
+    close(&shown.states[shown.states.len() - 1].errors, &found.fitted.held_out);
+    let fitted: Vec<Vector3<f64>> = shown.residuals.iter().filter(|r| !r.held_out).map(|r| r.error).collect();
+    close(&fitted, &found.fitted.identification);
+    // Strong correlations are those of the estimate.
+    let name = |name: &String| shown.correlations.names.iter().position(|own| own == name).unwrap();
+    for (a, b, rho) in &found.correlations {
+        let shown = shown.correlations.matrix[(name(a), name(b))];
+        assert!((shown - rho).abs() < 0.02, "{a} {b}: {shown} {rho}");
+    }
+    let page = report::identification_page(&problem, &found, &shown);
+    check(&page);
+    assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
+}
+
+#[test]
+fn thousands_of_poses_make_no_large_page() {
+    let (problem, few, split) = case("tests/cases/h-none-large.csv");
+    let found = identify(&problem, &few, &split, &Options::default()).unwrap();
+    let many = part(&few, (0..6600).map(|k| k % few.len()));
+    let split = Split::new(&problem, &many).unwrap();
+    let shown = picture::of_identification(&problem, &many, &split, &found).unwrap();
+    let page = report::identification_page(&problem, &found, &shown);
+    check(&page);
+    assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
+    assert!(page.html.contains("is drawn."), "what is left out is said");
+}
