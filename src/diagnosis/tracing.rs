@@ -108,8 +108,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let own = &scan.effects[tried.index];
         let pair = alike.first().zip(there.as_ref());
-        let apart =
-            pair.and_then(|((other, _), there)| apart(fitted, &library, there, &poses, (own, other)));
+        let apart = pair.and_then(|((other, _), there)| apart(fitted, &library, there, &poses, (own, other)));
         Ranked {
             effect: scan.effects[tried.index].clone(),
             p_value: tried.corrected,
