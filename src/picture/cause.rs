@@ -121,7 +121,9 @@ pub(super) fn of(found: &Effect, problem: &Problem, arm: &Arm, sight: &Sight) ->
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
     let mut without = arm.clone();
-    places.iter().for_each(|&k| without.x[k] = 0.0);
+    for &k in &places {
+        without.x[k] = 0.0;
+    }
     let all: Vec<usize> = (0..sight.measurements.len()).collect();
     let (left, with) = (sight.errors(arm, &all), sight.errors(&without, &all));
     let poses = sight.placement.poses(sight.measurements, &all, 1.0);

@@ -76,7 +76,7 @@ fn unexplained(left: &Unexplained) -> Markup {
                     "An empirical correction takes the error of poses left out in turn from "
                     (number(correction.cross_validated.0 * 1e3, 3)) " to " (number(correction.cross_validated.1 * 1e3, 3))
                     " mm rms"
-                    @if correction.beyond > 0 { "; " (correction.beyond) " held-out poses lie beyond its range and stay as they are" }
+                    @if correction.beyond > 0 { "; held-out poses beyond its range stay as they are: " (correction.beyond) }
                     "."
                 }
                 None => "No empirical correction predicts poses that were left out."

@@ -115,14 +115,17 @@ pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
     };
     let corrected = closure.unexplained.as_ref().and_then(|left| left.correction.as_ref());
     let (best, with) = match corrected {
-        Some(correction) => (correction.held_out, "and with the effects and the empirical correction"),
+        Some(correction) => (correction.held_out, "and after the loop, empirical correction included"),
         None => (last, "and after the loop"),
     };
     html! {
         (change(first.mean.norm, best.mean.norm, &format!("{} held-out poses, before {with}", last.n)))
         p {
             @if corrected.is_some() { "Without the correction " (mm(last.mean.norm)) " mm. " }
-            (if corrected.is_some() { "Gain of the effects alone " } else { "Gain " }) b { (shown(gain.value)) " mm" } ", 95 % interval " (shown(gain.low)) " to " (shown(gain.high)) " mm. "
+            @if !closure.effects.is_empty() {
+                "Gain of the effects " b { (shown(gain.value)) " mm" } ", 95 % interval " (shown(gain.low)) " to "
+                (shown(gain.high)) " mm. "
+            }
             "Before: the declared model as identified; the nominal arm had " (mm(fit.registered.held_out.mean.norm)) " mm. "
             (meaning)
         }

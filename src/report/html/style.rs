@@ -69,6 +69,7 @@ li.skip{color:var(--muted)}
 .columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:8px 40px}
 .found{margin:0 0 18px}
 .found p{margin:3px 0}
+.found td.l{white-space:normal;overflow-wrap:anywhere}
 code{font:13px ui-monospace,SFMono-Regular,Menlo,Consolas,monospace}
 footer{margin-top:56px;padding-top:14px;border-top:1px solid var(--grid);font-size:13px;color:var(--muted)}
 @media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:64px}td,th{padding:3px 6px}th{white-space:normal}.o{display:none}.scroll{overflow-x:auto}}

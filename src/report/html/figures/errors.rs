@@ -1,5 +1,6 @@
 //! Error of each held-out pose along each axis, state by state.
 
+use nalgebra::Vector3;
 use plotters::prelude::*;
 
 use super::frame::{
@@ -42,7 +43,7 @@ pub fn errors(picture: &Picture) -> Figure {
     let step = every(picture.held_out.len(), MOST);
     let size = (WIDTH, 24 + 4 * PANEL + 34);
     let mut norms: Vec<f64> =
-        states.last().map_or_else(Vec::new, |state| state.errors.iter().map(|e| e.norm()).collect());
+        states.last().map_or_else(Vec::new, |state| state.errors.iter().map(Vector3::norm).collect());
     norms.sort_by(f64::total_cmp);
     let typical = norms.get(norms.len() / 2).copied().unwrap_or(1e-3).max(1e-9);
     let floor = (FLOOR * typical * 1e3).log10();
@@ -87,7 +88,7 @@ fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[State], (axis, step): (usize
     let mut chart = chart(panel, x, y)?;
     for (place, state) in states.iter().enumerate() {
         let colour = colour(place, states.len());
-        let value = |error: &nalgebra::Vector3<f64>| if axis == 3 { error.norm() } else { error[axis].abs() };
+        let value = |error: &Vector3<f64>| if axis == 3 { error.norm() } else { error[axis].abs() };
         let points: Vec<(f64, f64)> = (0..state.errors.len())
             .step_by(step)
             .map(|k| (k as f64 + 1.0, (value(&state.errors[k]) * 1e3).log10().clamp(y.range.0, y.range.1)))

@@ -196,9 +196,9 @@ pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     colour.stroke_width(width)
 }
 
-/// The radius of a dot as drawn.
+/// A length as drawn, to the nearest pixel.
 pub fn radius(shown: f64) -> i32 {
-    #[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
+    #[expect(clippy::cast_possible_truncation, reason = "no longer than the paper")]
     let drawn = (shown * f64::from(SCALE)).round() as i32;
     drawn
 }

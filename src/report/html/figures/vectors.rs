@@ -41,7 +41,7 @@ pub fn vectors(picture: &Picture) -> Figure {
     let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
     let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
         legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
-        let length = px(i32::try_from((LONG * width).round() as i64).unwrap_or_default());
+        let length = radius(LONG * width);
         let end = px(WIDTH - 12);
         area.draw(&PathElement::new(vec![(end - length, px(10)), (end, px(10))], line(INK, 1.6)))?;
         write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
@@ -76,6 +76,7 @@ fn rounded(value: f64) -> f64 {
 
 /// Two digits that count, without an exponent.
 fn short(value: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, reason = "a power of ten")]
     let digits = 1 - value.abs().max(1e-12).log10().floor() as i32;
     if digits < 0 {
         let power = 10.0_f64.powi(-digits);
