@@ -81,16 +81,13 @@ fn is_summary(value: &Value, poses: u64) {
 
 /// Fits from different starts end within the solver's tolerance of each other, far below any noise.
 fn are_alike(one: &Value, other: &Value) {
-    match (one, other) {
-        (Value::Object(one), Value::Object(other)) => {
-            assert!(one.keys().eq(other.keys()), "{one:?} {other:?}");
-            one.iter().for_each(|(key, value)| are_alike(value, &other[key]));
-        }
-        _ => {
-            let (one, other) = (one.as_f64().unwrap(), other.as_f64().unwrap());
-            assert!((one - other).abs() < 1e-6, "{one} {other}");
-        }
+    if let (Value::Object(one), Value::Object(other)) = (one, other) {
+        assert!(one.keys().eq(other.keys()), "{one:?} {other:?}");
+        one.iter().for_each(|(key, value)| are_alike(value, &other[key]));
+        return;
     }
+    let (one, other) = (one.as_f64().unwrap(), other.as_f64().unwrap());
+    assert!((one - other).abs() < 1e-6, "{one} {other}");
 }
 
 fn held_out_rms(value: &Value) -> f64 {

@@ -187,7 +187,7 @@ const UNSEEN: f64 = 1e-12;
 impl Normal {
     /// Of columns, shape = (3 N, n), with priors on the first of them, and the gradient g.
     pub fn new(columns: &DMatrix<f64>, priors: &[Option<f64>], gradient: &DVector<f64>) -> Self {
-        let mut matrix = columns.tr_mul(columns);
+        let mut matrix = columns.transpose() * columns;
         for (j, sigma) in priors.iter().enumerate() {
             if let Some(sigma) = sigma {
                 matrix[(j, j)] += sigma.powi(-2);

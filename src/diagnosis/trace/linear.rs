@@ -20,6 +20,16 @@ pub(crate) struct Linear {
     basis: DMatrix<f64>,
     /// Rows that are data.
     rows: usize,
+    /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
+    sums: Sums,
+}
+
+/// What is asked for again and again.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    squares: f64,
+    data_squares: f64,
+    data_freedom: f64,
 }
 
 /// What the residual says about columns that were not fitted.
@@ -64,9 +74,12 @@ impl Linear {
         if let Some(basis) = orthonormal(&all) {
             let along = basis.tr_mul(&long);
             let residual = long - &basis * along;
-            return Self { residual, basis, rows };
+            let mut linear = Self { residual, basis, rows, sums: Sums::default() };
+            linear.sum(0);
+            return linear;
         }
-        let mut linear = Self { residual: long, basis: DMatrix::zeros(all.nrows(), 0), rows };
+        let basis = DMatrix::zeros(all.nrows(), 0);
+        let mut linear = Self { residual: long, basis, rows, sums: Sums::default() };
         linear.fit(&all);
         linear
     }
@@ -88,24 +101,25 @@ impl Linear {
 
     /// Sum of squares, priors included.
     pub fn squares(&self) -> f64 {
-        self.residual.norm_squared()
+        self.sums.squares
     }
 
-    /// Sum of squares of the data alone.
-    pub fn data_squares(&self) -> f64 {
-        self.residual.rows(0, self.rows).norm_squared()
-    }
-
-    /// Degrees of freedom of the data: 3 N − tr H.
-    pub fn data_freedom(&self) -> f64 {
-        self.rows as f64 - self.basis.rows(0, self.rows).norm_squared()
+    /// Sums anew once the columns from `first` on have been fitted.
+    fn sum(&mut self, first: usize) {
+        let before = if first == 0 { self.rows as f64 } else { self.sums.data_freedom };
+        let taken = self.basis.view((0, first), (self.rows, self.basis.ncols() - first)).norm_squared();
+        self.sums = Sums {
+            squares: self.residual.norm_squared(),
+            data_squares: self.residual.rows(0, self.rows).norm_squared(),
+            data_freedom: before - taken,
+        };
     }
 
     /// Degrees of freedom of the whole sum of squares at the scatter of the data.
     ///
     /// With true priors it has 3 N, with priors far wider than the deviations 3 N − tr H: the data's scatter decides.
     pub fn freedom(&self) -> f64 {
-        self.data_freedom() * self.squares() / self.data_squares().max(f64::MIN_POSITIVE)
+        self.sums.data_freedom * self.sums.squares / self.sums.data_squares.max(f64::MIN_POSITIVE)
     }
 
     /// Fits further directions, shape = (3 N + priors, k), and takes them off the residual.
@@ -135,6 +149,7 @@ impl Linear {
         let added = self.basis.columns_range(first..).into_owned();
         let along = added.tr_mul(&self.residual);
         self.residual -= &added * along;
+        self.sum(first);
         added
     }
 
@@ -194,7 +209,7 @@ impl Linear {
         let left_out = |number: usize| {
             let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
             let (basis, residual) = (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
-            let inner = DMatrix::identity(n, n) - basis.tr_mul(&basis);
+            let inner = DMatrix::identity(n, n) - basis.transpose() * &basis;
             let left_out = &residual + &basis * inner.cholesky()?.solve(&basis.tr_mul(&residual));
             Some(left_out.norm_squared())
         };
@@ -259,7 +274,7 @@ fn orthonormal(columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         column /= length;
     }
     for _ in 0..2 {
-        let factor = basis.tr_mul(&basis).cholesky()?.l();
+        let factor = (basis.transpose() * &basis).cholesky()?.l();
         if factor.diagonal().min() < CLOSE_TO_DEPENDENT {
             return None;
         }
