@@ -29,7 +29,7 @@ pub fn correlation(correlations: &Correlations) -> Option<Figure> {
     let count = i32::try_from(shown.len()).unwrap_or(1);
     let cell = ((WIDTH - NAMES - 4) / count).clamp(9, 26);
     let height = 8 + cell * count + 40;
-    let letters = f64::from(cell).min(TEXT);
+    let letters = (0.85 * f64::from(cell)).min(TEXT);
     let svg = figure((WIDTH, height), "Correlations of the parameters", |area| {
         for (row, &i) in (0..).zip(&shown) {
             let top = 8 + cell * row;

@@ -15,6 +15,8 @@ pub const SCALE: i32 = 4;
 pub const WIDTH: i32 = 480;
 /// Text as shown.
 pub const TEXT: f64 = 11.5;
+/// Room on the left for what the backend sets too far out.
+const MARGIN: i32 = 6;
 /// Room for what stands left of an axis and below it.
 pub const LEFT: i32 = 62;
 pub const BELOW: i32 = 40;
@@ -241,8 +243,12 @@ pub fn figure(size: (i32, i32), label: &str, paint: impl FnOnce(&Area) -> Result
         .fold(body.to_owned(), |body, default| body.replace(default, ""));
     let label = label.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"{label}\" font-family=\"system-ui, sans-serif\">{body}",
-        drawn.0, drawn.1, size.0, size.1
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{} 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"{label}\" font-family=\"system-ui, sans-serif\">{body}",
+        -px(MARGIN),
+        px(size.0 + MARGIN),
+        drawn.1,
+        size.0 + MARGIN,
+        size.1
     )
 }
 

@@ -10,7 +10,7 @@ use crate::study::{Comparison, Errors};
 
 const ROW: i32 = 22;
 /// Room for names.
-const NAMES: i32 = 186;
+const NAMES: i32 = 214;
 /// Room for numbers.
 const NUMBERS: i32 = 66;
 const TOP: i32 = 26;
