@@ -17,7 +17,7 @@ pub(super) const FAMILY: Family = Family {
             let slot = coordinate(problem, *joint);
             let pair = |&order: &u32| {
                 [("sin", Driver::Sine(joint - 1, order)), ("cos", Driver::Cosine(joint - 1, order))]
-                    .map(|(wave, driver)| Term::driven(&format!("{wave}{order}"), slot, driver, 5e-3))
+                    .map(|(wave, driver)| Term::driven(&format!("{wave}{order}"), slot, driver, 1e-3))
             };
             orders.iter().flat_map(pair).collect()
         }
