@@ -92,7 +92,7 @@ fn angles_and_lengths_take_priors_and_bounds() {
     let sliding = find(&parameters, "backlash[4].width").unwrap();
     assert_eq!((sliding.sigma, sliding.upper), (None, 2e-3));
     assert_eq!(find(&parameters, "station-shift[90].y").unwrap().sigma, Some(3e-3));
-    assert_eq!(find(&parameters, "joint-harmonic[3].cos4").unwrap().sigma, Some(5e-3));
+    assert_eq!(find(&parameters, "joint-harmonic[3].cos4").unwrap().sigma, Some(1e-3));
     assert!((find(&parameters, "joint-harmonic[3].sin4").unwrap().sigma.unwrap() - 0.2_f64.to_radians()).abs() < 1e-15);
 }
 
