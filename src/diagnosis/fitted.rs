@@ -132,12 +132,39 @@ impl Fitted {
     ///
     /// xᵀ ([N⁻¹])⁻¹ x over those parameters, with N = JᵀJ + Λ and what neither data nor priors see left out.
     pub fn loss_without(&self, normal: &Normal, parameters: &[usize]) -> Option<f64> {
-        let places: Vec<usize> =
-            parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
+        let places = self.places_of(parameters);
         let at = |&j: &usize| self.found.x[self.unknowns[j]] + normal.step[j];
         let x = DVector::from_iterator(places.len(), places.iter().map(at));
         let covariance = DMatrix::from_fn(places.len(), places.len(), |i, j| normal.inverse[(places[i], places[j])]);
         Some((x.transpose() * covariance.try_inverse()? * &x)[(0, 0)])
+    }
+
+    /// What an effect alone gives the fit: orthonormal directions, shape = (3 N + priors, k), and the part of the residual that
+    /// they take off, in the linear neighbourhood.
+    ///
+    /// The effect's columns with all others projected out are [J; Λ^½] N⁻¹ₑ ([N⁻¹]ₑₑ)⁻¹.
+    pub fn given_by(&self, library: &Library, (normal, generics): (&Normal, &[Generic]), effect: &Effect) -> Given {
+        let places: Vec<usize> = self.places_of(&self.parameters_of(effect));
+        let x = DVector::from_iterator(
+            places.len(),
+            places.iter().map(|&j| self.found.x[self.unknowns[j]] + normal.step[j]),
+        );
+        let own = normal.inverse.select_columns(&places);
+        let priors: Vec<(usize, f64)> =
+            normal.priors.iter().enumerate().filter_map(|(j, sigma)| Some((j, (*sigma)?))).collect();
+        let data = with_generics(library, generics) * &own;
+        let mut columns = DMatrix::zeros(data.nrows() + priors.len(), places.len());
+        columns.rows_mut(0, data.nrows()).copy_from(&data);
+        for (row, (j, sigma)) in priors.into_iter().enumerate() {
+            columns.set_row(data.nrows() + row, &(own.row(j) / sigma));
+        }
+        let Some(inverse) = own.select_rows(&places).try_inverse() else {
+            return Given { directions: columns.resize_horizontally(0, 0.0), part: DVector::zeros(0) };
+        };
+        let change = -(&columns * (inverse * x));
+        let directions = columns.qr().q();
+        let part = directions.tr_mul(&change);
+        Given { directions, part }
     }
 
     /// N = JᵀJ + Λ of the fit, with `generics` put in, and the step to where they belong.
@@ -151,14 +178,17 @@ impl Fitted {
                 pull[j] += self.found.x[k] / (sigma * sigma);
             }
         }
-        Normal::new(&columns, &priors, &pull)
+        Normal::new(&columns, priors, &pull)
     }
 
     /// Columns of some of the model's parameters, shape = (3 N, k).
     pub fn columns(&self, library: &Library, parameters: &[usize]) -> DMatrix<f64> {
-        let places: Vec<usize> =
-            parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect();
-        library.fitted().select_columns(&places)
+        library.fitted().select_columns(&self.places_of(parameters))
+    }
+
+    /// Places of some of the model's parameters among the unknowns.
+    fn places_of(&self, parameters: &[usize]) -> Vec<usize> {
+        parameters.iter().filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k)).collect()
     }
 }
 
@@ -174,9 +204,19 @@ pub(super) fn with_generics(library: &Library, generics: &[Generic]) -> DMatrix<
     columns
 }
 
+/// What an effect alone gives a fit.
+pub(super) struct Given {
+    /// Orthonormal, shape = (3 N + priors, k).
+    pub directions: DMatrix<f64>,
+    /// Part of the residual along them that the effect takes off.
+    pub part: DVector<f64>,
+}
+
 /// The inverse of a normal matrix; 0 in directions that neither data nor priors see.
 pub(super) struct Normal {
     pub inverse: DMatrix<f64>,
+    /// σ of the priors of the first columns.
+    priors: Vec<Option<f64>>,
     /// − N⁻¹ g: from where the derivatives were taken to the optimum of what they describe.
     pub step: DVector<f64>,
 }
@@ -186,7 +226,7 @@ const UNSEEN: f64 = 1e-12;
 
 impl Normal {
     /// Of columns, shape = (3 N, n), with priors on the first of them, and the gradient g.
-    pub fn new(columns: &DMatrix<f64>, priors: &[Option<f64>], gradient: &DVector<f64>) -> Self {
+    pub fn new(columns: &DMatrix<f64>, priors: Vec<Option<f64>>, gradient: &DVector<f64>) -> Self {
         let mut matrix = columns.transpose() * columns;
         for (j, sigma) in priors.iter().enumerate() {
             if let Some(sigma) = sigma {
@@ -196,13 +236,13 @@ impl Normal {
         let scale: Vec<f64> = matrix.diagonal().iter().map(|d| if *d > 0.0 { d.sqrt() } else { 1.0 }).collect();
         let n = matrix.nrows();
         if n == 0 {
-            return Self { inverse: matrix, step: DVector::zeros(0) };
+            return Self { inverse: matrix, priors, step: DVector::zeros(0) };
         }
         let eigen = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
         let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
         let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
         let inverse = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j]));
         let step = -(&inverse * gradient);
-        Self { inverse, step }
+        Self { inverse, priors, step }
     }
 }

@@ -113,7 +113,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             effect: scan.effects[tried.index].clone(),
             p_value: tried.corrected,
             f: (tried.gain.f, tried.gain.freedom),
-            gain: rms(scan.linear.squares()) - rms(scan.linear.squares() - tried.gain.squares),
+            gain: rms(scan.linear.sums().squares) - rms(scan.linear.sums().squares - tried.gain.squares),
             cross_validated,
             alike,
             apart,

@@ -77,9 +77,9 @@ pub(super) fn best(
     }
     let score = |generic: &Generic| linear.score(&generic.columns(library));
     let tried = |generic: Generic| {
-        let gain = linear.gain(&score(&generic))?;
+        let gain = linear.sums().gain(&score(&generic))?;
         let (squares, freedom) = (gain.squares, gain.freedom + generic.fitted);
-        let gain = linear.gain_of(squares, freedom)?;
+        let gain = linear.sums().gain_of(squares, freedom)?;
         let count = 2.0 * (places.len() * generic.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
         Some(Tried { generic, gain, criterion, corrected })
@@ -96,7 +96,7 @@ pub(super) fn best(
     all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
     let shapes: Vec<Generic> =
         all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
-    let squares = |generic: &Generic| linear.gain(&score(generic)).map_or(0.0, |gain| gain.squares);
+    let squares = |generic: &Generic| linear.sums().gain(&score(generic)).map_or(0.0, |gain| gain.squares);
     all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
     all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
@@ -131,7 +131,7 @@ pub(super) fn withdraw(
             added.iter().cloned().partition(|effect| function_of(effect) == Some((joint, from)));
         let parameters: Vec<usize> = own.iter().flat_map(|effect| fitted.parameters_of(effect)).collect();
         let linear = fitted.linear(&library, &parameters, &[]);
-        let explained = linear.gain(&linear.score(&fitted.columns(&library, &parameters)));
+        let explained = linear.sums().gain(&linear.score(&fitted.columns(&library, &parameters)));
         let explained = explained.map_or(0.0, |gain| gain.criterion + own.iter().map(search).sum::<f64>());
         let here = |generic: &Generic| {
             let coordinate = matches!(generic.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }

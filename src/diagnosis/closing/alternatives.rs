@@ -1,17 +1,14 @@
 //! Candidates that the data cannot tell from an effect that was added.
 
 use super::super::candidates::covers;
-use super::super::data::Data;
-use super::super::fitted::Fitted;
+use super::super::fitted::{Fitted, Given, Normal};
 use super::super::generic::Generic;
-use super::super::trace::{Scan, tries};
+use super::super::trace::{Library, Scan, tries};
 use super::super::tracing::named_place;
 use crate::problem::Effect;
 
 /// Candidates whose criterion is this close to that of an effect in its place are not told from it: odds of 20 to 1.
 const UNTOLD: f64 = 6.0;
-/// Poses that are enough to tell.
-const ENOUGH: usize = 1000;
 
 /// The effects that may stand in the place of an added one.
 pub(super) struct Alternatives {
@@ -21,35 +18,46 @@ pub(super) struct Alternatives {
     pub better: bool,
 }
 
-/// What may stand in the place of `effect`, all other effects kept.
-pub(super) fn alternatives(
-    fitted: &Fitted,
-    data: &Data,
-    effect: &Effect,
-    candidates: &[Effect],
-    generics: &[Generic],
-) -> Alternatives {
-    let library = fitted.library_of(data, &data.thinned(ENOUGH), candidates, generics);
-    let parameters = fitted.parameters_of(effect);
-    let linear = fitted.linear(&library, &parameters, generics);
-    let others: Vec<Effect> = candidates.iter().filter(|other| !covers(effect, other)).cloned().collect();
-    let everything: Vec<Effect> = others.iter().chain([effect]).cloned().collect();
-    let (all_tries, families) = tries(&everything);
-    let own_tries = all_tries.last().copied().unwrap_or(1.0) * families as f64;
-    let own = linear.gain(&linear.score(&fitted.columns(&library, &parameters)));
-    let own = own.map_or(0.0, |gain| gain.criterion + 2.0 * own_tries.ln());
-    let scan = Scan::new(&library, linear, others);
-    let ranking = scan.ranking();
-    let mut effects: Vec<Effect> = Vec::new();
-    for tried in ranking.iter().take_while(|tried| tried.criterion < own + UNTOLD) {
-        let candidate = &scan.effects[tried.index];
-        let known = |other: &Effect| named_place(other) == named_place(candidate);
-        // Other times of the same shift are the same effect; other orders of a harmonic are not.
-        let is_own = matches!(effect, Effect::StationShift { .. }) && known(effect);
-        if !effects.iter().any(known) && !is_own {
-            effects.push(candidate.clone());
-        }
+/// What may stand in the place of each added effect, all others kept, in the linear neighbourhood of a fit.
+pub(super) struct Replacements<'f, 'a> {
+    fitted: &'f Fitted,
+    library: &'f Library<'a>,
+    generics: &'f [Generic],
+    normal: Normal,
+    scan: Scan<'a, 'f>,
+}
+
+impl<'f, 'a> Replacements<'f, 'a> {
+    /// Tries `candidates`, whose places `library` holds, in a fit with `generics` put in.
+    pub fn new(fitted: &'f Fitted, library: &'f Library<'a>, candidates: &[Effect], generics: &'f [Generic]) -> Self {
+        let linear = fitted.linear(library, &[], generics);
+        let normal = fitted.normal(library, generics);
+        Self { fitted, library, generics, normal, scan: Scan::new(library, linear, candidates.to_vec()) }
     }
-    let better = ranking.first().is_some_and(|tried| tried.criterion < own - UNTOLD);
-    Alternatives { effects, better }
+
+    /// Those of one effect.
+    pub fn of(&self, effect: &Effect) -> Alternatives {
+        let Given { directions, part } = self.fitted.given_by(self.library, (&self.normal, self.generics), effect);
+        let sums = self.scan.linear.sums_without(&directions, &part);
+        let everything: Vec<Effect> = self.scan.effects.iter().chain([effect]).cloned().collect();
+        let (all_tries, families) = tries(&everything);
+        let own_tries = all_tries.last().copied().unwrap_or(1.0) * families as f64;
+        let own = sums.gain_of(part.norm_squared(), part.len());
+        let own = own.map_or(0.0, |gain| gain.criterion + 2.0 * own_tries.ln());
+        let ranking = self.scan.ranking_without(&directions, &part);
+        let is_other = |index: usize| !covers(effect, &self.scan.effects[index]);
+        let mut effects: Vec<Effect> = Vec::new();
+        let ranking: Vec<_> = ranking.into_iter().filter(|tried| is_other(tried.index)).collect();
+        for tried in ranking.iter().take_while(|tried| tried.criterion < own + UNTOLD) {
+            let candidate = &self.scan.effects[tried.index];
+            let known = |other: &Effect| named_place(other) == named_place(candidate);
+            // Other times of the same shift are the same effect; other orders of a harmonic are not.
+            let is_own = matches!(effect, Effect::StationShift { .. }) && known(effect);
+            if !effects.iter().any(known) && !is_own {
+                effects.push(candidate.clone());
+            }
+        }
+        let better = ranking.first().is_some_and(|tried| tried.criterion < own - UNTOLD);
+        Alternatives { effects, better }
+    }
 }

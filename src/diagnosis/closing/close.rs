@@ -6,7 +6,7 @@ use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::tracing::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
-use super::alternatives::alternatives;
+use super::alternatives::Replacements;
 use super::interval::{self, Interval};
 use super::pick::LEVEL;
 use super::rounds::Rounds;
@@ -137,12 +137,15 @@ pub fn close(
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
 fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
     let added = rounds.added(fitted);
-    if added.len() < 2 || rounds.has_many_poses() {
+    if added.len() < 2 {
         return Ok(None);
     }
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let generics = rounds.generics.clone();
+    let library = fitted.library(rounds.data, &candidates, &generics);
+    let replacements = Replacements::new(fitted, &library, &candidates, &generics);
     for effect in &added {
-        let other = alternatives(fitted, rounds.data, effect, &candidates, &rounds.generics);
+        let other = replacements.of(effect);
         if let (true, Some(better)) = (other.better, other.effects.first()) {
             let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
             let next = rounds.fit(fitted, &kept)?;
@@ -159,6 +162,8 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
 /// Every added effect with what is known of it.
 fn found(rounds: &Rounds, fitted: &Fitted) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let library = fitted.library(rounds.data, &candidates, &rounds.generics);
+    let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
     let tested = rounds.tested(fitted);
     let first_with = |effect: &Effect| {
         let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known) || covers(known, effect));
@@ -167,7 +172,7 @@ fn found(rounds: &Rounds, fitted: &Fitted) -> Vec<Found> {
     let one = |effect: Effect| Found {
         p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
         estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
-        alternatives: alternatives(fitted, rounds.data, &effect, &candidates, &rounds.generics).effects,
+        alternatives: replacements.of(&effect).effects,
         held_out_after: first_with(&effect),
         effect,
     };

@@ -29,7 +29,7 @@ pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], a
 
 /// Probability that k directions without an effect take off so much of the sum of squares.
 fn chance(linear: &Linear, loss: f64, k: usize) -> f64 {
-    let freedom = linear.freedom();
-    let f = loss / k as f64 / (linear.squares() / freedom);
+    let freedom = linear.sums().freedom();
+    let f = loss / k as f64 / (linear.sums().squares / freedom);
     FisherSnedecor::new(k as f64, freedom).map_or(1.0, |chance| chance.sf(f)).max(f64::MIN_POSITIVE)
 }

@@ -142,7 +142,7 @@ impl Rounds<'_> {
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
         let rows = linear.rows() as f64;
-        rows * linear.squares().ln() + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
+        rows * linear.sums().squares.ln() + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
     }
 
     /// The same without the effects that have lost their significance.

@@ -3,7 +3,9 @@
 mod library;
 mod linear;
 mod scan;
+mod score;
 
 pub(super) use library::Library;
-pub(super) use linear::{Gain, Linear};
+pub(super) use linear::Linear;
 pub(super) use scan::{Scan, Tried, tries};
+pub(super) use score::Gain;

@@ -1,10 +1,11 @@
 //! Every candidate tried against what a fit leaves.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::library::Library;
-use super::linear::{Gain, Linear, Score};
+use super::linear::Linear;
+use super::score::{Gain, Score, Sums};
 use crate::effect;
 use crate::problem::Effect;
 
@@ -49,31 +50,45 @@ impl<'a, 'l> Scan<'a, 'l> {
 
     /// Candidates that the fit does not absorb and that are possible, best first.
     pub fn ranking(&self) -> Vec<Tried> {
+        self.ranked(&self.scores, self.linear.sums())
+    }
+
+    /// The ranking that there would be without some of the directions that were fitted: orthonormal,
+    /// shape = (3 N + priors, k), with the part of the residual that they took off.
+    pub fn ranking_without(&self, directions: &DMatrix<f64>, given: &DVector<f64>) -> Vec<Tried> {
+        let data = directions.rows(0, self.linear.rows()).into_owned();
+        let without =
+            |(effect, score): (&Effect, &Score)| score.give_back(&self.library.columns(effect).tr_mul(&data), given);
+        let scores: Vec<Score> = self.effects.par_iter().zip(&self.scores).map(without).collect();
+        self.ranked(&scores, self.linear.sums_without(directions, given))
+    }
+
+    fn ranked(&self, scores: &[Score], sums: Sums) -> Vec<Tried> {
         let tried = |(index, score): (usize, &Score)| {
-            let gain = self.linear.gain(score).filter(|_| self.is_possible(index, score))?;
+            let gain = sums.gain(score).filter(|_| self.is_possible(index, score, sums))?;
             let tries = self.tries[index] * self.families as f64;
             let (criterion, corrected) = (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
             Some(Tried { index, gain, criterion, corrected })
         };
-        let mut all: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
+        let mut all: Vec<Tried> = scores.iter().enumerate().filter_map(tried).collect();
         all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         all
     }
 
     /// Whether a candidate is no negative compliance or mass, beyond doubt.
-    fn is_possible(&self, index: usize, score: &Score) -> bool {
+    fn is_possible(&self, index: usize, score: &Score, sums: Sums) -> bool {
         let never_negative = &self.never_negative[index];
         if !never_negative.contains(&true) {
             return true;
         }
-        let scatter = (self.linear.squares() / self.linear.freedom()).sqrt();
+        let scatter = (sums.squares / sums.freedom()).sqrt();
         let fine = |((value, error), never): ((f64, f64), &bool)| !never || value > -IMPOSSIBLE * error * scatter;
         score.estimates().into_iter().zip(never_negative).all(fine)
     }
 
     /// Candidates that the fit absorbs, so that nothing is left to show them.
     pub fn absorbed(&self) -> Vec<&Effect> {
-        let gone = |(effect, score)| self.linear.gain(score).is_none().then_some(effect);
+        let gone = |(effect, score)| self.linear.sums().gain(score).is_none().then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
     }
 
