@@ -18,6 +18,6 @@ mod unexplained;
 
 pub use apart::Apart;
 pub use checks::{Check, Driver, Findings, Outcome, Remainder, Sequence, Test, Untestable, check};
-pub use closing::{Closure, Found, Interval, Step, Verdict, close};
+pub use closing::{Closure, Found, Interval, Step, Verdict, WAVES, close};
 pub use tracing::{Ranked, Trace, trace};
 pub use unexplained::{Correction, Unexplained};

@@ -38,9 +38,17 @@ pub(super) const FAMILY: Family = Family {
     },
     describe: |effect| match effect {
         Effect::JointHarmonic { joint, orders } => {
-            let list: Vec<String> = orders.iter().map(u32::to_string).collect();
-            format!("angle of joint {joint} errs {} × a turn", list.join(", "))
+            format!("angle of joint {joint} errs {} × a turn", listed(orders))
         }
         _ => String::new(),
     },
 };
+
+/// Ascending orders in words; three and more in a row as "1 to 5".
+fn listed(orders: &[u32]) -> String {
+    let runs = orders.chunk_by(|a, b| a + 1 == *b).flat_map(|run| match run {
+        [first, _, .., last] => vec![format!("{first} to {last}")],
+        few => few.iter().map(u32::to_string).collect(),
+    });
+    runs.collect::<Vec<String>>().join(", ")
+}

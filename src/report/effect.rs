@@ -9,6 +9,8 @@ use crate::study::Estimate;
 
 /// Decimals of a value at most.
 const MOST: usize = 6;
+/// Parameters of one effect that are listed one by one.
+const MOST_LISTED: usize = 8;
 /// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
 const LEAST_P: f64 = 1e-16;
 
@@ -48,9 +50,36 @@ pub(super) fn declaration(effect: &Effect) -> String {
     }
 }
 
-/// In words and as a problem declares it.
+/// In words and, unless that is long, as a problem declares it.
 pub(super) fn both(effect: &Effect) -> String {
-    format!("{}: `{}`", effect::describe(effect), declaration(effect))
+    match effect {
+        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => effect::describe(effect),
+        _ => format!("{}: `{}`", effect::describe(effect), declaration(effect)),
+    }
+}
+
+/// The parameters of an effect with their values; of many waves the largest, by their height.
+pub(super) fn values(estimates: &[Estimate]) -> Vec<(String, String)> {
+    if estimates.len() <= MOST_LISTED {
+        return estimates.iter().map(|estimate| (estimate.name.clone(), value(estimate))).collect();
+    }
+    let mut waves: Vec<(String, Estimate)> = estimates.chunks_exact(2).filter_map(wave).collect();
+    waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
+    let shown = waves.iter().take(MOST_LISTED / 2).map(|(name, height)| (name.clone(), value(height)));
+    let more = waves.len().saturating_sub(MOST_LISTED / 2);
+    shown.chain([(format!("{more} lower ones"), "in loop.json".to_owned())]).collect()
+}
+
+/// Height of a sine and a cosine of one order, with its standard error; the two taken as uncorrelated.
+fn wave(pair: &[Estimate]) -> Option<(String, Estimate)> {
+    let [sine, cosine] = pair else { return None };
+    let height = sine.estimate.hypot(cosine.estimate);
+    let error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
+        (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine) / height.max(f64::MIN_POSITIVE)
+    });
+    let order = sine.name.rsplit_once(".sin").map_or("", |(_, order)| order);
+    let height = Estimate { estimate: height, std_error: error, ..sine.clone() };
+    Some((format!("wave of order {order}"), height))
 }
 
 /// A parameter with its error in a unit for people: `4.12 ± 0.05 µrad/(m·K)`.

@@ -11,6 +11,7 @@ use super::interval::{self, Interval};
 use super::pick::LEVEL;
 use super::rounds::Rounds;
 pub use super::rounds::Step;
+use super::waves;
 use crate::measurement::{Measurements, Split};
 use crate::problem::{Effect, Problem};
 use crate::study::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
@@ -61,6 +62,8 @@ pub struct Closure {
     pub effects: Vec<Found>,
     /// What each round came to.
     pub steps: Vec<Step>,
+    /// 1 σ of the prior that the closed problem has for the waves of joints, where they are many [rad].
+    pub wave_sigma: Option<f64>,
     /// Structure that no effect explains.
     pub unexplained: Option<Unexplained>,
     /// Mean reduction of the error on held-out poses [m].
@@ -85,7 +88,7 @@ pub fn close(
     let mut rounds =
         Rounds { data: &data, options, declared, generics: Vec::new(), steps: Vec::new(), seen: Vec::new() };
     let mut fitted = rounds.run(first)?;
-    for _ in 0..MOST_EXCHANGES {
+    for _ in 0..if rounds.has_many_poses() { 1 } else { MOST_EXCHANGES } {
         let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
         fitted = rounds.run(next)?;
     }
@@ -106,7 +109,7 @@ pub fn close(
         }
         fitted = without;
     }
-    let fitted = rounds.settled(fitted)?;
+    let (fitted, wave_sigma) = waves::filled(&rounds, fitted)?;
     let findings = check_fit(&fitted, &data);
     let unexplained = match rounds.generics.first() {
         Some(known) => unexplained::localise(&fitted, &data, Some(known), LEVEL),
@@ -129,6 +132,7 @@ pub fn close(
         closed: fitted.problem,
         effects,
         steps,
+        wave_sigma,
         unexplained,
         gain,
     })

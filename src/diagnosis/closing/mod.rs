@@ -6,7 +6,9 @@ mod interval;
 mod pick;
 mod retest;
 mod rounds;
+mod waves;
 
 pub use close::{Closure, Found, Step, Verdict, close};
 pub use interval::Interval;
 pub(super) use pick::LEVEL;
+pub use waves::WAVES;

@@ -7,7 +7,7 @@ use super::super::generic::Generic;
 use super::super::trace::{Scan, tries};
 use super::pick::{LEAVING, MOST_REFITTED, Pick, pick};
 use super::retest::{Retested, retest};
-use crate::problem::Effect;
+use crate::problem::{Effect, Problem};
 use crate::study::{ErrorSummary, IdentifyError, Options};
 
 /// Rounds after which the loop ends whatever is left.
@@ -80,7 +80,18 @@ impl Rounds<'_> {
         if fitted.found.termination.converged() {
             return Ok(fitted);
         }
-        Fitted::new(fitted.problem.clone(), self.data, &fitted.onwards(self.options))
+        self.fit_whole(fitted.problem.clone(), &fitted)
+    }
+
+    /// A problem fitted from where another fit ended.
+    pub fn fit_whole(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
+        Fitted::new(problem, self.data, &from.onwards(self.options))
+    }
+
+    /// The same in a few steps where there are many poses.
+    pub fn fit_few(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
+        let max_steps = self.has_many_poses().then_some(FEW_STEPS);
+        Fitted::new(problem, self.data, &Options { max_steps, ..from.onwards(self.options) })
     }
 
     /// Enters a fit into the story.
@@ -107,8 +118,7 @@ impl Rounds<'_> {
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        let options = Options { max_steps: self.has_many_poses().then_some(FEW_STEPS), ..fitted.onwards(self.options) };
-        Fitted::new(fitted.with_effects(&effects), self.data, &options)
+        self.fit_few(fitted.with_effects(&effects), fitted)
     }
 
     /// The problem fitted with what was picked; among rivals the one that fits best.

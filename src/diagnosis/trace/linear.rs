@@ -128,9 +128,25 @@ impl Linear {
 
     /// What the residual says about columns, shape = (3 N, k).
     pub fn score(&self, columns: &DMatrix<f64>) -> Score {
-        let data = self.basis.rows(0, self.rows);
-        let along = data.tr_mul(columns);
-        let gram = columns.tr_mul(columns) - along.tr_mul(&along);
+        self.projected(columns, &self.basis.rows(0, self.rows).tr_mul(columns))
+    }
+
+    /// The same of several sets of columns, multiplied together.
+    pub fn scores(&self, sets: &[DMatrix<f64>]) -> Vec<Score> {
+        let columns = DMatrix::from_columns(&sets.iter().flat_map(DMatrix::column_iter).collect::<Vec<_>>());
+        // The narrow side is transposed: this is the product that is fast.
+        let along = (columns.transpose() * self.basis.rows(0, self.rows)).transpose();
+        let mut first = 0;
+        let mut next = |set: &DMatrix<f64>| {
+            first += set.ncols();
+            self.projected(set, &along.columns(first - set.ncols(), set.ncols()).into_owned())
+        };
+        sets.iter().map(&mut next).collect()
+    }
+
+    /// The score of columns that have Qᵀ C along what was fitted.
+    fn projected(&self, columns: &DMatrix<f64>, along: &DMatrix<f64>) -> Score {
+        let gram = columns.tr_mul(columns) - along.tr_mul(along);
         let product = columns.tr_mul(&self.residual.rows(0, self.rows));
         Score { gram, product, lengths: columns.column_iter().map(|column| column.norm_squared()).collect() }
     }

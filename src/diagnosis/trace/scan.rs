@@ -24,6 +24,8 @@ pub(crate) struct Scan<'a, 'l> {
     never_negative: Vec<Vec<bool>>,
 }
 
+/// Candidates that are projected together.
+const TOGETHER: usize = 16;
 /// Standard errors below zero from which what is never negative is impossible.
 const IMPOSSIBLE: f64 = 3.0;
 
@@ -42,7 +44,10 @@ pub(crate) struct Tried {
 impl<'a, 'l> Scan<'a, 'l> {
     /// Tries `effects` against the fit that `linear` describes.
     pub fn new(library: &'l Library<'a>, linear: Linear, effects: Vec<Effect>) -> Self {
-        let scores = effects.par_iter().map(|effect| linear.score(&library.columns(effect))).collect();
+        let scores = effects
+            .par_chunks(TOGETHER)
+            .flat_map(|some| linear.scores(&some.iter().map(|effect| library.columns(effect)).collect::<Vec<_>>()));
+        let scores = scores.collect();
         let (tries, families) = tries(&effects);
         let never_negative = effects.iter().map(|effect| library.never_negative(effect)).collect();
         Self { library, linear, effects, scores, tries, families, never_negative }

@@ -20,6 +20,8 @@ struct Document<'a> {
     held_out_gain_mm: IntervalEntry,
     effects: Vec<FoundEntry<'a>>,
     unexplained: Option<UnexplainedEntry<'a>>,
+    /// 1 σ of the prior that waves of joints were given [rad].
+    wave_prior_rad: Option<f64>,
     steps: Vec<StepEntry<'a>>,
     checks_before: Vec<findings::Entry<'a>>,
     checks_after: Vec<findings::Entry<'a>>,
@@ -170,6 +172,7 @@ pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
         held_out_gain_mm: closure.gain.into(),
         effects: closure.effects.iter().map(FoundEntry::from).collect(),
         unexplained: closure.unexplained.as_ref().map(UnexplainedEntry::from),
+        wave_prior_rad: closure.wave_sigma,
         steps: closure.steps.iter().map(StepEntry::from).collect(),
         checks_before: findings::entries(&closure.before.findings),
         checks_after: findings::entries(&closure.findings),

@@ -77,16 +77,25 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
     if closure.effects.is_empty() {
         return Vec::new();
     }
-    vec![Block::heading("What was found"), Block::Ranking(closure.effects.iter().map(point).collect())]
+    let mut blocks =
+        vec![Block::heading("What was found"), Block::Ranking(closure.effects.iter().map(point).collect())];
+    if let Some(sigma) = closure.wave_sigma {
+        blocks.push(Block::Text(format!(
+            "Waves of joints are many: every order up to the highest that stands out is in the model, with one prior of {} ° \
+             for all. With it, poses are predicted best where whole parts of a joint's range are left out.",
+            number(sigma.to_degrees(), 6)
+        )));
+    }
+    blocks
 }
 
 fn point(found: &Found) -> Point {
     let mut details: Vec<String> =
-        found.estimates.iter().map(|estimate| format!("{} = {}", estimate.name, effect::value(estimate))).collect();
+        effect::values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}")).collect();
     let after = found.held_out_after;
     let mm = |value: f64| number(value * 1e3, 4);
     details.push(format!(
-        "{}, the probability that it is chance; held-out error with it in the model: mean {} mm, rms {} mm",
+        "{}, the probability that it is chance; held-out error after the round that added it: mean {} mm, rms {} mm",
         effect::p(found.p_value),
         mm(after.mean.norm),
         mm(after.rms.norm)

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
-use super::super::effect::{p, value};
-use crate::diagnosis::{Closure, Found};
+use super::super::effect::{p, values};
+use crate::diagnosis::{Closure, Found, WAVES};
 use crate::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
-use crate::study::Estimate;
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text
 /// will stand; everything else stays as it was written, comments included.
@@ -26,7 +25,29 @@ pub fn closed_problem(
         let found = closure.effects.iter().find(|found| found.effect == declared.effect);
         (declared.effect.clone(), found.map(comments).unwrap_or_default())
     });
-    edited(text, &declared, &closed.collect::<Vec<_>>(), files)
+    let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
+    match closure.wave_sigma {
+        Some(sigma) => with_rule(&edited, sigma),
+        None => Ok(edited),
+    }
+}
+
+/// The text with a prior of σ [rad] for all waves of joints at the end of `[parameters]`.
+fn with_rule(text: &str, sigma: f64) -> Result<String, TomlError> {
+    let mut document: DocumentMut = text.parse()?;
+    let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
+    if let Some(parameters) = parameters.as_table_like_mut() {
+        let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
+        parameters.insert(WAVES, Item::Value(Value::InlineTable(sigma)));
+    }
+    // A table in one line has no room for a comment.
+    if let Some(mut key) =
+        document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(WAVES))
+    {
+        key.leaf_decor_mut()
+            .set_prefix("# Found by flexcal loop: with this prior, what is left out is predicted best.\n");
+    }
+    Ok(document.to_string())
 }
 
 /// The text with the effects `closed`, each with comments, in the place of those `declared`.
@@ -137,8 +158,8 @@ fn arguments(effect: &Effect) -> Value {
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found) -> Vec<String> {
     let first = format!("Found by flexcal loop: {}, {}.", effect::describe(&found.effect), p(found.p_value));
-    let line = |estimate: &Estimate| format!("{} = {}", estimate.name, value(estimate));
-    std::iter::once(first).chain(found.estimates.iter().map(line)).collect()
+    let lines = values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}"));
+    std::iter::once(first).chain(lines).collect()
 }
 
 #[cfg(test)]
@@ -183,6 +204,19 @@ mod tests {
         assert_eq!(read["effect"][0]["joint-harmonic"]["orders"].as_array().unwrap().len(), 2);
         assert_eq!(read["effect"][2]["gear-ratio"]["joint"].as_integer(), Some(3));
         assert_eq!(read["data"]["files"][0].as_str(), Some("../data.csv"));
+    }
+
+    #[test]
+    fn a_prior_of_waves_is_a_rule() {
+        for text in [
+            "[parameters]\n\"base.*\" = { free = true }\n\n[data]\nfiles = []\n",
+            "parameters = {}\n",
+            "name = \"x\"\n",
+        ] {
+            let ruled = with_rule(text, 2.5e-5).unwrap();
+            let read: toml::Table = ruled.parse().unwrap();
+            assert_eq!(read["parameters"][WAVES]["sigma_rad"].as_float(), Some(2.5e-5), "{ruled}");
+        }
     }
 
     #[test]

@@ -7,8 +7,8 @@ use crate::diagnosis::{Closure, Found, Trace, Unexplained};
 use crate::effect;
 use crate::picture::Picture;
 use crate::problem::Effect;
-use crate::report::quantity::{Display, decimals, number};
-use crate::study::Estimate;
+use crate::report::effect::values;
+use crate::report::quantity::number;
 
 /// An effect as a problem file names it, with its place.
 fn named(found: &Effect) -> String {
@@ -25,15 +25,6 @@ fn chance(p: f64) -> String {
     } else {
         format!("p = {p:.3}")
     }
-}
-
-fn value(estimate: &Estimate) -> String {
-    let unit = Display::of(estimate.unit, estimate.estimate);
-    let error = estimate.std_error.map(|error| error * unit.factor);
-    let digits = error.map_or(4, |error| decimals(error, 6));
-    let shown = number(estimate.estimate * unit.factor, digits).replace('-', "−");
-    let error = error.map_or_else(String::new, |error| format!(" ± {}", number(error, digits)));
-    format!("{shown}{error} {}", unit.symbol)
 }
 
 /// Every found effect with its numbers, then what no effect explains.
@@ -55,8 +46,8 @@ fn one(found: &Found) -> Markup {
             p { code { (named(&found.effect)) } ", " (chance(found.p_value)) "; once it was in the model, held-out poses were off by "
                 (number(found.held_out_after.mean.norm * 1e3, 3)) " mm on average" }
             table {
-                @for estimate in &found.estimates {
-                    tr { td.l { code { (estimate.name) } } td { (value(estimate)) } }
+                @for (name, value) in values(&found.estimates) {
+                    tr { td.l { code { (name) } } td { (value.replace('-', "−")) } }
                 }
             }
             @if !others.is_empty() { p { "These data cannot tell it from: " (others.join("; ")) "." } }

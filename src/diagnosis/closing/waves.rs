@@ -1,0 +1,154 @@
+//! Waves of joints, once many were found: all orders, with one prior.
+//!
+//! Where a joint covers part of its turn, waves of neighbouring orders hardly differ there. Which of them are picked is chance;
+//! they cancel where it was measured and part beyond. With every order in the model and a prior that holds all of them down,
+//! what is predicted fades out where nothing was measured. The prior's σ is the one that predicts best what is left out where
+//! whole parts of a joint's range are.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::super::data::Data;
+use super::super::fitted::Fitted;
+use super::rounds::Rounds;
+use crate::parameter::Driver;
+use crate::problem::pattern::matches;
+use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
+use crate::study::IdentifyError;
+
+/// Coefficients from which on they have a scale of their own.
+const MANY: usize = 20;
+/// Orders of a joint from which on all up to the highest of them are put in.
+const SEVERAL: usize = 3;
+/// Parts of each joint's range that are left out in turn.
+const PARTS: usize = 5;
+/// Scales that are tried, as powers of two of the root mean square of what was found.
+const SCALES: std::ops::RangeInclusive<i32> = -8..=2;
+/// Part of a column's own square that holds what nothing sees where it is.
+const HELD: f64 = 1e-10;
+/// Pattern of the rule that gives all waves of joints one prior.
+pub const WAVES: &str = "joint-harmonic.*";
+
+/// The fit with every order of the joints whose waves are many, and 1 σ of their prior [rad]; the fit, settled, where they
+/// are few or the problem has a word of its own on them.
+pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
+    let waves = waves(&fitted);
+    let said = |rule: &ParameterRule| {
+        waves.iter().any(|&j| matches(&rule.pattern, &fitted.model.parameters[fitted.unknowns[j]].name))
+    };
+    if waves.len() < MANY || !rounds.has_many_poses() || fitted.problem.parameters.iter().any(said) {
+        return Ok((rounds.settled(fitted)?, None));
+    }
+    let squares: f64 = waves.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
+    let found = (squares / waves.len() as f64).sqrt();
+    let effects: Vec<Effect> = fitted.effects().into_iter().map(all_orders).collect();
+    let dense = with_scale(fitted.with_effects(&effects), found);
+    let dense = rounds.fit_few(dense, &fitted)?;
+    let scale = best_scale(&dense, rounds.data, found);
+    let scaled = with_scale(fitted.with_effects(&effects), scale);
+    Ok((rounds.fit_whole(scaled, &dense)?, Some(scale)))
+}
+
+/// Places of the coefficients of waves among the unknowns.
+fn waves(fitted: &Fitted) -> Vec<usize> {
+    let is_wave = |&j: &usize| {
+        let parameter = &fitted.model.parameters[fitted.unknowns[j]];
+        matches!(parameter.driver, Driver::Sine(..) | Driver::Cosine(..)) && matches(WAVES, &plain(&parameter.name))
+    };
+    (0..fitted.unknowns.len()).filter(is_wave).collect()
+}
+
+/// A name without the place in brackets.
+fn plain(name: &str) -> String {
+    match (name.find('['), name.find(']')) {
+        (Some(from), Some(to)) => format!("{}{}", &name[..from], &name[to + 1..]),
+        _ => name.to_owned(),
+    }
+}
+
+/// Several orders become all of them up to the highest.
+fn all_orders(effect: Effect) -> Effect {
+    match effect {
+        Effect::JointHarmonic { joint, orders } if orders.len() >= SEVERAL => {
+            Effect::JointHarmonic { joint, orders: (1..=orders.into_iter().max().unwrap_or(1)).collect() }
+        }
+        other => other,
+    }
+}
+
+/// The problem with a prior for all waves.
+fn with_scale(mut problem: Problem, sigma: f64) -> Problem {
+    problem.parameters.push(ParameterRule {
+        pattern: WAVES.to_owned(),
+        freedom: Freedom::Free {
+            sigma: Quantities { angle: Some(sigma), ..Quantities::default() },
+            min: Quantities::default(),
+            max: Quantities::default(),
+        },
+        location: problem.data.location.clone(),
+    });
+    problem
+}
+
+/// A part of the data in sums: JᵀJ, Jᵀr, rᵀr and its number of rows.
+struct Part {
+    gram: DMatrix<f64>,
+    product: DVector<f64>,
+    squares: f64,
+    rows: usize,
+}
+
+/// The scale [rad] of the prior on waves with which parts of the joints' ranges that are left out are
+/// predicted best, in the linear neighbourhood of the fit.
+fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
+    let waves = waves(fitted);
+    let library = fitted.library(data, &[], &[]);
+    let (columns, residual) = (library.fitted(), library.residual());
+    let part = |poses: &Vec<usize>| {
+        let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
+        let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));
+        Part { gram: j.transpose() * &j, product: j.tr_mul(&r), squares: r.norm_squared(), rows: rows.len() }
+    };
+    let whole = part(&(0..data.rows().len()).collect());
+    let parts: Vec<Part> = parts_of_ranges(data).par_iter().map(part).collect();
+    let n = columns.ncols();
+    let at = |j: usize| fitted.unknowns.get(j).map_or(0.0, |&k| fitted.found.x[k]);
+    let sigma = |j: usize| match fitted.unknowns.get(j) {
+        Some(&k) => fitted.model.parameters[k].sigma,
+        None => library.let_go()[j - fitted.unknowns.len()],
+    };
+    let weights: Vec<f64> = (0..n).map(|j| sigma(j).map_or(0.0, |sigma| sigma.powi(-2))).collect();
+    let error = |scale: f64| -> f64 {
+        let mut weights = weights.clone();
+        for &j in &waves {
+            weights[j] = scale.powi(-2);
+        }
+        let left_out = |part: &Part| {
+            let mut normal = &whole.gram - &part.gram;
+            let mut pull = &whole.product - &part.product;
+            for j in 0..n {
+                normal[(j, j)] += weights[j] + HELD * whole.gram[(j, j)] + f64::MIN_POSITIVE;
+                pull[j] += weights[j] * at(j);
+            }
+            let step = -normal.cholesky()?.solve(&pull);
+            let squares = part.squares + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
+            Some(part.rows as f64 * (squares / part.rows as f64).ln())
+        };
+        let all: Option<Vec<f64>> = parts.par_iter().map(left_out).collect();
+        all.map_or(f64::INFINITY, |all| all.iter().sum())
+    };
+    let tried: Vec<_> = SCALES.map(|power| found * 2.0_f64.powi(power)).map(|scale| (scale, error(scale))).collect();
+    tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |(scale, _)| scale)
+}
+
+/// Identification poses in each part of each joint's range, as many in each.
+fn parts_of_ranges(data: &Data) -> Vec<Vec<usize>> {
+    let rows = data.rows();
+    let coordinate = |pose: usize, joint: usize| data.measurements.configuration(rows[pose])[joint];
+    let of_joint = |joint: usize| {
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by(|&a, &b| coordinate(a, joint).total_cmp(&coordinate(b, joint)));
+        order.chunks(rows.len().div_ceil(PARTS).max(1)).map(<[usize]>::to_vec).collect::<Vec<_>>()
+    };
+    (0..data.measurements.joints).flat_map(of_joint).collect()
+}
