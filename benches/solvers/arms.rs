@@ -65,11 +65,12 @@ impl Arms {
             let nominal = DVector::zeros(lunar.truth.len());
             let sigmas = lunar.sigmas();
             let bounds = Bounds::new(-ERRORS * &sigmas, ERRORS * sigmas).unwrap();
-            let far = lunar.far.iter().enumerate().map(|(k, far)| (format!("far start {}", k + 1), far.clone()));
-            for (name, start) in std::iter::once(("nominal start".to_owned(), nominal)).chain(far) {
-                cases.push(lunar.case(Class::Elastic, &name, start.clone(), None));
-                cases.push(lunar.case(Class::Bounded, &name, start, Some(bounds.clone())));
+            cases.push(lunar.case(Class::Elastic, "nominal start", nominal.clone(), None));
+            for (k, far) in lunar.far.iter().enumerate() {
+                cases.push(lunar.case(Class::Elastic, &format!("far start {}", k + 1), far.clone(), None));
             }
+            cases.push(lunar.case(Class::Bounded, "nominal start", nominal, Some(bounds.clone())));
+            cases.push(lunar.case(Class::Bounded, "far start 1", lunar.far[0].clone(), Some(bounds)));
         }
         cases
     }

@@ -32,7 +32,7 @@ impl Class {
         Self::MoreGarbowHillstrom,
     ];
 
-    /// Heading of its section, which `tests/solvers.rs` reads.
+    /// Heading of its section, which `tests/auto_solver.rs` reads.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identifiable => "rigid, identifiable",
@@ -112,7 +112,7 @@ impl Case<'_> {
     pub fn limit(&self) -> Duration {
         match self.class {
             Class::Nist | Class::MoreGarbowHillstrom => Duration::from_secs(1),
-            _ => Duration::from_secs(10),
+            _ => Duration::from_secs(20),
         }
     }
 
