@@ -16,8 +16,8 @@ const SETTLED: f64 = 1e-4;
 /// ½‖r‖² that counts as zero for residuals of order one.
 const ZERO: f64 = 5e-15;
 /// Time for the repetitions of a solver on a problem [s], and how many there may be.
-const BUDGET: f64 = 0.4;
-const REPETITIONS: f64 = 15.0;
+const BUDGET: f64 = 0.3;
+const REPETITIONS: usize = 201;
 
 /// A solver on a problem.
 pub struct Row {
@@ -118,8 +118,8 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
 fn repeated<T>(count: usize, mut run: impl FnMut(usize) -> T, time: impl Fn(&T) -> f64) -> (Vec<T>, Vec<f64>) {
     let first: Vec<T> = (0..count).map(&mut run).collect();
     let mut times: Vec<Vec<f64>> = first.iter().map(|run| vec![time(run)]).collect();
-    let wanted = |times: &[f64]| (BUDGET / times[0]).clamp(1.0, REPETITIONS);
-    for round in 1..=REPETITIONS as usize {
+    let wanted = |times: &[f64]| (BUDGET / times[0]).clamp(1.0, REPETITIONS as f64);
+    for round in 1..REPETITIONS {
         for (k, times) in times.iter_mut().enumerate() {
             if (round as f64) < wanted(times) {
                 times.push(time(&run(k)));

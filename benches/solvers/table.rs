@@ -16,7 +16,7 @@ Written by `cargo bench --bench solvers`; do not edit. What the table means for 
   port of the crate `levenberg-marquardt`. All see the same residuals and derivatives.
 - optimum: yes where ½‖r‖² is within 1e-8 of the best known, with what the solver complains of although it is there; or why not.
 - steps: steps tried. r, J: evaluations of the residual alone, and of residual and Jacobian.
-- time: median of up to 15 runs, taken in turn with those of the other solvers, on one thread. A run is ended after 20 s
+- time: median of up to 201 runs in 0.3 s, taken in turn with those of the other solvers, on one thread. A run is ended after 20 s
   (collections: 1 s).
 - × fastest: the class's total time over that of the fastest solver which reaches every optimum of the class.
 ";
