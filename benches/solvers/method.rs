@@ -114,8 +114,8 @@ impl Method {
                 };
                 minimise_pseudo_inverse(fit, start, &settings).into()
             }
-            Self::TrustRegion => trust_region(fit, start, &settings),
-            Self::Lbfgs => lbfgs(fit, start, &settings),
+            Self::TrustRegion => trust_region(fit, &start, &settings),
+            Self::Lbfgs => lbfgs(fit, &start, &settings),
             Self::Minpack => {
                 let (x, report) = Minpack::new(data, start).with_rows(case.priors.as_ref()).solve(&settings);
                 let complaint = (!report.termination.was_successful()).then(|| format!("{:?}", report.termination));

@@ -27,21 +27,22 @@ const IDLE: usize = 20;
 
 type Vector = DVector<f64>;
 type Matrix = DMatrix<f64>;
+type State<G, H> = IterState<Vector, G, (), H, (), f64>;
 
 /// Steihaug's conjugate gradients within a radius; the first is ‖r‖, the length that orthogonal columns would need.
-pub fn trust_region(objective: impl Objective, start: Vector, settings: &Settings) -> End {
-    let smooth = Smooth::new(objective, &start, settings);
+pub fn trust_region(objective: impl Objective, start: &Vector, settings: &Settings) -> End {
+    let smooth = Smooth::new(objective, start, settings);
     let radius = smooth.residual.max(f64::MIN_POSITIVE);
     let inner = Steihaug::new().with_max_iters(10 * start.len() as u64);
     let solver = TrustRegion::new(inner).with_max_radius(1e6 * radius).unwrap().with_radius(radius).unwrap();
-    smooth.run(|state: IterState<Vector, Vector, (), Matrix, (), f64>| state, solver, settings.max_iterations)
+    smooth.run(|state: State<Vector, Matrix>| state, solver, settings.max_iterations)
 }
 
 /// Limited-memory BFGS with the line search of Moré and Thuente.
-pub fn lbfgs(objective: impl Objective, start: Vector, settings: &Settings) -> End {
-    let smooth = Smooth::new(objective, &start, settings);
+pub fn lbfgs(objective: impl Objective, start: &Vector, settings: &Settings) -> End {
+    let smooth = Smooth::new(objective, start, settings);
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY).with_tolerance_grad(0.0).unwrap();
-    smooth.run(|state: IterState<Vector, Vector, (), (), (), f64>| state, solver, SHORTER * settings.max_iterations)
+    smooth.run(|state: State<Vector, ()>| state, solver, SHORTER * settings.max_iterations)
 }
 
 /// The objective as argmin sees it, in scaled unknowns q = D x.
@@ -61,8 +62,16 @@ struct Seen {
     best: (Vector, f64),
     /// How often the cost was asked for where it is known.
     idle: usize,
-    /// Why the adapter has ended the run; `None` within: converged.
-    end: Option<Option<&'static str>>,
+    /// Whether the adapter has ended the run.
+    ended: Ended,
+}
+
+/// Why the adapter ends a run.
+#[derive(Clone, Copy)]
+enum Ended {
+    Not,
+    Converged,
+    Failed(&'static str),
 }
 
 /// Ends a run.
@@ -91,22 +100,17 @@ impl<'a, O: Objective> Smooth<'a, O> {
                 best: (start.clone(), linearisation.cost),
                 last: (start.clone(), linearisation),
                 idle: 0,
-                end: None,
+                ended: Ended::Not,
             }),
             objective,
             settings,
         }
     }
 
-    fn run<G, H, S>(
-        &self,
-        typed: fn(IterState<Vector, G, (), H, (), f64>) -> IterState<Vector, G, (), H, (), f64>,
-        solver: S,
-        max_iterations: u64,
-    ) -> End
+    fn run<G, H, S>(&self, typed: fn(State<G, H>) -> State<G, H>, solver: S, max_iterations: u64) -> End
     where
-        S: for<'b> Solver<&'b Self, IterState<Vector, G, (), H, (), f64>>,
-        IterState<Vector, G, (), H, (), f64>: argmin::core::State<Param = Vector, Float = f64>,
+        S: for<'b> Solver<&'b Self, State<G, H>>,
+        State<G, H>: argmin::core::State<Param = Vector, Float = f64>,
         G: Clone,
         H: Clone,
     {
@@ -118,17 +122,17 @@ impl<'a, O: Objective> Smooth<'a, O> {
             .ctrlc(false)
             .timer(false)
             .run();
-        let complaint = match (self.seen.borrow().end, result) {
-            (Some(end), _) => end.map(str::to_owned),
-            (None, Ok(result)) if result.state.get_iter() >= max_iterations => Some("iteration-limit".to_owned()),
-            (None, Ok(_)) => None,
-            (None, Err(error)) => Some(error.to_string()),
+        let complaint = match (self.seen.borrow().ended, result) {
+            (Ended::Failed(why), _) => Some(why.to_owned()),
+            (Ended::Not, Ok(result)) if result.state.get_iter() >= max_iterations => Some("iteration-limit".to_owned()),
+            (Ended::Not, Err(error)) => Some(error.to_string()),
+            (Ended::Not | Ended::Converged, _) => None,
         };
         End { x: self.seen.borrow().best.0.clone(), iterations: iterations.get(), complaint }
     }
 
-    fn stop<T>(&self, complaint: Option<&'static str>) -> Result<T, Error> {
-        self.seen.borrow_mut().end = Some(complaint);
+    fn stop<T>(&self, ended: Ended) -> Result<T, Error> {
+        self.seen.borrow_mut().ended = ended;
         Err(Stop.into())
     }
 
@@ -145,12 +149,12 @@ impl<'a, O: Objective> Smooth<'a, O> {
         }
         let Linearisation { cost, triangle, projected } = &self.seen.borrow().last.1.clone();
         if !triangle.iter().chain(projected).all(|value| value.is_finite()) {
-            return self.stop(Some("derivatives-not-finite"));
+            return self.stop(Ended::Failed("derivatives-not-finite"));
         }
         let size = |j: usize| triangle.column(j).norm() * (2.0 * cost).sqrt();
         let cosine = |j: usize| triangle.column(j).dot(projected).abs() / size(j).max(f64::MIN_POSITIVE);
         if *cost == 0.0 || (0..q.len()).all(|j| cosine(j) <= self.settings.gradient_tolerance) {
-            return self.stop(None);
+            return self.stop(Ended::Converged);
         }
         Ok(use_it(&self.seen.borrow().last.1))
     }
@@ -168,7 +172,8 @@ impl<O: Objective> CostFunction for &Smooth<'_, O> {
             return Ok(self.seen.borrow().last.1.cost);
         }
         if !moved.is_finite() || moved <= self.settings.step_tolerance * q.norm() {
-            return self.stop((!moved.is_finite()).then_some("steps are not finite"));
+            let failed = Ended::Failed("steps are not finite");
+            return self.stop(if moved.is_finite() { Ended::Converged } else { failed });
         }
         let cost = self.objective.cost(&x);
         let mut seen = self.seen.borrow_mut();

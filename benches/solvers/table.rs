@@ -92,7 +92,7 @@ fn summarise(out: &mut String, class: Class, rows: &[Row]) {
 /// Three digits.
 fn milliseconds(seconds: f64) -> String {
     let time = 1e3 * seconds;
-    let digits = (2.0 - time.max(1e-9).log10().floor()).clamp(0.0, 4.0) as usize;
+    let digits = [100.0, 10.0, 1.0, 0.1].iter().filter(|&&size| time < size).count();
     format!("{time:.digits$}")
 }
 
