@@ -1,6 +1,6 @@
 //! The solver that `auto` takes, held against the table of `benches/RESULTS.md`.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod common;
 
