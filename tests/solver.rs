@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 
-mod common;
+mod collections;
 
 #[path = "solver/bounds.rs"]
 mod bounds;
@@ -10,9 +10,6 @@ mod bounds;
 mod derivatives;
 #[path = "solver/edges.rs"]
 mod edges;
-#[path = "more_garbow_hillstrom/functions.rs"]
-#[expect(dead_code, reason = "only some of the functions are needed here")]
-mod functions;
 #[path = "solver/inequalities.rs"]
 mod inequalities;
 #[path = "solver/nist.rs"]

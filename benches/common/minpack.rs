@@ -1,22 +1,42 @@
 //! The MINPACK port of the crate `levenberg-marquardt` on the same residuals and derivatives.
 
-use flexcal::fit::{LeastSquares, jacobian, residual_vector};
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use flexcal::fit::{LeastSquares, LinearRows, jacobian, residual_vector};
+use flexcal::solver::Settings;
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
 use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 
 /// A problem as that crate sees it: residuals and Jacobian whole.
 pub struct Minpack<'a, P> {
     problem: &'a P,
+    rows: Option<&'a LinearRows>,
     x: DVector<f64>,
 }
 
 impl<'a, P: LeastSquares> Minpack<'a, P> {
+    /// To be solved from `x`.
+    pub fn new(problem: &'a P, x: DVector<f64>) -> Self {
+        Self { problem, rows: None, x }
+    }
+
+    /// With linear rows below the data, as priors are.
+    pub fn with_rows(self, rows: Option<&'a LinearRows>) -> Self {
+        Self { rows, ..self }
+    }
+
+    /// Where it ends, and why.
+    pub fn solve(self, settings: &Settings) -> (DVector<f64>, MinimizationReport<f64>) {
+        let solver = LevenbergMarquardt::new()
+            .with_ftol(settings.cost_tolerance)
+            .with_xtol(settings.step_tolerance)
+            .with_gtol(settings.gradient_tolerance);
+        let (end, report) = solver.minimize(self);
+        (end.x, report)
+    }
+
     /// ½‖r‖² at the minimum found from x = 0.
     pub fn minimise(problem: &'a P) -> f64 {
-        let start = Self { problem, x: DVector::zeros(problem.parameters()) };
-        let solver = LevenbergMarquardt::new().with_ftol(1e-12).with_xtol(1e-10).with_gtol(1e-10);
-        let (_, report) = solver.minimize(start);
+        let (_, report) = Self::new(problem, DVector::zeros(problem.parameters())).solve(&Settings::default());
         assert!(report.termination.was_successful());
         report.objective_function
     }
@@ -36,10 +56,28 @@ impl<P: LeastSquares> LeastSquaresProblem<f64, Dyn, Dyn> for Minpack<'_, P> {
     }
 
     fn residuals(&self) -> Option<DVector<f64>> {
-        Some(residual_vector(self.problem, &self.x))
+        let data = residual_vector(self.problem, &self.x);
+        Some(match self.rows {
+            Some(rows) => {
+                let m = data.len();
+                let mut all = data.resize_vertically(m + rows.constant.len(), 0.0);
+                all.rows_mut(m, rows.constant.len()).copy_from(&(&rows.matrix * &self.x + &rows.constant));
+                all
+            }
+            None => data,
+        })
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        Some(jacobian(self.problem, &self.x))
+        let data = jacobian(self.problem, &self.x);
+        Some(match self.rows {
+            Some(rows) => {
+                let m = data.nrows();
+                let mut all = data.resize_vertically(m + rows.matrix.nrows(), 0.0);
+                all.rows_mut(m, rows.matrix.nrows()).copy_from(&rows.matrix);
+                all
+            }
+            None => data,
+        })
     }
 }

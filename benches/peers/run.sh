@@ -1,34 +1,66 @@
 #!/bin/sh
-# Fits of flexcal and of Ceres in turn on the same data, one thread each, and the ratios of their times.
+# The same fit by flexcal and by others, in turn, one thread each: times, their ratios, and whether the minimum is reached.
 #
-#   benches/peers/run.sh [poses ...]          default: 28 100 1000 10000
+#   benches/peers/run.sh [poses/unknowns ...]        default: 100/25 1000/25 100/33 1000/33
 #
-# Needs a C++17 compiler and Ceres with its headers (Debian, Ubuntu: apt-get install g++ libceres-dev; this pulls in
-# Eigen and glog). Installs nothing itself; writes to target/peers only.
+# unknowns: 25 identifiable parameters of a rigid UR10, or all 33 of its joints and target, of which 8 are redundant.
+#
+# Ceres needs a C++17 compiler and Ceres with its headers (Debian, Ubuntu: apt-get install g++ libceres-dev; this pulls in
+# Eigen and glog). SciPy, lmfit and pybotics come from PyPI, in the versions of requirements.txt, into target/peers/venv,
+# which is made on the first run (python3 with venv). What is missing is left out, and said. Nothing else is installed,
+# and nothing outside target is written. pybotics takes minutes (ended
+# after five): PEERS="qr cholesky scipy" leaves out all but those.
 set -eu
 cd "$(dirname "$0")/../.."
 out=target/peers
+peers=${PEERS:-qr cholesky scipy scipy-jac lmfit pybotics}
 mkdir -p "$out"
-g++ -std=c++17 -O3 -DNDEBUG -I/usr/include/eigen3 benches/peers/ceres/fit.cc -lceres -lglog -o "$out/ceres"
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+without() {
+    echo "left out: $*" >&2
+    for peer in "$@"; do peers=$(echo " $peers " | sed "s/ $peer / /"); done
+}
+g++ -std=c++17 -O3 -DNDEBUG -I/usr/include/eigen3 benches/peers/ceres/fit.cc -lceres -lglog -o "$out/ceres" ||
+    without qr cholesky
+python=$out/venv/bin/python
+[ -x "$python" ] || python3 -m venv "$out/venv" || true
+"$python" -m pip install --quiet --disable-pip-version-check -r benches/peers/requirements.txt ||
+    without scipy scipy-jac lmfit pybotics
 flexcal=$(cargo bench --bench peers --no-run 2>&1 | sed -n 's/.*(\(.*\)).*/\1/p' | tail -1)
 
-printf '%8s  %10s %6s  %10s %6s  %10s %6s  %8s %8s\n' \
-    poses flexcal steps 'Ceres QR' steps 'Cholesky' steps '/QR' '/Chol.'
-for poses in "${@:-28 100 1000 10000}"; do for poses in $poses; do
-    "$flexcal" write "$poses" "$out/ur10.csv"
-    repeats=$((20000 / poses + 5))
-    # Three rounds in turn; the best median of each, so that a neighbour's load spoils neither.
-    for round in 1 2 3; do
-        echo "flexcal $("$flexcal" fit "$poses" $repeats)"
-        echo "qr $("$out/ceres" "$out/ur10.csv" qr $repeats)"
-        echo "cholesky $("$out/ceres" "$out/ur10.csv" cholesky $repeats)"
-    done | awk -v poses="$poses" '
+# Prints: median time [ms], final cost, steps or evaluations. Slow ones are measured less often.
+fit() {
+    case $1 in
+        flexcal) "$flexcal" fit "$poses" "$unknowns" $((20000 / poses + 5)) ;;
+        qr | cholesky) "$out/ceres" "$out/ur10.csv" "$1" $((20000 / poses + 5)) ;;
+        pybotics) timeout 300 "$python" benches/peers/python/fit.py "$out/ur10.csv" "$1" 1 || echo 300000 1e99 0 ;;
+        *) "$python" benches/peers/python/fit.py "$out/ur10.csv" "$1" $((2000 / poses + 3)) ;;
+    esac
+}
+
+[ $# -gt 0 ] || set -- 100/25 1000/25 100/33 1000/33
+printf '%6s %9s  %-10s %12s %14s %6s  %s\n' poses unknowns tool 'time [ms]' 'flexcal/tool' steps 'cost above the least'
+for size in "$@"; do
+    poses=${size%/*} unknowns=${size#*/}
+    "$flexcal" write "$poses" "$unknowns" "$out/ur10.csv"
+    # Five rounds in turn (pybotics one); the best median of each, so that a neighbour's load spoils none.
+    for round in 1 2 3 4 5; do
+        for tool in flexcal $peers; do
+            [ "$tool" != pybotics ] || [ $round = 1 ] || continue
+            echo "$tool $(fit "$tool")"
+        done
+    done | awk -v poses="$poses" -v unknowns="$unknowns" '
+        !($1 in best) { order[++n] = $1 }
         !($1 in best) || $2 < best[$1] { best[$1] = $2 }
-        { cost[$1] = $3; steps[$1] = $4 }
+        { cost[$1] = $3; steps[$1] = $4; if (least == "" || $3 < least) least = $3 }
         END {
-            printf "%8d  %7.3f ms %6d  %7.3f ms %6d  %7.3f ms %6d  %8.2f %8.2f\n", poses, best["flexcal"], steps["flexcal"],
-                best["qr"], steps["qr"], best["cholesky"], steps["cholesky"],
-                best["flexcal"] / best["qr"], best["flexcal"] / best["cholesky"]
-            if (cost["flexcal"] > cost["qr"] * (1 + 1e-8)) { print "flexcal stops above: " cost["flexcal"] " " cost["qr"]; exit 1 }
+            for (i = 1; i <= n; ++i) {
+                tool = order[i]
+                above = cost[tool] < 1e99 ? sprintf("%.1e", cost[tool] / least - 1) : "not done"
+                printf "%6d %9d  %-10s %12.3f %14.5f %6d  %s\n", poses, unknowns, tool, best[tool],
+                    best["flexcal"] / best[tool], steps[tool], above
+            }
+            if (cost["flexcal"] > least * (1 + 1e-8)) { print "flexcal stops above the minimum"; exit 1 }
         }'
-done; done
+done

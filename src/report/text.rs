@@ -40,8 +40,9 @@ pub fn why_not_trusted(result: &Identification) -> String {
 
 fn headline(problem: &Problem, result: &Identification) -> String {
     let fitted = &result.fitted;
+    let reason = result.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     format!(
-        "{}\n{} parameters from {} poses, {} poses held out; strategy {}, solver {}\n{} after {} steps, {:.3} s\n",
+        "{}\n{} parameters from {} poses, {} poses held out; strategy {}, solver {}{reason}\n{} after {} steps, {:.3} s\n",
         problem.title,
         result.unknowns.len(),
         fitted.identification.n,

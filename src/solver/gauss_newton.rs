@@ -45,17 +45,9 @@ pub fn minimise_gauss_newton<O: Objective>(
         termination: None,
     });
     let adapter = Adapter { objective, seen };
-    let mut solution = Solution {
-        at_bound: vec![None; start.len()],
-        x: start,
-        cost: f64::INFINITY,
-        termination: Termination::SizeMismatch,
-        iterations: 0,
-        cost_evaluations: 0,
-        linearisations: 0,
-        at_limit: Vec::new(),
-    };
+    let mut solution = Solution::at(start);
     if adapter.objective.parameters() != solution.x.len() {
+        solution.termination = Termination::SizeMismatch;
         return solution;
     }
     let method = GaussNewton::new();

@@ -6,6 +6,7 @@ mod bounded;
 mod bounds;
 mod box_step;
 mod divergence;
+mod execute;
 mod factor;
 mod gauss_newton;
 mod inequalities;

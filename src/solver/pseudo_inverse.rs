@@ -1,12 +1,12 @@
 //! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor scaled.
 
-use argmin::core::{Error, Executor, KV, Problem, Solver, State as _, TerminationReason};
-use argmin::core::{TerminationStatus, observers::Observe, observers::ObserverMode};
+use argmin::core::observers::Observe;
+use argmin::core::{Error, KV, Problem, Solver, State as _, TerminationReason};
 use argmin::kv;
 use nalgebra::DVector;
 
 use super::divergence::Watch;
-use super::run::Silent;
+use super::execute::{Ends, Silent, run};
 use super::spectrum::Spectrum;
 use super::trust_region::take_point;
 use super::{Divergence, Solution, State, Termination};
@@ -82,6 +82,12 @@ impl PseudoInverse {
     }
 }
 
+impl Ends for PseudoInverse {
+    fn end(&self) -> Option<Termination> {
+        self.termination
+    }
+}
+
 /// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁ are dropped.
 ///
 /// R and Qᵀr must be finite.
@@ -137,7 +143,7 @@ pub fn minimise_pseudo_inverse<O: Objective>(
     start: DVector<f64>,
     settings: &PseudoInverseSettings,
 ) -> Solution {
-    run(objective, start, settings, None::<Silent>)
+    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, None::<Silent>)
 }
 
 /// As [`minimise_pseudo_inverse`], telling `observer` of every iteration.
@@ -147,49 +153,5 @@ pub fn minimise_pseudo_inverse_observed<O: Objective>(
     settings: &PseudoInverseSettings,
     observer: impl Observe<State> + 'static,
 ) -> Solution {
-    run(objective, start, settings, Some(observer))
-}
-
-fn run<O: Objective>(
-    objective: O,
-    start: DVector<f64>,
-    settings: &PseudoInverseSettings,
-    observer: Option<impl Observe<State> + 'static>,
-) -> Solution {
-    let mut executor = Executor::new(objective, PseudoInverse::new(*settings))
-        .configure(|state: State| state.param(start.clone()).max_iters(settings.max_iterations))
-        .ctrlc(false)
-        .timer(false);
-    if let Some(observer) = observer {
-        executor = executor.add_observer(observer, ObserverMode::Always);
-    }
-    let mut solution = Solution {
-        at_bound: vec![None; start.len()],
-        x: start,
-        cost: f64::INFINITY,
-        termination: Termination::Interrupted,
-        iterations: 0,
-        cost_evaluations: 0,
-        linearisations: 0,
-        at_limit: Vec::new(),
-    };
-    // The executor fails only when an observer does.
-    let Ok(mut result) = executor.run() else { return solution };
-    solution.linearisations = result.problem.counts.get("linearise_count").copied().unwrap_or(0);
-    solution.iterations = result.state.get_iter();
-    solution.termination = match (result.solver.termination(), result.state.get_termination_status()) {
-        (Some(termination), _) => termination,
-        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => Termination::IterationLimit,
-        (None, _) => Termination::Interrupted,
-    };
-    solution.cost = result.state.get_cost();
-    let mut last = result.state.take_param();
-    if !solution.termination.converged() && result.state.get_best_cost() < solution.cost {
-        solution.cost = result.state.get_best_cost();
-        last = result.state.take_best_param();
-    }
-    if let Some(x) = last {
-        solution.x = x;
-    }
-    solution
+    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, Some(observer))
 }

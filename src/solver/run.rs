@@ -1,10 +1,10 @@
 //! One call from objective and start to solution.
 
-use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, State as _, TerminationReason, TerminationStatus};
+use argmin::core::observers::Observe;
 use nalgebra::DVector;
 
-use super::{AtBound, Bounds, Inequalities, Settings, State, Subproblem, Termination, TrustRegion};
+use super::execute::{Silent, run};
+use super::{AtBound, Bounds, Inequalities, Settings, State, Termination};
 use super::{constrained_levenberg_marquardt, levenberg_marquardt, nearest};
 use crate::fit::Objective;
 
@@ -30,6 +30,20 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Of a run from `start` that has not begun.
+    pub(super) fn at(start: DVector<f64>) -> Self {
+        Self {
+            at_bound: vec![None; start.len()],
+            x: start,
+            cost: f64::INFINITY,
+            termination: Termination::Interrupted,
+            iterations: 0,
+            cost_evaluations: 0,
+            linearisations: 0,
+            at_limit: Vec::new(),
+        }
+    }
+
     /// Evaluations of the residual, with derivatives or without.
     pub fn evaluations(&self) -> u64 {
         self.cost_evaluations + self.linearisations
@@ -75,7 +89,7 @@ impl Solution {
 /// assert!((solution.x[1] - 2.0_f64.ln()).abs() < 1e-9);
 /// ```
 pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
-    run(objective, start, levenberg_marquardt(*settings), settings, None::<Silent>)
+    run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, None::<Silent>)
 }
 
 /// As [`minimise`], telling `observer` of every iteration.
@@ -85,7 +99,7 @@ pub fn minimise_observed<O: Objective>(
     settings: &Settings,
     observer: impl Observe<State> + 'static,
 ) -> Solution {
-    run(objective, start, levenberg_marquardt(*settings), settings, Some(observer))
+    run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, Some(observer))
 }
 
 /// Minimises ½‖r(x)‖² within `bounds` from `start`.
@@ -132,11 +146,6 @@ pub fn minimise_constrained_observed<O: Objective>(
     constrained(objective, start, bounds, rows, settings, Some(observer))
 }
 
-/// An observer that says nothing.
-pub(super) struct Silent;
-
-impl Observe<State> for Silent {}
-
 fn constrained<O: Objective>(
     objective: O,
     start: DVector<f64>,
@@ -148,55 +157,12 @@ fn constrained<O: Objective>(
     let fits = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
     let infeasible = fits && nearest(&start, bounds, rows).is_none();
     let solver = constrained_levenberg_marquardt(bounds.clone(), rows.clone(), *settings);
-    let mut solution = run(objective, start, solver, settings, observer);
+    let mut solution = run(objective, start, solver, settings.max_iterations, observer);
     if infeasible {
         solution.termination = Termination::Infeasible;
     } else if fits {
         solution.at_bound = (0..solution.x.len()).map(|j| bounds.at(&solution.x, j)).collect();
         solution.at_limit = (0..rows.len()).map(|i| rows.at(&solution.x, i)).collect();
-    }
-    solution
-}
-
-fn run<O: Objective, S: Subproblem>(
-    objective: O,
-    start: DVector<f64>,
-    solver: TrustRegion<S>,
-    settings: &Settings,
-    observer: Option<impl Observe<State> + 'static>,
-) -> Solution {
-    let unknowns = start.len();
-    let mut executor = Executor::new(objective, solver)
-        .configure(|state: State| state.param(start.clone()).max_iters(settings.max_iterations))
-        .ctrlc(false)
-        .timer(false);
-    if let Some(observer) = observer {
-        executor = executor.add_observer(observer, ObserverMode::Always);
-    }
-    let mut solution = Solution {
-        x: start,
-        cost: f64::INFINITY,
-        termination: Termination::Interrupted,
-        iterations: 0,
-        cost_evaluations: 0,
-        linearisations: 0,
-        at_bound: vec![None; unknowns],
-        at_limit: Vec::new(),
-    };
-    // The executor fails only when an observer does.
-    let Ok(mut result) = executor.run() else { return solution };
-    let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
-    solution.cost_evaluations = count("cost_count");
-    solution.linearisations = count("linearise_count");
-    solution.iterations = result.state.get_iter();
-    solution.cost = result.state.get_cost();
-    solution.termination = match (result.solver.termination(), result.state.get_termination_status()) {
-        (Some(termination), _) => termination,
-        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => Termination::IterationLimit,
-        (None, _) => Termination::Interrupted,
-    };
-    if let Some(x) = result.state.take_param() {
-        solution.x = x;
     }
     solution
 }

@@ -184,6 +184,7 @@ pub fn identify_model(
         distrust,
         strategy,
         solver,
+        solver_reason: options.solver.reason(model),
         termination: end.termination,
         iterations: end.iterations,
         evaluations: end.evaluations,

@@ -62,6 +62,8 @@ pub struct Identification {
     pub strategy: Strategy,
     /// The solver that was used.
     pub solver: SolverChoice,
+    /// Why that one, where `auto` chose it.
+    pub solver_reason: Option<&'static str>,
     /// Why it stopped.
     pub termination: Termination,
     /// Why the fit is not to be trusted, if it is not.

@@ -22,7 +22,7 @@ pub enum Strategy {
 /// A solver by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SolverChoice {
-    /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise.
+    /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise; `docs/solvers.md` says why.
     #[default]
     Auto,
     /// Levenberg–Marquardt without bounds.
@@ -87,6 +87,15 @@ impl SolverChoice {
             Self::Auto if model.is_bounded() => Self::Bounded,
             Self::Auto => Self::LevenbergMarquardt,
             chosen => chosen,
+        }
+    }
+
+    /// Why [`decide`](Self::decide) takes what it takes, where the choice is left to it.
+    pub fn reason(self, model: &Model) -> Option<&'static str> {
+        match self {
+            Self::Auto if model.is_bounded() => Some("bounds to keep"),
+            Self::Auto => Some("no bounds"),
+            _ => None,
         }
     }
 }

@@ -1,52 +1,6 @@
-//! What several tests share: residual functions written once, generic over the scalar, as problems with exact
-//! derivatives; arms and measurements that the model itself makes.
+//! What several tests share: arms and measurements that the model itself makes.
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 pub mod arms;
 pub mod made;
-
-use std::ops::Range;
-
-use flexcal::fit::{Block, LeastSquares};
-use nalgebra::DVector;
-use num_dual::Dual64;
-
-/// A residual function of a few unknowns, evaluated as one item.
-pub struct Analytic {
-    pub unknowns: usize,
-    pub rows: usize,
-    pub value: fn(&[f64]) -> Vec<f64>,
-    pub dual: fn(&[Dual64]) -> Vec<Dual64>,
-}
-
-impl LeastSquares for Analytic {
-    fn parameters(&self) -> usize {
-        self.unknowns
-    }
-
-    fn items(&self) -> usize {
-        1
-    }
-
-    fn rows_per_item(&self) -> usize {
-        self.rows
-    }
-
-    fn residuals(&self, x: &DVector<f64>, _items: Range<usize>, out: &mut [f64]) {
-        out.copy_from_slice(&(self.value)(x.as_slice()));
-    }
-
-    fn linearise(&self, x: &DVector<f64>, _items: Range<usize>, block: &mut Block) {
-        let n = x.len();
-        block.column_mut(n).copy_from_slice(&(self.value)(x.as_slice()));
-        let mut dual: Vec<Dual64> = x.iter().map(|&x| Dual64::from(x)).collect();
-        for j in 0..n {
-            dual[j] = dual[j].derivative();
-            for (out, row) in block.column_mut(j).iter_mut().zip((self.dual)(&dual)) {
-                *out = row.eps;
-            }
-            dual[j] = Dual64::from(x[j]);
-        }
-    }
-}

@@ -5,8 +5,8 @@ use flexcal::solver::{AtBound, Bounds, Settings, Termination, minimise, minimise
 use nalgebra::DVector;
 use num_dual::Dual64;
 
-use crate::common::Analytic;
-use crate::functions as f;
+use crate::collections::Analytic;
+use crate::collections::functions as f;
 
 macro_rules! analytic {
     ($function:ident, $unknowns:expr, $rows:expr) => {

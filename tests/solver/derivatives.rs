@@ -6,8 +6,8 @@ use flexcal::fit::{Block, LeastSquares, check_jacobian};
 use nalgebra::DVector;
 use num_dual::Dual64;
 
-use crate::common::Analytic;
-use crate::functions as f;
+use crate::collections::Analytic;
+use crate::collections::functions as f;
 
 /// Scales one column of the derivatives.
 struct Planted<P> {

@@ -170,11 +170,11 @@ fn an_observer_sees_every_iteration_and_may_stop() {
     let start = DVector::from_element(1, 3.0);
     let solution = minimise_observed(Fit::new(&Logarithm), start, &Settings::default(), Watch(seen.clone()));
     assert_eq!(seen.load(std::sync::atomic::Ordering::Relaxed), solution.iterations);
-    let problem = crate::common::Analytic {
+    let problem = crate::collections::Analytic {
         unknowns: 2,
         rows: 2,
-        value: crate::functions::rosenbrock::<f64>,
-        dual: crate::functions::rosenbrock::<num_dual::Dual64>,
+        value: crate::collections::functions::rosenbrock::<f64>,
+        dual: crate::collections::functions::rosenbrock::<num_dual::Dual64>,
     };
     let start = DVector::from_vec(vec![-1.2, 1.0]);
     let solution = minimise_observed(Fit::new(&problem), start, &Settings::default(), Watch(seen));

@@ -7,8 +7,8 @@ use flexcal::solver::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-use crate::common::Analytic;
-use crate::functions as f;
+use crate::collections::Analytic;
+use crate::collections::functions as f;
 
 const FREE: f64 = f64::INFINITY;
 

@@ -1,4 +1,4 @@
-// The fit of benches/fit.rs by Ceres with automatic differentiation: 25 parameters of a rigid UR10.
+// The fit of benches/fit.rs by Ceres with automatic differentiation: a rigid UR10, its 25 identifiable parameters or all 33.
 //
 //   fit <csv> <qr|cholesky> <repeats>
 //
@@ -21,7 +21,6 @@
 
 namespace {
 
-constexpr int kUnknowns = 25;
 constexpr int kJoints = 6;
 constexpr int kScalars = 5 * kJoints + 3;  // alpha, a, theta, d, beta of each joint; target
 
@@ -80,6 +79,40 @@ std::vector<double> Numbers(const std::string& line) {
   return out;
 }
 
+// Fits `arm` to the poses that the rest of the file holds.
+template <int kUnknowns>
+int Fit(const Arm& arm, std::ifstream& file, const std::string& linear_solver, int repeats) {
+  double x[kUnknowns] = {};
+  ceres::Problem problem;
+  for (std::string line; std::getline(file, line);) {
+    const auto row = Numbers(line);
+    auto* residual = new Residual{arm, {}, {}};
+    std::copy_n(row.begin(), kJoints, residual->q.begin());
+    std::copy_n(row.begin() + kJoints, 3, residual->measured.begin());
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residual, 3, kUnknowns>(residual), nullptr, x);
+  }
+
+  ceres::Solver::Options options;
+  options.linear_solver_type = linear_solver == "qr" ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
+  options.num_threads = 1;
+  options.function_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-10;
+  options.gradient_tolerance = 1e-10;
+  options.logging_type = ceres::SILENT;
+  std::vector<double> times;
+  ceres::Solver::Summary summary;
+  for (int k = 0; k < std::max(1, repeats); ++k) {
+    std::fill_n(x, kUnknowns, 0.0);
+    const auto begin = std::chrono::steady_clock::now();
+    ceres::Solve(options, &problem, &summary);
+    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+  }
+  std::sort(times.begin(), times.end());
+  std::printf("%.4f %.9e %d\n", times[times.size() / 2], summary.final_cost,
+              static_cast<int>(summary.iterations.size()) - 1);
+  return summary.IsSolutionUsable() ? 0 : 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -100,38 +133,8 @@ int main(int argc, char** argv) {
   arm.unknown.fill(-1);
   int next = 0;
   for (double k : Numbers(line)) arm.unknown[static_cast<int>(k)] = next++;
-  if (nominal.size() != kScalars || next != kUnknowns) {
-    std::fprintf(stderr, "%s: not the arm that this program is built for\n", argv[1]);
-    return 2;
-  }
-
-  double x[kUnknowns] = {};
-  ceres::Problem problem;
-  while (std::getline(file, line)) {
-    const auto row = Numbers(line);
-    auto* residual = new Residual{arm, {}, {}};
-    std::copy_n(row.begin(), kJoints, residual->q.begin());
-    std::copy_n(row.begin() + kJoints, 3, residual->measured.begin());
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residual, 3, kUnknowns>(residual), nullptr, x);
-  }
-
-  ceres::Solver::Options options;
-  options.linear_solver_type = std::string(argv[2]) == "qr" ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
-  options.num_threads = 1;
-  options.function_tolerance = 1e-12;
-  options.parameter_tolerance = 1e-10;
-  options.gradient_tolerance = 1e-10;
-  options.logging_type = ceres::SILENT;
-  std::vector<double> times;
-  ceres::Solver::Summary summary;
-  for (int k = 0; k < std::max(1, std::atoi(argv[3])); ++k) {
-    std::fill_n(x, kUnknowns, 0.0);
-    const auto begin = std::chrono::steady_clock::now();
-    ceres::Solve(options, &problem, &summary);
-    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-  }
-  std::sort(times.begin(), times.end());
-  std::printf("%.4f %.9e %d\n", times[times.size() / 2], summary.final_cost,
-              static_cast<int>(summary.iterations.size()) - 1);
-  return summary.IsSolutionUsable() ? 0 : 1;
+  if (nominal.size() == kScalars && next == 25) return Fit<25>(arm, file, argv[2], std::atoi(argv[3]));
+  if (nominal.size() == kScalars && next == 33) return Fit<33>(arm, file, argv[2], std::atoi(argv[3]));
+  std::fprintf(stderr, "%s: not the arm that this program is built for\n", argv[1]);
+  return 2;
 }

@@ -1,0 +1,133 @@
+//! The arms: a rigid UR10, and the lunar sampler bending under its loads.
+
+use flexcal::fit::{LeastSquares, LinearRows};
+use flexcal::measurement::{Measurements, Split};
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::problem::Problem;
+use flexcal::solver::Bounds;
+use flexcal::study::Placement;
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::case::{Case, Class};
+use crate::common::file;
+use crate::common::ur10::Ur10;
+use crate::made;
+
+/// Errors of the arm, and bounds of its parameters [σ of the prior]: priors are wider than errors.
+const ERRORS: f64 = 0.3;
+/// How far a far start is from the truth [σ of the prior], and how many there are.
+const FAR: f64 = 5.0;
+const FAR_STARTS: usize = 3;
+
+/// Every arm with its poses.
+pub struct Arms {
+    ur10: [Ur10; 3],
+    pub lunar: [Lunar; 2],
+}
+
+/// The lunar sampler with errors drawn as wide as a part of its priors, as it would be measured.
+pub struct Lunar {
+    pub problem: Problem,
+    pub measurements: Measurements,
+    pub split: Split,
+    model: Model,
+    placement: Placement,
+    truth: DVector<f64>,
+    /// Points [`FAR`] away from the truth.
+    far: Vec<DVector<f64>>,
+}
+
+impl Arms {
+    pub fn new() -> Self {
+        Self { ur10: [100, 1000, 10_000].map(Ur10::new), lunar: [28, 200].map(Lunar::new) }
+    }
+
+    pub fn cases(&self) -> Vec<Case<'_>> {
+        let mut cases = Vec::new();
+        for ur10 in &self.ur10 {
+            for (class, unknowns) in [(Class::Identifiable, &ur10.identifiable), (Class::Redundant, &ur10.geometric)] {
+                let residuals = ur10.residuals(unknowns);
+                cases.push(Case {
+                    class,
+                    name: format!("UR10, {} parameters, {} poses", unknowns.len(), ur10.configurations.len()),
+                    start: DVector::zeros(residuals.parameters()),
+                    data: Box::new(residuals),
+                    priors: None,
+                    bounds: None,
+                    minima: Vec::new(),
+                    accuracy: 0.0,
+                });
+            }
+        }
+        for lunar in &self.lunar {
+            let nominal = DVector::zeros(lunar.truth.len());
+            let sigmas = lunar.sigmas();
+            let bounds = Bounds::new(-ERRORS * &sigmas, ERRORS * sigmas).unwrap();
+            cases.push(lunar.case(Class::Elastic, "nominal start", nominal.clone(), None));
+            for (k, far) in lunar.far.iter().enumerate() {
+                cases.push(lunar.case(Class::Elastic, &format!("far start {}", k + 1), far.clone(), None));
+            }
+            cases.push(lunar.case(Class::Bounded, "nominal start", nominal, Some(bounds.clone())));
+            cases.push(lunar.case(Class::Bounded, "far start 1", lunar.far[0].clone(), Some(bounds)));
+        }
+        cases
+    }
+}
+
+impl Lunar {
+    fn new(poses: usize) -> Self {
+        let problem = Problem::read(&file("problems/lunar-sampler/problem.toml")).unwrap();
+        let mut random = ChaCha8Rng::seed_from_u64(2025);
+        let mut measurements = made::at_random(&problem, poses, 1.5, &mut random);
+        let model = made::model_of(&problem, &measurements);
+        let truth = ERRORS * made::draw(&model, |_| 0.0, &mut random);
+        made::measure(&problem, &mut measurements, &truth, problem.data.position_sigma.unwrap(), &mut random);
+        let mut lunar = Self {
+            split: made::split_at(poses, &measurements),
+            placement: Placement::of(&measurements),
+            far: Vec::new(),
+            problem,
+            measurements,
+            model,
+            truth,
+        };
+        let sigmas = lunar.sigmas();
+        let mut far =
+            || &lunar.truth + sigmas.map(|sigma| if random.random_bool(0.5) { FAR * sigma } else { -FAR * sigma });
+        lunar.far = (0..FAR_STARTS).map(|_| far()).collect();
+        lunar
+    }
+
+    pub fn name(&self) -> String {
+        format!("lunar sampler, {} poses", self.measurements.len())
+    }
+
+    fn sigmas(&self) -> DVector<f64> {
+        DVector::from_iterator(self.truth.len(), self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap()))
+    }
+
+    fn residuals(&self) -> PoseResiduals<'_> {
+        let n = self.truth.len();
+        let sigma = self.problem.data.position_sigma.unwrap();
+        let poses = self.placement.poses(&self.measurements, &self.split.identification, sigma);
+        PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
+    }
+
+    /// All parameters with their priors.
+    pub fn case(&self, class: Class, start_name: &str, start: DVector<f64>, bounds: Option<Bounds>) -> Case<'_> {
+        let n = self.truth.len();
+        let matrix = DMatrix::from_diagonal(&self.sigmas().map(f64::recip));
+        Case {
+            class,
+            name: format!("{}, {start_name}", self.name()),
+            data: Box::new(self.residuals()),
+            priors: Some(LinearRows { matrix, constant: DVector::zeros(n) }),
+            start,
+            bounds,
+            minima: Vec::new(),
+            accuracy: 0.0,
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The problems, and the classes that they belong to.
+
+use std::time::Duration;
+
+use flexcal::fit::{Fit, LeastSquares, LinearRows, Objective as _};
+use flexcal::solver::{Bounds, Settings};
+use nalgebra::DVector;
+
+use crate::collections::{more_garbow_hillstrom, nist};
+use crate::watched::Watched;
+
+/// Kinds of problem; the table has a section for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    Identifiable,
+    Redundant,
+    Elastic,
+    Bounded,
+    Sequential,
+    Nist,
+    MoreGarbowHillstrom,
+}
+
+impl Class {
+    pub const EACH: [Self; 7] = [
+        Self::Identifiable,
+        Self::Redundant,
+        Self::Elastic,
+        Self::Bounded,
+        Self::Sequential,
+        Self::Nist,
+        Self::MoreGarbowHillstrom,
+    ];
+
+    /// Heading of its section, which `tests/auto_solver.rs` reads.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Identifiable => "rigid, identifiable",
+            Self::Redundant => "rigid, redundant",
+            Self::Elastic => "elastic",
+            Self::Bounded => "bounded",
+            Self::Sequential => "sequential",
+            Self::Nist => "NIST",
+            Self::MoreGarbowHillstrom => "Moré–Garbow–Hillstrom",
+        }
+    }
+
+    /// What its problems are, in a sentence or two.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Identifiable => {
+                "UR10, the 25 geometric parameters that positions identify, from nominal values; positions with 0.05 mm noise."
+            }
+            Self::Redundant => {
+                "The same with all 33 geometric parameters, 8 of them redundant: the Jacobian is rank-deficient at every point."
+            }
+            Self::Elastic => {
+                "Lunar sampler, loads on the bent arm, all 32 parameters with their priors, from nominal values (errors are \
+                 drawn from 0.3 of the priors) and from 5 σ of the prior off the true value of every parameter, up or down at random."
+            }
+            Self::Bounded => {
+                "The same within bounds as wide as 1 σ of the true errors: a third of the true values lie beyond. What ends \
+                 outside the bounds has not reached the optimum."
+            }
+            Self::Sequential => {
+                "Lunar sampler by the strategy `sequential`: stiffness, then geometry, repeated until it settles. Only solvers \
+                 of `identify --solver` take part; time is that of `identify`, evaluations of residual and Jacobian are \
+                 counted together, and the optimum is that of the joint fit, to 1e-4: the strategy stops when a sweep gains less than 1e-6."
+            }
+            Self::Nist => {
+                "The eight problems of higher difficulty of the NIST Statistical Reference Datasets, from both starts; the optimum \
+                 is the certified one. Tolerances as tight as each solver can."
+            }
+            Self::MoreGarbowHillstrom => {
+                "The least-squares problems of Moré, Garbow & Hillstrom (1981) from their standard starts; any listed minimum \
+                 counts. Tolerances as tight as each solver can."
+            }
+        }
+    }
+}
+
+/// A least-squares problem with a start.
+pub struct Case<'a> {
+    pub class: Class,
+    pub name: String,
+    pub data: Box<dyn LeastSquares + 'a>,
+    pub priors: Option<LinearRows>,
+    pub start: DVector<f64>,
+    pub bounds: Option<Bounds>,
+    /// ½‖r‖² at known minima; empty where the best that any solver finds has to do.
+    pub minima: Vec<f64>,
+    /// Relative accuracy of the known minima.
+    pub accuracy: f64,
+}
+
+impl Case<'_> {
+    /// How exactly all solvers are asked to converge.
+    pub fn settings(&self) -> Settings {
+        match self.class {
+            Class::Nist | Class::MoreGarbowHillstrom => Settings {
+                gradient_tolerance: 1e-14,
+                cost_tolerance: 1e-15,
+                step_tolerance: 1e-14,
+                max_iterations: 3000,
+                ..Settings::default()
+            },
+            _ => Settings::default(),
+        }
+    }
+
+    /// Time allowed to one run.
+    pub fn limit(&self) -> Duration {
+        match self.class {
+            Class::Nist | Class::MoreGarbowHillstrom => Duration::from_secs(1),
+            _ => Duration::from_secs(20),
+        }
+    }
+
+    /// `data`, which may be the case's own or one that watches it, with the priors.
+    pub fn fit<'b, P: LeastSquares>(&self, data: &'b P) -> Fit<'b, P> {
+        let fit = Fit::new(data);
+        match &self.priors {
+            Some(priors) => fit.with_rows(priors.clone()).unwrap(),
+            None => fit,
+        }
+    }
+
+    /// ½‖r(x)‖², infinite outside the bounds.
+    pub fn cost(&self, x: &DVector<f64>) -> f64 {
+        let inside = |bounds: &Bounds| {
+            let kept = |j| (bounds.lower()[j]..=bounds.upper()[j]).contains(&x[j]);
+            (0..x.len()).all(kept)
+        };
+        if !self.bounds.as_ref().is_none_or(inside) {
+            return f64::INFINITY;
+        }
+        self.fit(&Watched::new(self.data.as_ref(), self.limit())).cost(x)
+    }
+}
+
+/// NIST StRD of higher difficulty, and Moré–Garbow–Hillstrom.
+pub fn collections() -> Vec<Case<'static>> {
+    let mut cases = Vec::new();
+    for start in 0..2 {
+        for dataset in nist::datasets().into_iter().filter(|dataset| nist::HIGHER_DIFFICULTY.contains(&dataset.name)) {
+            cases.push(Case {
+                class: Class::Nist,
+                name: format!("{}, start {}", dataset.name, start + 1),
+                priors: None,
+                start: dataset.starts[start].clone(),
+                bounds: None,
+                minima: vec![0.5 * dataset.rss],
+                accuracy: 1e-9,
+                data: Box::new(dataset),
+            });
+        }
+    }
+    for problem in more_garbow_hillstrom::problems() {
+        cases.push(Case {
+            class: Class::MoreGarbowHillstrom,
+            name: problem.name.to_owned(),
+            data: Box::new(problem.analytic),
+            priors: None,
+            start: DVector::from_vec(problem.start),
+            bounds: None,
+            minima: problem.minima.iter().map(|squares| 0.5 * squares).collect(),
+            accuracy: 1e-5,
+        });
+    }
+    cases.sort_by(|a, b| (a.class, a.name.as_str()).cmp(&(b.class, b.name.as_str())));
+    cases
+}

@@ -1,0 +1,126 @@
+//! The solvers, each as it would be called.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use flexcal::fit::LeastSquares as _;
+use flexcal::solver::{
+    Bounds, GaussNewtonSettings, PseudoInverseSettings, Solution, minimise, minimise_bounded, minimise_gauss_newton,
+    minimise_pseudo_inverse,
+};
+use nalgebra::DVector;
+
+use crate::case::Case;
+use crate::common::minpack::Minpack;
+use crate::smooth::{lbfgs, trust_region};
+use crate::watched::Watched;
+
+/// A solver; names of those that `identify --solver` offers are theirs there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    LevenbergMarquardt,
+    Bounded,
+    GaussNewton,
+    PseudoInverse,
+    TrustRegion,
+    Lbfgs,
+    Minpack,
+}
+
+/// What a solver left behind.
+pub struct Run {
+    /// ½‖r‖² by the problem itself; infinite outside the bounds.
+    pub cost: f64,
+    /// Steps tried.
+    pub iterations: u64,
+    pub residuals: usize,
+    pub jacobians: usize,
+    pub seconds: f64,
+    /// Why it ended, unless it says that it has converged.
+    pub complaint: Option<String>,
+}
+
+/// Where a solver ended, by its own word.
+pub struct End {
+    pub x: DVector<f64>,
+    pub iterations: u64,
+    pub complaint: Option<String>,
+}
+
+impl From<Solution> for End {
+    fn from(solution: Solution) -> Self {
+        let Solution { x, iterations, termination, .. } = solution;
+        Self { x, iterations, complaint: (!termination.converged()).then(|| termination.as_str().to_owned()) }
+    }
+}
+
+impl Method {
+    pub const EACH: [Self; 7] = [
+        Self::LevenbergMarquardt,
+        Self::Bounded,
+        Self::GaussNewton,
+        Self::PseudoInverse,
+        Self::TrustRegion,
+        Self::Lbfgs,
+        Self::Minpack,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LevenbergMarquardt => "levenberg-marquardt",
+            Self::Bounded => "bounded",
+            Self::GaussNewton => "gauss-newton",
+            Self::PseudoInverse => "pseudo-inverse",
+            Self::TrustRegion => "argmin trust region",
+            Self::Lbfgs => "argmin L-BFGS",
+            Self::Minpack => "MINPACK port",
+        }
+    }
+
+    /// Solves from the start; a solver that panics gives up where it began.
+    pub fn run(self, case: &Case) -> Run {
+        let watched = Watched::new(case.data.as_ref(), case.limit());
+        let begin = Instant::now();
+        let end = catch_unwind(AssertUnwindSafe(|| self.end(case, &watched)));
+        let seconds = begin.elapsed().as_secs_f64();
+        let start = case.start.clone();
+        let End { x, iterations, complaint } =
+            end.unwrap_or_else(|_| End { x: start, iterations: 0, complaint: Some("it panics".to_owned()) });
+        let (residuals, jacobians) = watched.evaluations();
+        let late = watched.is_late().then(|| format!("not done within {} s", case.limit().as_secs()));
+        Run { cost: case.cost(&x), iterations, residuals, jacobians, seconds, complaint: late.or(complaint) }
+    }
+
+    fn end(self, case: &Case, data: &Watched) -> End {
+        let (start, settings) = (case.start.clone(), case.settings());
+        let fit = case.fit(data);
+        match self {
+            Self::LevenbergMarquardt => minimise(fit, start, &settings).into(),
+            Self::Bounded => {
+                let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
+                minimise_bounded(fit, start, &bounds, &settings).into()
+            }
+            Self::GaussNewton => {
+                let tolerance = settings.cost_tolerance.sqrt().min(GaussNewtonSettings::default().tolerance);
+                let settings =
+                    GaussNewtonSettings { tolerance, max_iterations: settings.max_iterations, ..Default::default() };
+                minimise_gauss_newton(fit, start, &settings).into()
+            }
+            Self::PseudoInverse => {
+                let settings = PseudoInverseSettings {
+                    step_tolerance: settings.step_tolerance,
+                    max_iterations: settings.max_iterations,
+                    ..PseudoInverseSettings::default()
+                };
+                minimise_pseudo_inverse(fit, start, &settings).into()
+            }
+            Self::TrustRegion => trust_region(fit, &start, &settings),
+            Self::Lbfgs => lbfgs(fit, &start, &settings),
+            Self::Minpack => {
+                let (x, report) = Minpack::new(data, start).with_rows(case.priors.as_ref()).solve(&settings);
+                let complaint = (!report.termination.was_successful()).then(|| format!("{:?}", report.termination));
+                End { x, iterations: report.number_of_evaluations.saturating_sub(1) as u64, complaint }
+            }
+        }
+    }
+}

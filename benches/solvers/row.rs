@@ -1,0 +1,134 @@
+//! What the table says of a solver on a problem.
+
+use std::time::Instant;
+
+use flexcal::study::{Options, SolverChoice, Strategy, identify};
+use nalgebra::DVector;
+
+use crate::arms::Lunar;
+use crate::case::{Case, Class};
+use crate::method::{Method, Run};
+
+/// The optimum is reached at no more than this part above the best known ½‖r‖².
+const REACHED: f64 = 1e-8;
+/// The same for a strategy that stops when a sweep gains less than 1e-6.
+const SETTLED: f64 = 1e-4;
+/// ½‖r‖² that counts as zero for residuals of order one.
+const ZERO: f64 = 5e-15;
+/// Time for the repetitions of a solver on a problem [s], and how many there may be.
+const BUDGET: f64 = 0.3;
+const REPETITIONS: usize = 201;
+
+/// A solver on a problem.
+pub struct Row {
+    pub class: Class,
+    pub problem: String,
+    pub solver: &'static str,
+    /// Or why not.
+    pub reached: Result<(), String>,
+    /// What the solver said of its end, unless that it has converged.
+    pub complaint: Option<String>,
+    pub iterations: u64,
+    pub residuals: usize,
+    /// `None` where they are counted with the residuals.
+    pub jacobians: Option<usize>,
+    /// Median [s].
+    pub seconds: f64,
+}
+
+/// Every solver on `case`, repeated in turn.
+pub fn measure(case: &Case) -> Vec<Row> {
+    let (runs, seconds) = repeated(Method::EACH.len(), |k| Method::EACH[k].run(case), |run| run.seconds);
+    let found = || runs.iter().map(|run| run.cost);
+    let best = |listed: f64| {
+        let near = found().filter(|cost| (cost / listed - 1.0).abs() <= case.accuracy);
+        near.reduce(f64::min).unwrap_or(listed)
+    };
+    // What is listed to a few digits is made precise by those that come to it.
+    let optima: Vec<f64> = match case.minima[..] {
+        [] => vec![found().fold(f64::INFINITY, f64::min)],
+        _ => case.minima.iter().map(|&listed| if listed == 0.0 { 0.0 } else { best(listed) }).collect(),
+    };
+    let row = |((run, seconds), method): ((&Run, f64), Method)| Row {
+        class: case.class,
+        problem: case.name.clone(),
+        solver: method.name(),
+        reached: reached(run, &optima, case),
+        complaint: run.complaint.clone(),
+        iterations: run.iterations,
+        residuals: run.residuals,
+        jacobians: Some(run.jacobians),
+        seconds,
+    };
+    runs.iter().zip(seconds).zip(Method::EACH).map(row).collect()
+}
+
+fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
+    if optima.iter().any(|&best| run.cost <= best * (1.0 + REACHED) + ZERO * f64::from(best == 0.0)) {
+        return Ok(());
+    }
+    let best = optima.iter().copied().fold(f64::INFINITY, f64::min);
+    let start = case.cost(&case.start);
+    Err(if run.cost.is_infinite() && case.bounds.is_some() {
+        "outside the bounds".to_owned()
+    } else if !run.cost.is_finite() {
+        "outside the domain".to_owned()
+    } else if run.cost >= start {
+        "no better than the start".to_owned()
+    } else if best == 0.0 {
+        format!("cost {:.1e} instead of 0", run.cost)
+    } else {
+        format!("cost {:.1e} of the optimum above it", run.cost / best - 1.0)
+    })
+}
+
+/// The strategy `sequential` with every solver that it may use.
+pub fn sequential(arm: &Lunar) -> Vec<Row> {
+    let whole = arm.case(Class::Sequential, "", DVector::zeros(0), None);
+    let joint = Options::default();
+    let cost = |options: &Options| {
+        let begin = Instant::now();
+        let found = identify(&arm.problem, &arm.measurements, &arm.split, options).unwrap();
+        let seconds = begin.elapsed().as_secs_f64();
+        (whole.cost(&found.x), found, seconds)
+    };
+    let (best, ..) = cost(&joint);
+    let each = SolverChoice::EACH;
+    let solve = |k: usize| cost(&Options { strategy: Strategy::Sequential, solver: each[k], ..Options::default() });
+    let (runs, seconds) = repeated(each.len(), solve, |run| run.2);
+    let row = |((run, seconds), solver): ((&(f64, flexcal::study::Identification, f64), f64), SolverChoice)| {
+        let (cost, found, _) = run;
+        let gap = cost / best - 1.0;
+        Row {
+            class: Class::Sequential,
+            problem: arm.name(),
+            solver: solver.as_str(),
+            reached: if gap <= SETTLED { Ok(()) } else { Err(format!("cost {gap:.1e} of the optimum above it")) },
+            complaint: (!found.termination.converged()).then(|| found.termination.as_str().to_owned()),
+            iterations: found.iterations,
+            residuals: usize::try_from(found.evaluations).unwrap(),
+            jacobians: None,
+            seconds,
+        }
+    };
+    runs.iter().zip(seconds).zip(each).map(row).collect()
+}
+
+/// The first run of each of `count` solvers, and the median time of its repetitions, which are taken in turn.
+fn repeated<T>(count: usize, mut run: impl FnMut(usize) -> T, time: impl Fn(&T) -> f64) -> (Vec<T>, Vec<f64>) {
+    let first: Vec<T> = (0..count).map(&mut run).collect();
+    let mut times: Vec<Vec<f64>> = first.iter().map(|run| vec![time(run)]).collect();
+    let wanted = |times: &[f64]| (BUDGET / times[0]).clamp(1.0, REPETITIONS as f64);
+    for round in 1..REPETITIONS {
+        for (k, times) in times.iter_mut().enumerate() {
+            if (round as f64) < wanted(times) {
+                times.push(time(&run(k)));
+            }
+        }
+    }
+    let median = |mut times: Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
+    (first, times.into_iter().map(median).collect())
+}

@@ -1,0 +1,73 @@
+//! A problem that counts how often it is evaluated, and ends when its time is up.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use flexcal::fit::{Block, LeastSquares};
+use nalgebra::DVector;
+
+/// The problem itself while there is time; after that no point lies in its domain, which ends any solver.
+pub struct Watched<'a> {
+    problem: &'a dyn LeastSquares,
+    deadline: Instant,
+    late: AtomicBool,
+    /// Items whose residuals were evaluated without and with derivatives.
+    items: [AtomicUsize; 2],
+}
+
+impl<'a> Watched<'a> {
+    pub fn new(problem: &'a dyn LeastSquares, limit: Duration) -> Self {
+        Self { problem, deadline: Instant::now() + limit, late: AtomicBool::new(false), items: Default::default() }
+    }
+
+    /// Evaluations of the whole residual alone, and of residual and Jacobian.
+    pub fn evaluations(&self) -> (usize, usize) {
+        let count = |k: usize| self.items[k].load(Relaxed) / self.problem.items();
+        (count(0), count(1))
+    }
+
+    /// Whether the time was up before the solver came to its end.
+    pub fn is_late(&self) -> bool {
+        self.late.load(Relaxed)
+    }
+
+    fn count(&self, k: usize, items: usize) -> bool {
+        self.items[k].fetch_add(items, Relaxed);
+        let late = Instant::now() > self.deadline;
+        if late {
+            self.late.store(true, Relaxed);
+        }
+        late
+    }
+}
+
+impl LeastSquares for Watched<'_> {
+    fn parameters(&self) -> usize {
+        self.problem.parameters()
+    }
+
+    fn items(&self) -> usize {
+        self.problem.items()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        self.problem.rows_per_item()
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        if self.count(0, items.len()) {
+            out.fill(f64::NAN);
+        } else {
+            self.problem.residuals(x, items, out);
+        }
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        if self.count(1, items.len()) {
+            block.values_mut().fill(f64::NAN);
+        } else {
+            self.problem.linearise(x, items, block);
+        }
+    }
+}
