@@ -43,8 +43,8 @@ impl Pair {
         Ok(Self { effects: pair.map(|declared| declared.effect), plain: problem.clone(), declared })
     }
 
-    /// D_s of the effects' parameters: small where each is known well beside the other and everything else. Where a mass is,
-    /// and what else has no size, does not count.
+    /// The errors of the effects' parameters, each beside the other effect and everything else that is free: an effect whose
+    /// own part is known so well is told from the other. Where a mass is, and what else has no size, does not count.
     ///
     /// # Errors
     /// As for [`Site::new`], or rules of `[parameters]` fix both effects.
@@ -58,7 +58,7 @@ impl Pair {
         if columns.is_empty() {
             return Err(DesignError::NothingFree { file: self.declared.data.location.file.clone() });
         }
-        Ok(Criterion::Subset(columns))
+        Ok(Criterion::Each(columns))
     }
 
     fn told(&self, poses: &Measurements) -> Result<Separation, DesignError> {

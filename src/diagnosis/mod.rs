@@ -25,5 +25,5 @@ pub use checks::{Check, Driver, Findings, Outcome, Remainder, Sequence, Test, Un
 pub use closing::{Closure, Found, Interval, Step, Verdict, close};
 pub use detection::{Detectable, Detection, Size, detectable};
 pub use separation::{Separation, Side, separation};
-pub use tracing::{Ranked, Trace, trace};
+pub use tracing::{Ranked, Trace, examine, trace};
 pub use unexplained::{Correction, Unexplained};

@@ -101,7 +101,7 @@ pub(super) fn text(detection: &Detection) -> String {
         blocks.push(Block::Text(format!("Not with these poses, even at the size of their prior: {}.", list(hidden))));
     }
     let groups = effect::grouped(detection.untestable.iter().cloned());
-    blocks.extend((!groups.is_empty()).then(|| Block::Text("Not with measurements of this kind:".to_owned())));
+    blocks.extend((!groups.is_empty()).then(|| Block::heading("Not with measurements of this kind")));
     blocks
         .extend((!groups.is_empty()).then(|| Block::list(groups.iter().map(|(words, why)| format!("{words}: {why}")))));
     to_text(&blocks)
