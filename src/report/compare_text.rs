@@ -15,7 +15,9 @@ const TABLE_3: [&str; 8] =
 
 /// Columns of the rows of a comparison, after the first.
 pub(super) const ROWS: [&str; 9] =
-    ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", "ms", "condition", "termination"];
+    ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", TIME, "condition", "termination"];
+/// The one that differs from run to run.
+pub(super) const TIME: &str = "ms";
 
 /// A comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {

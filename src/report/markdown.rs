@@ -1,6 +1,6 @@
 //! `report.md` of `identify` and `compare`.
 
-use super::compare_text::{ROWS, ablation_rows, strategy_rows};
+use super::compare_text::{ROWS, TIME, ablation_rows, strategy_rows};
 use super::document::{Block, Table, to_markdown};
 use super::findings;
 use super::parameters::{HEADER, LEFT, blind_text, correlation_text, parameter_rows};
@@ -20,9 +20,15 @@ pub fn identification_markdown(problem: &Problem, found: &Identification, findin
 /// A comparison as Markdown, ending in a line break.
 pub fn comparison_markdown(problem: &Problem, comparison: &Comparison, findings: &Findings) -> String {
     let joint = &comparison.joint;
-    let side_by_side = |first: &'static str, rows| {
-        let header = std::iter::once(first).chain(ROWS).collect();
-        Block::Table(Table { header, rows, left: vec![0, 1, 9] })
+    // Without the time taken: the same input gives the same page.
+    let side_by_side = |first: &'static str, mut rows: Vec<Vec<String>>| {
+        let mut header: Vec<&str> = std::iter::once(first).chain(ROWS).collect();
+        let time = header.iter().position(|name| *name == TIME);
+        if let Some(time) = time {
+            header.remove(time);
+            rows.iter_mut().for_each(|row| _ = row.remove(time));
+        }
+        Block::Table(Table { header, rows, left: vec![0, 1, 8] })
     };
     let mut blocks = vec![
         Block::Text(counts(joint)),
