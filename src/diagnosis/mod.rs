@@ -1,6 +1,6 @@
 //! What a fit's residual says about effects that the model lacks, and the loop that adds them.
 //!
-//! - [`checks`]: whether structure is left at all.
+//! - [`check`]: whether structure is left at all.
 //! - `trace`: every candidate of the catalogue scored in the linear neighbourhood of a fit; [`trace()`] ranks them.
 //! - [`detectable`]: the same scan before anything is measured: from what size on it would find each effect.
 //! - `closing`: rounds of fit, trace, add, test again; [`close`] tells the whole story.

@@ -1,7 +1,7 @@
 //! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
 //!
-//! - [`states`]: the arm before, with geometry alone, with elasticity, after the loop, and its errors on held-out poses.
-//! - [`correlations`]: the whole matrix. [`cause`]: the residual against what drives a found effect. [`trend`]: the same for
+//! - `states`: the arm before, with geometry alone, with elasticity, after the loop, and its errors on held-out poses.
+//! - `correlations`: the whole matrix. `cause`: the residual against what drives a found effect. `trend`: the same for
 //!   structure that no effect explains.
 
 mod cause;

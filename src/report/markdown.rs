@@ -26,7 +26,9 @@ pub fn comparison_markdown(problem: &Problem, comparison: &Comparison, findings:
         let time = header.iter().position(|name| *name == TIME);
         if let Some(time) = time {
             header.remove(time);
-            rows.iter_mut().for_each(|row| _ = row.remove(time));
+            for row in &mut rows {
+                row.remove(time);
+            }
         }
         Block::Table(Table { header, rows, left: vec![0, 1, 8] })
     };
