@@ -60,22 +60,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let split = Split::new(&problem, &measurements)?;
 
     let found = identify(&problem, &measurements, &split, &Options::default())?;
-    let mut text = format!("{:<18} {:>13} {:>11} {:>13}\n", "SI", "estimate", "± 1 σ", "true");
+    let mut lines = vec![format!("{:<18} {:>13} {:>11} {:>13}", "SI", "estimate", "± 1 σ", "true")];
     for estimate in &found.estimates {
         let known = simulation.parameters.iter().find(|parameter| parameter.name == estimate.name);
         let known = known.map_or_else(String::new, |parameter| format!("{:.5}", parameter.value));
         let error = estimate.std_error.map_or_else(String::new, |error| format!("{error:.2e}"));
-        text += &format!("{:<18} {:>13.5} {error:>11} {known:>13}\n", estimate.name, estimate.estimate);
+        lines.push(format!("{:<18} {:>13.5} {error:>11} {known:>13}", estimate.name, estimate.estimate));
     }
-    let (before, after) = (&found.registered.held_out, &found.fitted.held_out);
-    text += &format!(
-        "held-out poses are off by {:.3} mm on average; before, by {:.3} mm",
-        after.mean.norm * 1e3,
-        before.mean.norm * 1e3
-    );
+    let [before, after] = [&found.registered, &found.fitted].map(|errors| errors.held_out.mean.norm * 1e3);
+    lines.push(format!("held-out poses are off by {after:.3} mm on average; before, by {before:.3} mm"));
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]
     {
-        println!("{text}");
+        println!("{}", lines.join("\n"));
     }
     Ok(())
 }

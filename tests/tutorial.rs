@@ -25,15 +25,16 @@ enum Part<'a> {
 fn parts(page: &str) -> Vec<Part<'_>> {
     let (mut parts, mut open): (Vec<Part>, Option<Block>) = (Vec::new(), None);
     for line in page.lines() {
-        match (line.strip_prefix("```"), open.take()) {
+        let fence = line.strip_prefix("```");
+        assert!(fence.is_none_or(str::is_empty) || open.is_none(), "a fence within a fence: {line}");
+        match (fence, open.take()) {
             (Some(""), Some(block)) => parts.push(Part::Block(block)),
             (Some(info), None) => open = Some(Block { info, lines: Vec::new() }),
             (None, Some(mut block)) => {
                 block.lines.push(line);
                 open = Some(block);
             }
-            (None, None) => parts.push(Part::Text(line)),
-            (Some(info), Some(_)) => panic!("a fence within a fence: {info}"),
+            _ => parts.push(Part::Text(line)),
         }
     }
     assert!(open.is_none(), "the last fence is open");

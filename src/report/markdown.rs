@@ -80,7 +80,7 @@ fn identified(problem: &Problem, found: &Identification, findings: &Findings) ->
     let mut left = vec![noise(problem, found), outliers(problem, found)];
     left.retain(|text| !text.is_empty());
     let mut blocks = vec![Block::heading("What is left")];
-    blocks.extend(left.iter().map(|text| paragraph(text)));
+    blocks.extend(left.iter().flat_map(|text| with_points(text)));
     blocks.push(Block::list(findings::all(findings)));
     blocks.push(Block::heading("Parameters"));
     let (header, left) = (HEADER.to_vec(), LEFT.to_vec());
