@@ -66,6 +66,9 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "rank 31 of 32", "estimate.json"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
+    for name in ["report.md", "report.html"] {
+        assert!(out.contains(name) && bench.path("out/lunar-sampler").join(name).exists(), "{name}");
+    }
     let json: Value =
         serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
     assert_eq!(json["held_out"]["n"], 50);

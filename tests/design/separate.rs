@@ -21,7 +21,7 @@ type Case = ([&'static str; 2], [&'static [f64]; 2]);
 const CASES: [Case; 3] = [
     (
         ["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"],
-        [&[4.5e-4], &[0.0, 0.035 * DEGREE]],
+        [&[7e-4], &[0.0, 0.05 * DEGREE]],
     ),
     (["unmodelled-mass = { link = \"B\" }", "hoist-force"], [&[0.3, 0.8], &[0.03]]),
     (
