@@ -96,7 +96,7 @@ fn effects_of_half_that_size_are_found_in_few() {
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture stated_size"]
 fn effects_of_the_stated_size_are_found_as_often_as_stated() {
     for factor in [0.5, 1.0, 1.5] {
-        println!("{factor}: {:?}", power(factor, 200));
+        println!("{factor}: {:?}", power(factor, 50));
     }
 }
 

@@ -19,10 +19,7 @@ type Case = ([&'static str; 2], [&'static [f64]; 2]);
 
 /// What 28 random poses hardly tell apart (docs/sweep.md).
 const CASES: [Case; 3] = [
-    (
-        ["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"],
-        [&[7e-4], &[0.0, 0.05 * DEGREE]],
-    ),
+    (["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"], [&[7e-4], &[0.0, 0.05 * DEGREE]]),
     (["unmodelled-mass = { link = \"B\" }", "hoist-force"], [&[0.3, 0.8], &[0.03]]),
     (
         ["joint-harmonic = { joint = 4, orders = [1] }", "joint-harmonic = { joint = 4, orders = [2] }"],
