@@ -1,35 +1,55 @@
 //! Identifies the geometric and elastic parameters of robot arms from measured end-point positions.
 //!
+//! # A walk through the house
+//!
 //! From input to result, each room uses only those before it:
 //!
-//! - [`problem`] and [`measurement`]: the arm as declared and the poses as measured, in SI units; [`error`] says what is wrong
-//!   with a file, where.
-//! - [`spatial`], [`scalar`], [`arm`]: frames, and the arm's physics written once for real and dual numbers.
-//! - [`parameter`], [`model`]: free parameters, and positions with their derivatives as a function of them.
-//! - [`fit`], [`solver`]: least squares over many small items, which know no arms.
-//! - [`study`]: what to fit in which order, identifiability, errors, comparison, compensation; [`diagnosis`]: what structure
-//!   the residual still has, and the loop that adds what it points to; [`campaign`]: many fits where the truth is known;
-//!   [`picture`] gathers what its figures show; [`report`] writes it down.
-//! - [`design`]: which poses to measure, and what they will tell.
-//! - [`paper`]: the closed forms of [Chen2021], a baseline; [`rig`]: an independent simulator that shares no physics with
-//!   the model.
+//! 1. [`problem`] and [`measurement`]: the arm as declared and the poses as measured, in SI units. A mistake in a file is an
+//!    [`error`] that says where.
+//! 2. [`spatial`], [`scalar`], [`arm`]: frames, and the arm's physics written once for real and dual numbers.
+//! 3. [`parameter`], [`effect`], [`model`]: what is free, the catalogue of what an arm may do besides, and positions with their
+//!    derivatives as a function of both.
+//! 4. [`fit`], [`solver`]: least squares over many small items, which know no arms.
+//! 5. [`study`]: what to fit in which order, identifiability, standard errors, comparison, compensation.
+//! 6. [`diagnosis`]: what structure the residual still has, which effects it points to ([`diagnosis::trace`]), and the loop that
+//!    adds them ([`diagnosis::close`]).
+//! 7. [`picture`] gathers what figures show; [`report`] writes text, JSON, Markdown and HTML.
 //!
-//! ```no_run
+//! Beside this way stand [`design`] (which poses to measure, and what they will tell), [`campaign`] (many fits where the
+//! truth is known), [`paper`] (the closed forms of [Chen2021], a baseline), and [`rig`], a simulator that shares no physics
+//! with the model.
+//!
+//! # The same walk in code
+//!
+//! ```
 //! use std::path::Path;
 //!
+//! use flexcal::diagnosis::{Verdict, close};
 //! use flexcal::measurement::{Measurements, Split};
 //! use flexcal::problem::Problem;
 //! use flexcal::study::{Options, identify};
 //!
+//! // The arm as declared, and the poses: 28 to identify, 50 held out.
 //! let problem = Problem::read(Path::new("problems/lunar-sampler"))?;
 //! let (measurements, _warnings) = Measurements::read(&problem.data.files, &problem)?;
 //! let split = Split::new(&problem, &measurements)?;
+//!
+//! // Fit what is free. Held-out poses only judge.
 //! let found = identify(&problem, &measurements, &split, &Options::default())?;
-//! for estimate in &found.estimates {
-//!     println!("{} {} ± {:?} {}", estimate.name, estimate.estimate, estimate.std_error, estimate.unit.symbol());
-//! }
+//! let stiffness = found.estimates.iter().find(|estimate| estimate.name == "joint2.stiffness");
+//! assert!(stiffness.is_some_and(|estimate| estimate.std_error.is_some()));
+//!
+//! // The residual is larger than noise: find what the model lacks.
+//! assert!(found.reduced_chi2.is_some_and(|chi2| chi2 > 5.0));
+//! let closure = close(&problem, &measurements, &split, &Options::default())?;
+//! assert_eq!(closure.verdict, Verdict::Explained);
+//! assert_eq!(flexcal::effect::describe(&closure.effects[0].effect), "link A bows with temperature");
+//! assert!(closure.after.fitted.held_out.mean.norm < 0.1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! `examples/` has an arm of one's own from text to estimate, an effect of one's own, and a report; `docs/` explains files,
+//! effects, plans and results.
 
 pub mod arm;
 pub mod campaign;

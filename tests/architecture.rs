@@ -34,7 +34,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("study", &[GROUND, BELOW_STUDY]),
     ("diagnosis", &[GROUND, BELOW_STUDY, &["study"]]),
     // Which poses to measure, and what they will tell.
-    ("design", &[GROUND, BELOW_STUDY, &["study"]]),
+    ("design", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
     // Many fits to what model or rig measure.
     ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
     // What figures show, as numbers.

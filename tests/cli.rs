@@ -66,6 +66,9 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "rank 31 of 32", "estimate.json"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
+    for name in ["report.md", "report.html"] {
+        assert!(out.contains(name) && bench.path("out/lunar-sampler").join(name).exists(), "{name}");
+    }
     let json: Value =
         serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
     assert_eq!(json["held_out"]["n"], 50);
@@ -279,6 +282,11 @@ fn the_readme_shows_what_is_printed() {
         text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).output().unwrap().stdout)
     };
     assert_eq!(shown("loop"), printed("loop", &root.join("problems/lunar-sampler")).trim_end());
+    let drawn = fs::read_to_string(folder.path().join("out/lunar-sampler/figures/effect-1.svg")).unwrap();
+    if std::env::var_os("FLEXCAL_REFILL").is_some() {
+        fs::write(root.join("docs/effect.svg"), &drawn).unwrap();
+    }
+    assert_eq!(fs::read_to_string(root.join("docs/effect.svg")).unwrap(), drawn, "FLEXCAL_REFILL=1 draws it anew");
     let identified = printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"));
     // The third line ends in the time it took.
     let timeless = |text: &str| -> Vec<String> {

@@ -10,7 +10,11 @@ mod bench;
 mod command;
 #[path = "design/confirmed.rs"]
 mod confirmed;
+#[path = "design/detection.rs"]
+mod detection;
 #[path = "design/exchange.rs"]
 mod exchange;
 #[path = "design/forecast.rs"]
 mod forecast;
+#[path = "design/separate.rs"]
+mod separate;

@@ -122,6 +122,14 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     }
     let page = report::identification_page(&problem, &found, &shown);
     check(&page);
+    // Every check with its verdict, on the page and in Markdown.
+    assert!(shown.findings.checks.len() > 5);
+    for check in &shown.findings.checks {
+        assert!(page.html.contains(&check.to_string().replace('&', "&amp;")), "{check}");
+    }
+    let told = report::identification_markdown(&problem, &found, &shown.findings);
+    assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
+    assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
 }
 

@@ -19,7 +19,7 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Compares, writes `compare.json` and `report.html`, and prints the tables.
+/// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
@@ -32,14 +32,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
-    let path = output::write(&folder, "compare.json", &json)?;
     let shown = picture::of_comparison(&problem, &measurements, &split, &comparison)?;
+    let told = report::comparison_markdown(&problem, &comparison, &shown.findings);
+    output::write_all(&folder, &[("compare.json", &json), ("report.md", &told)])?;
     output::write_page(&folder, &report::comparison_page(&problem, &comparison, &shown))?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::compare_text(&problem, &comparison))?;
-        output::print(&format!("\nWritten to {}\n", path.display()))?;
+        output::print(&format!("\nWritten to {}: compare.json, report.md, report.html\n", folder.display()))?;
     }
     if comparison.joint.is_trusted() {
         return Ok(Outcome::Done);

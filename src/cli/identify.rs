@@ -79,7 +79,7 @@ impl From<SolverArgument> for SolverChoice {
     }
 }
 
-/// Identifies, writes `estimate.json` and `report.html`, and prints the table.
+/// Identifies, writes `estimate.json`, `report.md` and `report.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, measurements, split } = common.read()?;
@@ -97,14 +97,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
-    let path = output::write(&folder, "estimate.json", &json)?;
     let shown = picture::of_identification(&problem, &measurements, &split, &identification)?;
+    let told = report::identification_markdown(&problem, &identification, &shown.findings);
+    output::write_all(&folder, &[("estimate.json", &json), ("report.md", &told)])?;
     output::write_page(&folder, &report::identification_page(&problem, &identification, &shown))?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::estimate_text(&problem, &identification))?;
-        output::print(&format!("\nWritten to {}\n", path.display()))?;
+        output::print(&format!("\nWritten to {}: estimate.json, report.md, report.html\n", folder.display()))?;
     }
     if identification.is_trusted() {
         return Ok(Outcome::Done);

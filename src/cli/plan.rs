@@ -1,9 +1,10 @@
 //! `flexcal plan`.
 
 use std::error::Error;
+use std::path::Path;
 
 use clap::{Args, ValueEnum, value_parser};
-use flexcal::design::{self, Candidates, Criterion, PlanOptions, PlanProgress};
+use flexcal::design::{self, Candidates, Criterion, Pair, PlanOptions, PlanProgress};
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
 use flexcal::report;
@@ -23,7 +24,8 @@ a table. The plan is plan.csv: measure it, add the columns x_mm, y_mm, z_mm, and
 Examples:
   flexcal plan problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
   flexcal plan my-arm --poses 40 --candidates reachable.csv --criterion D
-  flexcal plan my-arm --poses 10 --data first.csv --seed 7"
+  flexcal plan my-arm --poses 10 --data first.csv --seed 7
+  flexcal plan my-arm --poses 12 --separate 'gear-ratio = { joint = 3 }' 'joint-harmonic = { joint = 3, orders = [1] }'"
 )]
 pub struct Arguments {
     #[command(flatten)]
@@ -34,6 +36,9 @@ pub struct Arguments {
     /// What to make small
     #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
     criterion: CriterionArgument,
+    /// Choose the poses that tell two effects apart; each as trace and loop name it and as a problem declares it
+    #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
+    separate: Vec<String>,
     #[command(flatten)]
     source: Source,
 }
@@ -68,7 +73,9 @@ impl From<CriterionArgument> for Criterion {
 /// Plans, writes `plan.csv` and `plan.json`, and prints what the plan promises.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
-    let problem = Problem::read(&common.problem)?;
+    let declared = Problem::read(&common.problem)?;
+    let pair = pair(&arguments.separate, &declared)?;
+    let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let candidates = match source.table(&problem, common.quiet)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
@@ -96,19 +103,24 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         seed: source.seed,
         progress: Some(&show),
     };
-    let result = design::plan(&problem, &candidates, given.as_ref(), &options);
+    let result = match &pair {
+        Some(pair) => design::separate(pair, &candidates, given.as_ref(), &options)
+            .map(|(plan, separated)| (plan, Some(separated))),
+        None => design::plan(&problem, &candidates, given.as_ref(), &options).map(|plan| (plan, None)),
+    };
     if let Some(line) = &line {
         line.clear();
     }
-    let plan = result?;
+    let (plan, separated) = result?;
+    let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
     let folder = common.folder(&problem);
-    let json = report::plan_json(&problem, &criterion, source.seed, &plan);
+    let json = report::plan_json(&problem, criterion, source.seed, &plan, separated.as_ref());
     let path = output::write(&folder, "plan.csv", &report::poses_csv(&problem, &plan.poses))?;
     output::write(&folder, "plan.json", &json)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
-        output::print(&report::plan_text(&problem, &criterion, &plan))?;
+        output::print(&report::plan_text(&problem, criterion, &plan, separated.as_ref()))?;
         output::print(&format!("\nWritten to {}, what it promises to plan.json beside it\n", path.display()))?;
     }
     if plan.suffices {
@@ -118,4 +130,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
     }
     Ok(Outcome::NotTrusted)
+}
+
+/// The two effects to tell apart, if there are any.
+fn pair(named: &[String], problem: &Problem) -> Result<Option<Pair>, Box<dyn Error>> {
+    let [one, other] = named else { return Ok(None) };
+    let read = |text: &String| problem.effect(text, Path::new("--separate"));
+    Ok(Some(Pair::new(problem, [read(one)?, read(other)?])?))
 }

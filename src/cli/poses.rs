@@ -7,7 +7,7 @@ use flexcal::design::{DesignError, Ranges};
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::Truth;
+use flexcal::rig::{PoseRanges, Truth};
 
 use super::diagnostic;
 
@@ -38,11 +38,16 @@ impl Source {
         Ok(Some(poses))
     }
 
-    /// Where poses may lie.
-    pub fn ranges(&self, problem: &Problem) -> Result<Ranges, DesignError> {
+    /// Where poses may lie, with all that may be set there.
+    pub fn all_ranges(&self, problem: &Problem) -> Result<Ranges, DesignError> {
         let Some(file) = &self.truth else { return Ranges::of(problem) };
-        let poses = Truth::read(file, problem)?.poses;
-        // What no declared effect depends on need not be set.
+        let PoseRanges { joints, payloads, hoist, temperature, approach, .. } = Truth::read(file, problem)?.poses;
+        Ok(Ranges { joints, payloads, hoist, temperature, approach })
+    }
+
+    /// The same without temperatures and sides on which no declared effect depends: they need not be set.
+    pub fn ranges(&self, problem: &Problem) -> Result<Ranges, DesignError> {
+        let all = self.all_ranges(problem)?;
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let thermal = declared(|effect| {
             matches!(
@@ -53,18 +58,12 @@ impl Source {
             )
         });
         let sided = declared(|effect| matches!(effect, Effect::Backlash { .. }));
-        Ok(Ranges {
-            joints: poses.joints,
-            payloads: poses.payloads,
-            hoist: poses.hoist,
-            temperature: poses.temperature.filter(|_| thermal),
-            approach: poses.approach && sided,
-        })
+        Ok(Ranges { temperature: all.temperature.filter(|_| thermal), approach: all.approach && sided, ..all })
     }
 
     /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
     pub fn known_ranges(&self, problem: &Problem) -> Result<Option<Ranges>, DesignError> {
-        match self.ranges(problem) {
+        match self.all_ranges(problem) {
             Err(DesignError::NoRange { .. }) => Ok(None),
             other => other.map(Some),
         }

@@ -14,6 +14,8 @@ use crate::problem::{JointKind, Problem};
 const ANGLE_STEP: f64 = 1e-4;
 /// Lengths are commanded in steps of this [m].
 const LENGTH_STEP: f64 = 1e-6;
+/// Added to the stream of the poses for what is drawn apart, so that poses are the same with it and without.
+const APART: u64 = 1 << 32;
 /// Forces and temperatures are set in steps of this [N], [°C].
 const SETTING_STEP: f64 = 0.1;
 
@@ -62,7 +64,7 @@ impl Ranges {
     /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by
     /// itself; positions are zero.
     pub fn draw(&self, problem: &Problem, count: usize, extremes: Extremes, seed: u64, stream: u64) -> Measurements {
-        let mut random = stream_of(seed, stream);
+        let (mut random, mut apart) = (stream_of(seed, stream), stream_of(seed, APART + stream));
         let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
             let (kind, within) = (random.random::<f64>(), random.random::<f64>());
             match extremes {
@@ -76,7 +78,7 @@ impl Ranges {
             let joints = self.joints.iter().map(|&range| value(&mut random, range)).collect();
             let choice = value(&mut random, (0.0, 1.0));
             let hoist = self.hoist.map(|range| value(&mut random, range));
-            let temperature = self.temperature.map(|range| value(&mut random, range));
+            let temperature = self.temperature.map(|range| value(&mut apart, range));
             let sides = self.joints.iter().map(|_| random.random()).collect();
             drawn.push(problem, &Draft { joints, choice, hoist, temperature, sides });
         }

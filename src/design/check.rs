@@ -5,6 +5,7 @@
 
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
+use crate::diagnosis::{Detection, detectable};
 use crate::error::InputErrorKind;
 use crate::measurement::{Measurements, Split};
 use crate::problem::Problem;
@@ -63,6 +64,8 @@ pub struct Check {
     pub noise: f64,
     /// Of the first n of a series of such poses.
     pub growth: Growth,
+    /// Which effects of the catalogue they would show, and from what size on.
+    pub detection: Detection,
     /// Measured coordinates.
     pub coordinates: usize,
     /// Free parameters without a prior.
@@ -115,6 +118,7 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         forecast: forecast.over(parameters, &arms),
         elsewhere,
         noise,
+        detection: detectable(problem, &poses)?,
         growth: Growth::new(parameters, &told, &workspace, noise, count),
         coordinates: 3 * count,
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),

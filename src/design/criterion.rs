@@ -24,6 +24,8 @@ pub enum Criterion {
     E,
     /// D_s: det of the part of C of these parameters (numbers in the model), all others estimated along with them.
     Subset(Vec<usize>),
+    /// S of these parameters alone (numbers in the model), all others estimated along with them.
+    Each(Vec<usize>),
 }
 
 /// A criterion made ready for one problem, in scaled unknowns.
@@ -58,6 +60,7 @@ impl Criterion {
             Self::E => "E",
             Self::S => "S",
             Self::Subset(_) => "subset",
+            Self::Each(_) => "S of a subset",
         }
     }
 
@@ -71,7 +74,7 @@ impl Criterion {
     ) -> Option<Yardstick> {
         let n = parameters.len();
         let is_wanted = |k: usize| match self {
-            Self::Subset(columns) => columns.contains(&k),
+            Self::Subset(columns) | Self::Each(columns) => columns.contains(&k),
             // Where only bases or targets are free, they are what is looked for.
             _ => !parameters[k].slot.is_placement() || parameters.iter().all(|p| p.slot.is_placement()),
         };
@@ -86,7 +89,7 @@ impl Criterion {
                 }
                 Size::Trace(weights)
             }
-            Self::S => Size::Product,
+            Self::S | Self::Each(_) => Size::Product,
             Self::E => Size::Eigenvalue(decided(average, prior, &wanted)?),
         };
         Some(Yardstick { wanted, rest, size })

@@ -47,6 +47,24 @@ pub enum DesignError {
         /// Candidates in which the arm comes to rest.
         candidates: usize,
     },
+    /// Two effects that are one.
+    #[error("--separate: both effects are the same: {effect}")]
+    SameEffect {
+        /// In words.
+        effect: String,
+    },
+    /// An effect that the problem has.
+    #[error("--separate: the problem declares this effect already: {effect}")]
+    DeclaredEffect {
+        /// In words.
+        effect: String,
+    },
+    /// An effect that no choice of poses shows.
+    #[error("--separate: an effect of time is told by when poses are measured, not by which: {effect}")]
+    FollowsTime {
+        /// In words.
+        effect: String,
+    },
     /// The nominal arm does not come to rest anywhere.
     #[error("the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses")]
     NoEquilibrium,

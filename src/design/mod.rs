@@ -14,6 +14,7 @@ mod growth;
 mod plan;
 mod scan;
 mod sensitivity;
+mod separate;
 mod site;
 
 pub use candidates::{Extremes, Ranges};
@@ -25,4 +26,5 @@ pub use forecast::{Expected, Forecast, Prediction};
 pub use growth::{Growth, GrowthStep};
 pub use plan::{Candidates, Plan, PlanOptions, PlanProgress, plan};
 pub use sensitivity::Sensitivity;
+pub use separate::{Pair, Separated, separate};
 pub use site::Site;

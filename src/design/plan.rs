@@ -10,7 +10,7 @@ use crate::measurement::Measurements;
 use crate::problem::Problem;
 
 /// Candidates drawn from ranges, evenly and with a liking for the ends.
-const DRAWN: [usize; 2] = [500, 2000];
+pub(super) const DRAWN: [usize; 2] = [500, 2000];
 /// Exchanges, each from poses drawn at random.
 const STARTS: usize = 8;
 /// The best exchanges that are refined.
@@ -20,13 +20,13 @@ const ROUNDS: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Candidates of a round.
 const ABOUT: usize = 2500;
 /// Draws of random poses that a plan is compared with; odd, so that there is a median.
-const DRAWS: usize = 75;
+pub(super) const DRAWS: usize = 75;
 /// Streams of random numbers of one seed.
-const EVENLY: u64 = 0;
+pub(super) const EVENLY: u64 = 0;
 const AT_ENDS: u64 = 1;
 const FIRST_ROUND: u64 = 2;
 const FIRST_START: u64 = 100;
-const FIRST_DRAW: u64 = 200;
+pub(super) const FIRST_DRAW: u64 = 200;
 
 /// Where the poses of a plan come from.
 #[derive(Debug, Clone)]
@@ -257,7 +257,7 @@ fn shuffled(all: usize, count: usize, random: &mut impl Rng) -> Vec<usize> {
 }
 
 /// The middle one of an odd number of values.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -10,9 +10,12 @@ use rayon::prelude::*;
 use super::{DesignError, Sensitivity};
 use crate::measurement::Measurements;
 use crate::model::Model;
-use crate::parameter::Parameter;
+use crate::parameter::{BeamField, Parameter, Slot};
 use crate::problem::Problem;
 use crate::study::Placement;
+
+/// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter [kg].
+const PROBE_MASS: f64 = 1.0;
 
 /// The model with a base for every session and a target for every word of some tables of poses.
 #[derive(Debug, Clone)]
@@ -57,7 +60,9 @@ impl<'a> Site<'a> {
     /// What the poses of a table tell about the nominal arm; `unit` [m] stands for σ, if it is given. Words that the site does
     /// not know are taken for its first.
     pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
-        self.sensitivity_at(table, unit, &DVector::zeros(self.model.parameters.len()))
+        let added = |slot| matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. });
+        let about = self.model.parameters.iter().map(|own| if added(own.slot) { PROBE_MASS } else { 0.0 });
+        self.sensitivity_at(table, unit, &DVector::from_iterator(self.model.parameters.len(), about))
     }
 
     /// The same about `count` arms drawn from the priors; parameters without one stay nominal, and arms that do not come to

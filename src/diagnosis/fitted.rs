@@ -26,6 +26,11 @@ impl Fitted {
     /// Fits `problem` to the identification rows.
     pub fn new(problem: Problem, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
         let found = identify(&problem, data.measurements, data.split, options)?;
+        Self::of(problem, data, found)
+    }
+
+    /// A problem that was fitted to the identification rows before.
+    pub fn of(problem: Problem, data: &Data, found: Identification) -> Result<Self, IdentifyError> {
         let placement = Placement::of(data.measurements);
         let model = Model::new(&problem, &placement.bases, &placement.targets)?;
         let free = |&k: &usize| {

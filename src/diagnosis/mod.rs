@@ -1,7 +1,8 @@
 //! What a fit's residual says about effects that the model lacks, and the loop that adds them.
 //!
-//! - [`checks`]: whether structure is left at all.
+//! - [`check`]: whether structure is left at all.
 //! - `trace`: every candidate of the catalogue scored in the linear neighbourhood of a fit; [`trace()`] ranks them.
+//! - [`detectable`]: the same scan before anything is measured: from what size on it would find each effect.
 //! - `closing`: rounds of fit, trace, add, test again; [`close`] tells the whole story.
 //! - `unexplained`: structure that no effect explains, its place, and a correction without a cause.
 
@@ -10,8 +11,11 @@ mod candidates;
 mod checks;
 mod closing;
 mod data;
+mod detection;
 mod fitted;
 mod generic;
+mod power;
+mod separation;
 mod trace;
 mod tracing;
 mod unexplained;
@@ -19,5 +23,7 @@ mod unexplained;
 pub use apart::Apart;
 pub use checks::{Check, Driver, Findings, Outcome, Remainder, Sequence, Test, Untestable, check};
 pub use closing::{Closure, Found, Interval, Step, Verdict, WAVES, close};
-pub use tracing::{Ranked, Trace, trace};
+pub use detection::{Detectable, Detection, Size, detectable};
+pub use separation::{Separation, Side, separation};
+pub use tracing::{Ranked, Trace, examine, trace};
 pub use unexplained::{Correction, Unexplained};

@@ -132,6 +132,20 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     }
 }
 
+/// Checks what a fit of `problem` leaves of the identification rows.
+///
+/// # Errors
+/// Problem, data and fit do not belong together.
+pub fn examine(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    found: &Identification,
+) -> Result<Findings, IdentifyError> {
+    let data = Data::new(measurements, split);
+    Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
+}
+
 /// Checks what a fit leaves.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let library = fitted.library(data, &[], &[]);

@@ -1,7 +1,7 @@
 //! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
 //!
-//! - [`states`]: the arm before, with geometry alone, with elasticity, after the loop, and its errors on held-out poses.
-//! - [`correlations`]: the whole matrix. [`cause`]: the residual against what drives a found effect. [`trend`]: the same for
+//! - `states`: the arm before, with geometry alone, with elasticity, after the loop, and its errors on held-out poses.
+//! - `correlations`: the whole matrix. `cause`: the residual against what drives a found effect. `trend`: the same for
 //!   structure that no effect explains.
 
 mod cause;
@@ -12,7 +12,7 @@ mod trend;
 
 use nalgebra::Vector3;
 
-use crate::diagnosis::Closure;
+use crate::diagnosis::{Closure, Findings, examine};
 use crate::measurement::{Measurements, Split};
 use crate::model::{Ablation, Model};
 use crate::problem::Problem;
@@ -52,6 +52,8 @@ pub struct Picture {
     pub residuals: Vec<Residual>,
     /// Whether `time` of the residuals was measured.
     pub time_measured: bool,
+    /// Checks of what it leaves of the fitted poses.
+    pub findings: Findings,
     /// Correlations of its parameters.
     pub correlations: Correlations,
     /// The residual against the cause of each found effect, in the order in which they were found.
@@ -75,7 +77,8 @@ pub fn of_identification(
     let mut states = vec![sight.nominal(problem, &fitted.model)?];
     states.extend(sight.rigid(problem, &fitted.model)?);
     states.push(sight.identified(&fitted, found));
-    Ok(sight.picture(states, &fitted, found, sigma_of(problem, found)))
+    let findings = examine(problem, measurements, split, found)?;
+    Ok(sight.picture(states, &fitted, found, (sigma_of(problem, found), findings)))
 }
 
 /// The picture of a comparison: of its joint fit, and of geometry alone.
@@ -96,7 +99,8 @@ pub fn of_comparison(
         states.push(sight.state(Stand::GeometryOnly, &rigid));
     }
     states.push(sight.identified(&fitted, &comparison.joint));
-    Ok(sight.picture(states, &fitted, &comparison.joint, sigma_of(problem, &comparison.joint)))
+    let findings = examine(problem, measurements, split, &comparison.joint)?;
+    Ok(sight.picture(states, &fitted, &comparison.joint, (sigma_of(problem, &comparison.joint), findings)))
 }
 
 /// The picture of a closed loop, with the cause of every effect that it found.
@@ -117,7 +121,7 @@ pub fn of_closure(
     states.push(sight.identified(&before, &closure.before.fit));
     states.push(sight.state(Stand::Closed, &after));
     let sigma = sigma_of(&closure.closed, &closure.after);
-    let mut picture = sight.picture(states, &after, &closure.after, sigma);
+    let mut picture = sight.picture(states, &after, &closure.after, (sigma, closure.findings.clone()));
     picture.causes =
         closure.effects.iter().filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &sight)).collect();
     picture.trend = closure.unexplained.as_ref().and_then(|left| trend::of(left, closure, &after, &sight, sigma));
@@ -138,7 +142,13 @@ impl Sight<'_> {
         self.state(if elastic { Stand::Elastic } else { Stand::Identified }, arm)
     }
 
-    fn picture(&self, states: Vec<State>, best: &Arm, found: &Identification, sigma: f64) -> Picture {
+    fn picture(
+        &self,
+        states: Vec<State>,
+        best: &Arm,
+        found: &Identification,
+        (sigma, findings): (f64, Findings),
+    ) -> Picture {
         let rows: Vec<usize> = (0..self.measurements.len()).collect();
         let poses = self.placement.poses(self.measurements, &rows, sigma);
         let errors = self.errors(best, &rows);
@@ -155,6 +165,7 @@ impl Sight<'_> {
             states,
             residuals: rows.iter().copied().zip(&poses).zip(errors).map(residual).collect(),
             time_measured: self.measurements.time_measured,
+            findings,
             correlations: Correlations::of(best, self, found, sigma),
             causes: Vec::new(),
             trend: None,

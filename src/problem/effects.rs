@@ -1,10 +1,12 @@
 //! The tables `[[effect]]`: one effect each, with its arguments.
 
+use std::path::Path;
+
 use toml::de::DeTable;
 
-use super::item::Item;
+use super::item::{Document, Item};
 use super::section::Section;
-use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Statics};
+use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Problem, Statics};
 use crate::error::{InputError, InputErrorKind};
 use crate::units::TIME;
 
@@ -90,6 +92,22 @@ pub(super) fn check(
         return Err(location.clone().error(kind));
     }
     Ok(())
+}
+
+/// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3 }`; `hoist-force` alone
+/// stands for `hoist-force = true`.
+pub(super) fn parse(text: &str, named: &Path, problem: &Problem) -> Result<EffectDeclaration, InputError> {
+    let text = if text.contains('=') { text.to_owned() } else { format!("{text} = true") };
+    let document = Document { file: named.to_owned(), text: text.into() };
+    let table = document.table()?;
+    let section = Section::new(&document, String::new(), 0..0, table.get_ref());
+    let entries = section.entries();
+    let [(name, item)] = entries.as_slice() else {
+        return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
+    };
+    let declared = EffectDeclaration { effect: effect(name, item, &problem.joints)?, location: item.location() };
+    check(std::slice::from_ref(&declared), problem.statics, &problem.joints, &problem.data)?;
+    Ok(declared)
 }
 
 /// One effect; `true` stands for no arguments.

@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 use super::item::Document;
 use super::section::Section;
 use super::{
-    BasePose, Data, Equilibrium, HeldOut, Problem, Statics, Tool, arm, constraints, effects, parameters, robust,
+    BasePose, Data, EffectDeclaration, Equilibrium, HeldOut, Problem, Statics, Tool, arm, constraints, effects,
+    parameters, robust,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
@@ -29,6 +30,15 @@ impl Problem {
     /// The first mistake found.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
+    }
+
+    /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint = 3 }`); `named` is what
+    /// messages call the text.
+    ///
+    /// # Errors
+    /// It is no effect, or one that could never act on this arm.
+    pub fn effect(&self, text: &str, named: &Path) -> Result<EffectDeclaration, InputError> {
+        effects::parse(text, named, self)
     }
 }
 

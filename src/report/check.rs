@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::detection;
 use super::expected::{ExpectedEntry, cells};
 use super::json::{Observability, Unidentified, to_text};
 use super::parameters::blind_text;
@@ -28,6 +29,8 @@ struct Document<'a> {
     growth: Vec<StepEntry>,
     /// Least number of poses that see everything and predict as exactly as one position is measured.
     enough: Option<usize>,
+    /// From what size on each effect of the catalogue would be found.
+    detectable: detection::Entry<'a>,
 }
 
 #[derive(Debug, Serialize)]
@@ -99,6 +102,7 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
         },
         growth: growth.steps.iter().map(StepEntry::from).collect(),
         enough: growth.enough,
+        detectable: detection::Entry::of(&check.detection),
     };
     to_text(&document)
 }
@@ -125,6 +129,8 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
         prediction(check),
         "\n".to_owned(),
         growth(check),
+        "\n".to_owned(),
+        detection::text(&check.detection),
     ]
     .concat()
 }

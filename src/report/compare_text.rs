@@ -13,10 +13,15 @@ const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [
 const TABLE_3: [&str; 8] =
     ["held out, mm", "axis", "before", "with elasticity", "ignoring it", "paper: before", "with", "ignoring"];
 
+/// Columns of the rows of a comparison, after the first.
+pub(super) const ROWS: [&str; 9] =
+    ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", TIME, "condition", "termination"];
+/// The one that differs from run to run.
+pub(super) const TIME: &str = "ms";
+
 /// A comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
-    let Comparison { joint, rigid, strategies, paper, ablations } = comparison;
-    let strategies = strategies.iter().map(|result| line(result.strategy.as_str(), result));
+    let Comparison { joint, rigid, paper, ablations, .. } = comparison;
     [
         format!(
             "{}\n{} poses to identify, {} held out\n",
@@ -24,14 +29,25 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         ),
         geometry(problem, joint),
         errors(joint, rigid, paper.iter().any(|_| ablations.len() > 1)),
-        rows("strategy", strategies.chain(paper.iter().map(paper_line)).collect()),
+        rows("strategy", strategy_rows(comparison)),
         paper_ignores_effects(problem, paper),
-        rows("elasticity", ablations.iter().map(|(ablation, result)| line(ablation.as_str(), result)).collect()),
+        rows("elasticity", ablation_rows(comparison)),
     ]
     .into_iter()
     .filter(|part| !part.is_empty())
     .collect::<Vec<String>>()
     .join("\n")
+}
+
+/// One row for each strategy and solver, the paper's own last.
+pub(super) fn strategy_rows(comparison: &Comparison) -> Vec<Vec<String>> {
+    let strategies = comparison.strategies.iter().map(|result| line(result.strategy.as_str(), result));
+    strategies.chain(comparison.paper.iter().map(paper_line)).collect()
+}
+
+/// One row for each part of the elasticity.
+pub(super) fn ablation_rows(comparison: &Comparison) -> Vec<Vec<String>> {
+    comparison.ablations.iter().map(|(ablation, result)| line(ablation.as_str(), result)).collect()
 }
 
 /// What the paper's procedure leaves out of the declared model.
@@ -147,17 +163,6 @@ fn cells(
 }
 
 fn rows(title: &str, body: Vec<Vec<String>>) -> String {
-    let header = [
-        title,
-        "solver",
-        "held out mean",
-        "rms, mm",
-        "fitted rms",
-        "steps",
-        "evaluations",
-        "ms",
-        "condition",
-        "termination",
-    ];
+    let header: Vec<&str> = std::iter::once(title).chain(ROWS).collect();
     table(&header, body, &[0, 1, 9])
 }

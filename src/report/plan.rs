@@ -6,8 +6,9 @@ use super::expected::{ExpectedEntry, cells};
 use super::json::{Observability, Unidentified, to_text};
 use super::parameters::blind_text;
 use super::quantity::{number, table};
+use super::separation;
 use super::text::conditioning;
-use crate::design::{Criterion, Plan};
+use crate::design::{Criterion, Plan, Separated};
 use crate::problem::Problem;
 
 #[derive(Debug, Serialize)]
@@ -32,6 +33,9 @@ struct Document<'a> {
     observability: Observability,
     parameters: Vec<PlannedEntry<'a>>,
     unidentified: Vec<Unidentified<'a>>,
+    /// How well it tells two effects apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    separation: Option<separation::Entry<'a>>,
 }
 
 /// A parameter after planned poses, and after random ones.
@@ -42,8 +46,14 @@ struct PlannedEntry<'a> {
     random_std_error: Option<f64>,
 }
 
-/// A plan as JSON text.
-pub fn plan_json(problem: &Problem, criterion: &Criterion, seed: u64, plan: &Plan) -> String {
+/// A plan as JSON text; `separated` where it tells two effects apart.
+pub fn plan_json(
+    problem: &Problem,
+    criterion: &Criterion,
+    seed: u64,
+    plan: &Plan,
+    separated: Option<&Separated>,
+) -> String {
     let (planned, meaningful) = (&plan.planned, plan.meaningful());
     let name = |k: usize| planned.expected[k].name.as_str();
     let parameters = planned.expected.iter().enumerate();
@@ -65,12 +75,13 @@ pub fn plan_json(problem: &Problem, criterion: &Criterion, seed: u64, plan: &Pla
         observability: Observability::of(&planned.identifiability, 3 * planned.poses),
         parameters: parameters.map(entry).collect(),
         unidentified: Unidentified::all(&planned.identifiability, name),
+        separation: separated.map(separation::Entry::of),
     };
     to_text(&document)
 }
 
-/// A plan in words, ending in a line break.
-pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan) -> String {
+/// A plan in words; `separated` where it tells two effects apart; ending in a line break.
+pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separated: Option<&Separated>) -> String {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), planned.poses - plan.poses.len());
     let besides = if given > 0 { format!(" besides {given} that are measured") } else { String::new() };
@@ -110,6 +121,7 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan) -> Strin
         conditioning(&planned.identifiability, names.len(), 3 * planned.poses),
         "\n".to_owned(),
         blind_text(&planned.identifiability, &names),
+        separated.map_or_else(String::new, |separated| format!("\n{}", separation::text(separated))),
     ]
     .concat()
 }

@@ -75,7 +75,8 @@ fn errors(result: &Identification) -> String {
     text
 }
 
-fn noise(problem: &Problem, result: &Identification) -> String {
+/// How large the residual is against the declared noise.
+pub(super) fn noise(problem: &Problem, result: &Identification) -> String {
     match (result.noise, result.reduced_chi2) {
         (Noise::Estimated(sigma), _) => format!(
             "No σ is declared; the scatter about the fit gives {:.4} mm per coordinate, model errors included.\n",
@@ -115,7 +116,7 @@ fn active_constraints(result: &Identification) -> String {
 }
 
 /// Poses whose residual is too long to be noise; nothing to say without any.
-fn outliers(problem: &Problem, result: &Identification) -> String {
+pub(super) fn outliers(problem: &Problem, result: &Identification) -> String {
     let outliers = &result.outliers;
     if outliers.is_empty() {
         return String::new();

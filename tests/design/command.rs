@@ -109,6 +109,56 @@ fn a_check_takes_measured_poses_or_draws_them() {
 }
 
 #[test]
+fn a_check_names_what_would_be_found() {
+    let bench = Bench::new();
+    let (out, _) = bench.run(0, "check problems/lunar-sampler", &[]);
+    for expected in
+        ["How large an effect must be", "gear-ratio = { joint = 4 }", "Not with these poses", "tracker-scale"]
+    {
+        assert!(out.contains(expected), "{expected} missing in:\n{out}");
+    }
+    let check: Value = serde_json::from_str(&fs::read_to_string(bench.path("check.json")).unwrap()).unwrap();
+    let detectable = &check["detectable"];
+    assert_eq!((detectable["power"].as_f64(), detectable["level"].as_f64()), (Some(0.8), Some(0.01)));
+    let effects = detectable["effects"].as_array().unwrap();
+    let gear = effects.iter().find(|own| own["effect"] == "gear-ratio" && own["joint"] == 2).unwrap();
+    let size = &gear["sizes"][0];
+    assert_eq!((size["parameters"][0].as_str(), size["unit"].as_str()), (Some("gear-ratio[2].error"), Some("1")));
+    assert!(size["found_from"].as_f64().unwrap() < size["prior_sigma"].as_f64().unwrap());
+    // Every order of every joint is there.
+    assert_eq!(effects.iter().filter(|own| own["effect"] == "joint-harmonic").count(), 240);
+}
+
+#[test]
+fn a_plan_tells_two_effects_apart() {
+    let bench = Bench::new();
+    let table = bench.write("some.csv", &drawn(60));
+    let pair = ["--separate", "gear-ratio = { joint = 3 }", "hoist-force", "--candidates", &table];
+    let (out, _) = bench.run(0, "plan problems/lunar-sampler --poses 20", &pair);
+    for expected in
+        ["told apart", "angle between them", "hoist-force = true", "gear-ratio[3].error", "p beside the other"]
+    {
+        assert!(out.contains(expected), "{expected} missing in:\n{out}");
+    }
+    let plan: Value = serde_json::from_str(&fs::read_to_string(bench.path("plan.json")).unwrap()).unwrap();
+    let sides = plan["separation"]["effects"].as_array().unwrap();
+    assert_eq!((sides[0]["effect"].as_str(), sides[1]["effect"].as_str()), (Some("gear-ratio"), Some("hoist-force")));
+    for side in sides {
+        assert!(side["told_from"].as_f64() <= side["random_told_from"].as_f64(), "{side}");
+        assert!(side["p_value"].as_f64() <= side["random_p_value"].as_f64(), "{side}");
+    }
+    for (pair, expected) in [
+        (["gear-rato = { joint = 3 }", "hoist-force"], "--separate:1: gear-rato: unknown effect"),
+        (["gear-ratio = { joint = 9 }", "hoist-force"], "no joint 9"),
+        (["tracker-drift", "hoist-force"], "an effect of time"),
+    ] {
+        let more = ["--separate", pair[0], pair[1], "--candidates", &table];
+        let (_, err) = bench.run(2, "plan problems/lunar-sampler --poses 20", &more);
+        assert!(err.contains(expected), "{expected} missing in:\n{err}");
+    }
+}
+
+#[test]
 fn too_few_poses_are_not_to_be_trusted() {
     let bench = Bench::new();
     let problem = fs::read_to_string("problems/ur10-ipa/problem.toml").unwrap();

@@ -10,8 +10,9 @@ use super::bench::{lunar, ranges};
 
 const POSES: usize = 14;
 
-fn criteria() -> [Criterion; 5] {
-    [Criterion::S, Criterion::D, Criterion::A, Criterion::E, Criterion::Subset(vec![10, 16, 24])]
+fn criteria() -> [Criterion; 6] {
+    let some = || vec![10, 16, 24];
+    [Criterion::S, Criterion::D, Criterion::A, Criterion::E, Criterion::Subset(some()), Criterion::Each(some())]
 }
 
 /// Forty candidates of the lunar sampler.

@@ -83,6 +83,11 @@ impl Linear {
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
 
+    /// What [`Linear::freedom`] is to be expected to be where the priors are true: rows, priors included, less what was fitted.
+    pub fn expected_freedom(&self) -> f64 {
+        (self.basis.nrows() - self.basis.ncols()) as f64
+    }
+
     /// Fits further directions, shape = (3 N + priors, k), and takes them off the residual.
     fn fit(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let first = self.basis.ncols();

@@ -91,6 +91,11 @@ impl Score {
         (0..k).map(|i| (-estimate[i] / scale[i], inverse[(i, i)].max(0.0).sqrt() / scale[i])).collect()
     }
 
+    /// How many new directions the columns have.
+    pub fn rank(&self) -> usize {
+        self.reduction().map_or(0, |(_, rank)| rank)
+    }
+
     /// bᵀ G⁺ b and the rank of G, scaled columns; `None` where nothing new is left of them.
     fn reduction(&self) -> Option<(f64, usize)> {
         let scale = DVector::from_iterator(self.lengths.len(), self.lengths.iter().map(|length| length.sqrt()));

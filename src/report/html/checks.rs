@@ -14,6 +14,14 @@ pub(super) fn list(before: &Findings, after: &Findings) -> Markup {
     }
 }
 
+/// Checks of one fit.
+pub(super) fn of(findings: &Findings) -> Markup {
+    html! {
+        h3 { "Checks" }
+        (one(findings))
+    }
+}
+
 fn one(findings: &Findings) -> Markup {
     let of = |check: &Check| match (&check.outcome, check.failed()) {
         (Err(_), _) => "skip",

@@ -54,7 +54,7 @@ pub fn identification_page(problem: &Problem, found: &Identification, picture: &
     let body = html! {
         (headline::of_identification(problem, found))
         (section("Errors", &figures.show([figures::errors(picture), figures::vectors(picture)])))
-        (section("What is left", &figures.show(figures::histogram(picture).into_iter().chain(figures::order(picture)))))
+        (left(&mut figures, picture))
         (identified(&mut figures, found, picture))
     };
     figures.page(problem, "identification", &body)
@@ -72,6 +72,7 @@ pub fn comparison_page(problem: &Problem, comparison: &Comparison, picture: &Pic
             (parameters::comparison_table(comparison))
         }))
         (section("Errors of the joint fit", &figures.show([figures::errors(picture), figures::vectors(picture)])))
+        (left(&mut figures, picture))
         (identified(&mut figures, joint, picture))
     };
     figures.page(problem, "comparison", &body)
@@ -101,6 +102,17 @@ pub fn closure_page(problem: &Problem, closure: &Closure, picture: &Picture) -> 
         (identified(&mut figures, &closure.after, picture))
     };
     figures.page(problem, "closed loop", &body)
+}
+
+/// What a fit leaves, and what the checks say of it.
+fn left(figures: &mut Figures, picture: &Picture) -> Markup {
+    section(
+        "What is left",
+        &html! {
+            (figures.show(figures::histogram(picture).into_iter().chain(figures::order(picture))))
+            (checks::of(&picture.findings))
+        },
+    )
 }
 
 /// Parameters, what they share, and what nobody sees.

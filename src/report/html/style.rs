@@ -72,8 +72,8 @@ li.skip{color:var(--muted)}
 .found td.l{white-space:normal;overflow-wrap:anywhere}
 code{font:13px ui-monospace,SFMono-Regular,Menlo,Consolas,monospace}
 footer{margin-top:56px;padding-top:14px;border-top:1px solid var(--grid);font-size:13px;color:var(--muted)}
-@media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:64px}td,th{padding:3px 6px}th{white-space:normal}.o{display:none}.scroll{overflow-x:auto}}
-@media print{@page{margin:14mm}body{font-size:11pt}main{max-width:none;padding:0}.grid{grid-template-columns:1fr 1fr;gap:18px 22px}h2{margin-top:26px;break-after:avoid}.big{font-size:34px}.scroll{overflow:visible}table{font-size:8.5pt}td,th{padding:2px 6px}tr{break-inside:avoid}figcaption{font-size:9pt}.bar{width:80px}}
+@media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:64px}td,th{padding:3px 6px}th{white-space:normal}.o{display:none}table{font-size:13px}td.l:first-child{white-space:normal;overflow-wrap:anywhere}}
+@media print{@page{margin:14mm}body{font-size:11pt}main{max-width:none;padding:0}.grid{grid-template-columns:1fr 1fr;gap:18px 22px}h2{margin-top:26px;break-after:avoid}.big{font-size:34px}.scroll{overflow:visible}table{font-size:8.5pt}td,th{padding:2px 6px}tr{break-inside:avoid}figcaption,ul.plain li{font-size:9pt}.columns{grid-template-columns:1fr 1fr;gap:4px 22px}.bar{width:80px;-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 ";
 
 fn hex(colour: RGBColor) -> String {

@@ -9,8 +9,10 @@ use crate::picture::Correlations;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 40;
-/// Room for names.
-const NAMES: i32 = 118;
+/// Room for names, at least and at most.
+const NAMES: (i32, i32) = (118, 230);
+/// Width of a letter as a part of its height.
+const LETTER: f64 = 0.62;
 /// Correlations below this are left white.
 const LEAST: f64 = 0.05;
 
@@ -27,16 +29,22 @@ pub fn correlation(correlations: &Correlations) -> Option<Figure> {
     shown.truncate(MOST);
     shown.sort_unstable();
     let count = i32::try_from(shown.len()).unwrap_or(1);
-    let cell = ((WIDTH - NAMES - 4) / count).clamp(9, 26);
+    let longest = shown.iter().map(|&i| correlations.names[i].chars().count()).max().unwrap_or_default();
+    let letters_of = |cell: i32| (0.85 * f64::from(cell)).min(TEXT);
+    let cell_of = |names: i32| ((WIDTH - names - 4) / count).clamp(8, 26);
+    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
+    let room = |cell: i32| (LETTER * letters_of(cell) * longest as f64).ceil() as i32 + 12;
+    let names = room(cell_of(NAMES.0)).clamp(NAMES.0, NAMES.1);
+    let cell = cell_of(names);
     let height = 8 + cell * count + 40;
-    let letters = (0.85 * f64::from(cell)).min(TEXT);
+    let letters = letters_of(cell);
     let svg = figure((WIDTH, height), "Correlations of the parameters", |area| {
         for (row, &i) in (0..).zip(&shown) {
             let top = 8 + cell * row;
-            let place = (NAMES - 6, top + cell / 2);
+            let place = (names - 6, top + cell / 2);
             write_sized(area, &correlations.names[i], place, (MUTED, letters), HPos::Right)?;
             for (column, &j) in (0..).zip(&shown) {
-                let left = NAMES + cell * column;
+                let left = names + cell * column;
                 let value = matrix[(i, j)];
                 let corners = [(px(left), px(top)), (px(left + cell) - 3, px(top + cell) - 3)];
                 let style = match value {
@@ -53,11 +61,11 @@ pub fn correlation(correlations: &Correlations) -> Option<Figure> {
         for k in 0..=10 {
             let value = f64::from(k) / 5.0 - 1.0;
             let colour = if value < 0.0 { WARM.mix(-value) } else { ACCENT.mix(value) };
-            let left = NAMES + 14 * k;
+            let left = names + 14 * k;
             area.draw(&Rectangle::new([(px(left), px(y - 6)), (px(left + 14), px(y + 6))], colour.filled()))?;
         }
-        write(area, "−1", (NAMES - 6, y), MUTED, HPos::Right)?;
-        write(area, "+1   correlation [1]", (NAMES + 14 * 11 + 6, y), MUTED, HPos::Left)
+        write(area, "−1", (names - 6, y), MUTED, HPos::Right)?;
+        write(area, "+1   correlation [1]", (names + 14 * 11 + 6, y), MUTED, HPos::Left)
     });
     let left_out = all - shown.len();
     let part =

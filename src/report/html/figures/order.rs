@@ -39,7 +39,7 @@ pub fn order(picture: &Picture) -> Option<Figure> {
             let (panel, below) = rest.split_vertically(px(if last { PANEL + 36 } else { PANEL }));
             rest = below;
             let bottom = Axis::linear(across, if last { label } else { "" }).numbers(if last { 7 } else { 0 });
-            let mut chart = chart(&panel, &bottom, &Axis::linear((-most, most), name).numbers(4))?;
+            let mut chart = chart(&panel, &bottom, &Axis::linear((-most, most), name).numbers(5))?;
             let band = Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], GRID.filled());
             chart.draw_series([band])?;
             chart.draw_series([PathElement::new(vec![(across.0, 0.0), (across.1, 0.0)], line(FAINT, 1.0))])?;

@@ -67,7 +67,9 @@ pub fn ranking(trace: &Trace) -> Option<Figure> {
             area.draw(&Rectangle::new(bar, style))?;
             let mark = if k > 0 && alike(ranked) { "≈ first  " } else { "" };
             let gain = format!("{mark}−{} µm", number(ranked.gain.max(0.0) * 1e6, 0));
-            write(area, &gain, (end / px(1) + 6, y), MUTED, HPos::Left)?;
+            // Beside the bar, and clear of the line.
+            let beside = end.max(place(-trace.level.log10()));
+            write(area, &gain, (beside / px(1) + 6, y), MUTED, HPos::Left)?;
         }
         let level = place(-trace.level.log10());
         area.draw(&PathElement::new(vec![(level, px(top - 4)), (level, px(bottom))], line(INK, 1.0)))?;

@@ -1,0 +1,99 @@
+//! An arm of one's own, from its data sheet to an estimate: `cargo run --example own_arm`.
+//!
+//! Declared in text, measured on the virtual test rig (which knows a truth that the declared arm does not), identified, and
+//! printed beside that truth.
+
+use std::error::Error;
+use std::path::Path;
+
+use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::rig::{Simulation, Truth, simulate};
+use flexcal::study::{Options, identify};
+
+/// One row a joint: Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β). Two joints give way under their loads.
+const ARM: &str = r#"
+name = "elbow"
+joint = [
+  { d_m = 0.45 },
+  { alpha_deg = 90, a_m = 0.05, stiffness_N_m_per_rad = 60e3, body = [{ name = "arm", mass_kg = 9, com_m = [0.3, 0, 0] }] },
+  { a_m = 0.60, stiffness_N_m_per_rad = 25e3, body = [{ name = "forearm", mass_kg = 6, com_m = [0.25, 0, 0] }] },
+  { a_m = 0.50, body = [{ name = "hand", mass_kg = 2, com_m = [0.08, 0, 0] }] },
+]
+tool.target_m = [0.15, 0.02, 0.0]
+
+[parameters]
+"joint*.a*" = { sigma_deg = 0.2, sigma_mm = 1 }
+"joint*.stiffness" = { sigma_relative = 0.5 }
+"joint1.*" = { fixed = true }
+"base.*" = { free = true }
+
+[data]
+position_sigma_mm = 0.03
+held_out = { column = "split" }
+"#;
+
+/// What is true of it, and where it is measured.
+const TRUTH: &str = r#"
+[parameters]
+"joint2.stiffness" = { relative = 0.8 }
+"joint3.a" = { mm = 0.7 }
+
+[noise]
+position_sigma_mm = 0.03
+
+[poses]
+q1_deg = [-150, 150]
+q2_deg = [0, 120]
+q3_deg = [-130, -10]
+q4_deg = [-100, 100]
+payload_kg = [0, 3]
+identification = 40
+"#;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // The names stand for files in messages.
+    let problem = Problem::parse(ARM, Path::new("own_arm.toml"))?;
+    let truth = Truth::parse(TRUTH, Path::new("truth.toml"), &problem)?;
+    let simulation = simulate(&problem, &truth, 90, 1)?;
+    let measurements = table(&simulation);
+    let split = Split::new(&problem, &measurements)?;
+
+    let found = identify(&problem, &measurements, &split, &Options::default())?;
+    let mut lines = vec![format!("{:<18} {:>13} {:>11} {:>13}", "SI", "estimate", "± 1 σ", "true")];
+    for estimate in &found.estimates {
+        let known = simulation.parameters.iter().find(|parameter| parameter.name == estimate.name);
+        let known = known.map_or_else(String::new, |parameter| format!("{:.5}", parameter.value));
+        let error = estimate.std_error.map_or_else(String::new, |error| format!("{error:.2e}"));
+        lines.push(format!("{:<18} {:>13.5} {error:>11} {known:>13}", estimate.name, estimate.estimate));
+    }
+    let [before, after] = [&found.registered, &found.fitted].map(|errors| errors.held_out.mean.norm * 1e3);
+    lines.push(format!("held-out poses are off by {after:.3} mm on average; before, by {before:.3} mm"));
+    #[expect(clippy::print_stdout, reason = "an example shows what it found")]
+    {
+        println!("{}", lines.join("\n"));
+    }
+    Ok(())
+}
+
+/// Simulated rows as measurements. Your own would come from a file, by `Measurements::read`.
+fn table(simulation: &Simulation) -> Measurements {
+    let rows = &simulation.rows;
+    Measurements {
+        files: Vec::new(),
+        origin: (2_u32..).take(rows.len()).map(|line| (0, line)).collect(),
+        joints: simulation.joints.len(),
+        configurations: rows.iter().flat_map(|row| row.conditions.configuration.clone()).collect(),
+        positions: rows.iter().map(|row| row.position).collect(),
+        sigma: None,
+        payload: rows.iter().map(|row| row.conditions.payload).collect(),
+        hoist: None,
+        temperature: None,
+        time: rows.iter().map(|row| row.conditions.time).collect(),
+        time_measured: true,
+        approach: None,
+        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
+        target: None,
+        marked_held_out: Some(rows.iter().map(|row| row.held_out).collect()),
+    }
+}

@@ -1,0 +1,147 @@
+//! Poses planned to tell two effects apart, measured on the virtual test rig: does the loop name the right one?
+
+use std::path::Path;
+
+use flexcal::design::{Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate};
+use flexcal::diagnosis::close;
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::{Effect, Problem};
+use flexcal::rig::{Cause, TrueEffect, Truth};
+use flexcal::study::Options;
+use rayon::prelude::*;
+
+use super::bench::{lunar, measure, ranges, true_arm};
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Two effects as a problem declares them, and their strengths on the rig, SI.
+type Case = ([&'static str; 2], [&'static [f64]; 2]);
+
+/// What 28 random poses hardly tell apart (docs/sweep.md).
+const CASES: [Case; 3] = [
+    (["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"], [&[7e-4], &[0.0, 0.05 * DEGREE]]),
+    (["unmodelled-mass = { link = \"B\" }", "hoist-force"], [&[0.3, 0.8], &[0.03]]),
+    (
+        ["joint-harmonic = { joint = 4, orders = [1] }", "joint-harmonic = { joint = 4, orders = [2] }"],
+        [&[0.16 * DEGREE, 0.0], &[0.0, 0.08 * DEGREE]],
+    ),
+];
+
+fn pair(problem: &Problem, names: [&str; 2]) -> Result<Pair, DesignError> {
+    Pair::new(problem, names.map(|name| problem.effect(name, Path::new("test")).unwrap()))
+}
+
+/// 28 poses that tell the two apart, chosen among candidates within the ranges of the rig, or among few of them.
+fn planned(problem: &Problem, truth: &Truth, names: [&str; 2], few: bool) -> (Measurements, Separated) {
+    let within = ranges(truth);
+    let candidates = if few {
+        Candidates::Rows(Box::new(within.draw(problem, 300, Extremes::Often, 1, 0)))
+    } else {
+        Candidates::Within(within)
+    };
+    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None };
+    let (plan, told) = separate(&pair(problem, names).unwrap(), &candidates, None, &options).unwrap();
+    (plan.poses, told)
+}
+
+/// Whether the loop names the effect that an arm drawn from TRUTH.toml has, and nothing else, from these poses.
+fn is_named(problem: &Problem, truth: &Truth, poses: &Measurements, own: &(Effect, &[f64]), seed: u64) -> bool {
+    let mut truth = truth.clone();
+    let (effect, strengths) = own;
+    truth.effects = vec![TrueEffect::new(Cause::Catalogued(effect.clone()), strengths, &problem.joints).unwrap()];
+    let held_out = ranges(&truth).draw(problem, 4, Extremes::No, 700 + seed, 0);
+    let mut rows = below(poses, &held_out);
+    let (rig, _) = true_arm(problem, &truth, &rows, seed);
+    measure(&rig, &mut rows, truth.noise_sigma, 5000 + seed);
+    let split = Split { identification: (0..poses.len()).collect(), held_out: (poses.len()..rows.len()).collect() };
+    let closure = close(problem, &rows, &split, &Options::default()).unwrap();
+    closure.effects.len() == 1 && closure.effects[0].effect == *effect
+}
+
+/// One table below the other.
+fn below(one: &Measurements, other: &Measurements) -> Measurements {
+    let mut all = one.clone();
+    let both = |one: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>| {
+        if let (Some(one), Some(other)) = (one, other) {
+            one.extend(other);
+        }
+    };
+    all.origin.extend(&other.origin);
+    all.configurations.extend(&other.configurations);
+    all.positions.extend(&other.positions);
+    all.time = (0_u32..).take(all.positions.len()).map(f64::from).collect();
+    all.session.of_row.extend(&other.session.of_row);
+    both(&mut all.payload, &other.payload);
+    both(&mut all.hoist, &other.hoist);
+    all
+}
+
+/// In how many of the seeds the loop names each of the two where it is at work: from planned poses, and from as many random
+/// ones, drawn anew for each seed.
+fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], Separated) {
+    let (problem, truth) = lunar();
+    let (names, strengths) = case;
+    let (planned, told) = planned(&problem, &truth, *names, few);
+    let random = |seed| ranges(&truth).draw(&problem, 28, Extremes::No, 300 + seed, 0);
+    let count = |side: usize, planned_poses: bool| {
+        let own = (told.effects[side].clone(), strengths[side]);
+        let right = |&seed: &u64| {
+            let poses = if planned_poses { planned.clone() } else { random(seed) };
+            is_named(&problem, &truth, &poses, &own, seed)
+        };
+        (0..seeds).into_par_iter().filter(right).count()
+    };
+    ([count(0, true), count(1, true)], [count(0, false), count(1, false)], told)
+}
+
+#[test]
+fn planned_poses_tell_apart_what_random_ones_confuse() {
+    let (planned, _, told) = named(&CASES[1], true, 3);
+    assert_eq!(planned, [3, 3]);
+    for (side, own) in told.planned.sides.iter().enumerate() {
+        let random = told.random(|random| random.sides[side].told.worst);
+        let least = own.told.worst.unwrap();
+        assert!(least < 0.7 * random, "{least} {random}");
+        let size = own.found.worst.unwrap();
+        let p = told.random(|random| Some(random.sides[side].expected_p(size)));
+        assert!(own.expected_p(size) < p, "{} {p}", own.expected_p(size));
+    }
+    assert!(told.planned.angle.unwrap() > told.random(|own| own.angle));
+}
+
+/// The figures of docs/plan.md.
+#[test]
+#[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture right_effect"]
+fn the_right_effect_is_named_from_planned_poses() {
+    for case in &CASES {
+        let (planned, random, told) = named(case, false, 10);
+        let angle = |angle: f64| angle.to_degrees();
+        println!(
+            "{:?}: planned {planned:?}, random {random:?} of 10; angle {:.1}° planned, {:.1}° random",
+            case.0,
+            angle(told.planned.angle.unwrap()),
+            angle(told.random(|own| own.angle)),
+        );
+        for side in 0..2 {
+            println!(
+                "  told from {:.3e} planned, {:.3e} random; strengths {:?}",
+                told.planned.sides[side].told.worst.unwrap(),
+                told.random(|own| own.sides[side].told.worst),
+                case.1[side],
+            );
+        }
+        assert!(planned.iter().all(|&count| count >= 9), "{:?}", case.0);
+    }
+}
+
+#[test]
+fn a_pair_must_be_two_effects_that_poses_show() {
+    let (problem, _) = lunar();
+    let refused = |names| pair(&problem, names).unwrap_err().to_string();
+    assert!(refused(["hoist-force", "hoist-force = true"]).contains("the same"));
+    assert!(refused(["hoist-force", "tracker-drift"]).contains("effect of time"));
+    assert!(problem.effect("gear-ratio = { joint = 9 }", Path::new("test")).is_err());
+    let mut declared = problem.clone();
+    declared.effects.push(problem.effect("hoist-force", Path::new("test")).unwrap());
+    assert!(pair(&declared, ["hoist-force", "payload-mass"]).unwrap_err().to_string().contains("already"));
+}
