@@ -13,7 +13,7 @@ use crate::study::{ErrorSummary, IdentifyError, Options};
 /// Rounds after which the loop ends whatever is left.
 const MOST_ROUNDS: usize = 24;
 /// Steps of a fit to so many poses before the last: what curved valleys still hide decides nothing.
-const FEW_STEPS: u64 = 12;
+const FEW_STEPS: u64 = 4;
 /// Rivals that are fitted to decide between them.
 const MOST_RIVALS: usize = 5;
 
