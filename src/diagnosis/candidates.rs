@@ -2,6 +2,7 @@
 
 use super::data::Data;
 use crate::effect::{self, Candidate, FAMILIES};
+use crate::parameter::holds_all;
 use crate::problem::{Effect, Problem};
 
 /// Candidates of the catalogue that are not declared, divided into those that the data can show and the others.
@@ -19,6 +20,9 @@ impl Candidates {
             match untestable {
                 _ if problem.effects.iter().any(|declared| covers(&declared.effect, &effect)) => {}
                 Some(reason) => found.untestable.push((effect, reason)),
+                None if holds_all(problem, &effect::parameters_of(&effect, problem)) => {
+                    found.untestable.push((effect, "[parameters] holds it fixed"));
+                }
                 None => found.testable.push(effect),
             }
         }

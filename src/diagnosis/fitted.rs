@@ -12,6 +12,7 @@ use crate::problem::{Effect, EffectDeclaration, Problem};
 use crate::study::{Identification, IdentifyError, Noise, Options, Placement, identify};
 
 /// A fitted problem.
+#[derive(Clone)]
 pub(super) struct Fitted {
     pub problem: Problem,
     pub model: Model,
@@ -40,7 +41,7 @@ impl Fitted {
         let unknowns = (0..model.parameters.len()).filter(free).collect();
         let sigma = match found.noise {
             Noise::Estimated(sigma) => sigma,
-            Noise::Declared | Noise::Unknown => problem.data.position_sigma.unwrap_or(1e-3),
+            Noise::Declared | Noise::Unknown => placement.sigma(data.measurements, data.rows(), &problem),
         };
         Ok(Self { problem, model, found, unknowns, sigma })
     }

@@ -3,7 +3,7 @@
 use super::candidates::Candidates;
 use super::detection::{POWER, Size, candidates, sizes, timed, with_linear};
 use super::power::ScanTest;
-use super::trace::{Library, Linear, tries};
+use super::trace::tries;
 use crate::error::InputError;
 use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
@@ -70,7 +70,8 @@ pub fn separation(
                 test: ScanTest::new(score.rank(), both.expected_freedom(), 1.0),
             }
         };
-        Separation { angle: angle(library, linear, [one, other]), sides: [side(one, other), side(other, one)] }
+        let angle = linear.angle(&library.columns(one), &library.columns(other));
+        Separation { angle, sides: [side(one, other), side(other, one)] }
     })
 }
 
@@ -79,10 +80,4 @@ fn first(sizes: Vec<Size>) -> Size {
     let none =
         Size { parameters: Vec::new(), unit: crate::parameter::Unit::Number, prior: 0.0, worst: None, best: None };
     sizes.into_iter().next().unwrap_or(none)
-}
-
-fn angle(library: &Library, linear: &Linear, [one, other]: [&Effect; 2]) -> Option<f64> {
-    let [a, b] = [one, other].map(|effect| linear.directions(&library.columns(effect)));
-    let cosines = a.tr_mul(&b).singular_values();
-    cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
 }

@@ -190,7 +190,12 @@ pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, le
     let correction = validated
         .filter(|(without, with)| with < without)
         .map(|(without, with)| correct(fitted, data, &generic, (rms(without), rms(with))));
-    Some(Unexplained { place: generic.place(), depends_on: vec![generic.depends_on()], p_value: corrected, correction })
+    let depends_on = match generic.of {
+        // Without a column for it, the order of the rows stands for time.
+        Quantity::Elapsed if !data.measurements.time_measured => "row".to_owned(),
+        _ => generic.depends_on(),
+    };
+    Some(Unexplained { place: generic.place(), depends_on: vec![depends_on], p_value: corrected, correction })
 }
 
 /// Structure that the checks see and no place or quantity shows.

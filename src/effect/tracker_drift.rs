@@ -17,7 +17,7 @@ pub(super) const FAMILY: Family = Family {
     },
     candidates: |_, conditions| {
         let there = !conditions.times.is_empty();
-        vec![Candidate::needing(Effect::TrackerDrift, there, "all poses have the same time")]
+        vec![Candidate::needing(Effect::TrackerDrift, there, "too few poses before or after any time")]
     },
     describe: |effect| match effect {
         Effect::TrackerDrift => "the measuring station drifts".to_owned(),

@@ -11,6 +11,7 @@ mod resolve;
 pub use constraint::{LinearConstraint, constrain};
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
+pub(crate) use resolve::holds_all;
 pub use resolve::{EffectParameter, resolve};
 
 /// A free parameter.

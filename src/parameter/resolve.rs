@@ -103,6 +103,19 @@ pub fn resolve(
     Ok(parameters)
 }
 
+/// Whether the rules of `problem` hold all of these parameters of an effect that it does not declare.
+pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
+    let held = |parameter: &EffectParameter| {
+        let kind = unit(parameter.slot, parameter.driver);
+        let speaks = |rule: &&ParameterRule| {
+            (matches(&rule.pattern, &parameter.name) || matches(&rule.pattern, &parameter.plain)) && fits(rule, kind)
+        };
+        let last = problem.parameters.iter().rev().find(speaks);
+        last.is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
+    };
+    !parameters.is_empty() && parameters.iter().all(held)
+}
+
 /// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, effects.
 pub(super) fn candidates(
     problem: &Problem,

@@ -78,7 +78,7 @@ pub fn of_identification(
     states.extend(sight.rigid(problem, &fitted.model)?);
     states.push(sight.identified(&fitted, found));
     let findings = examine(problem, measurements, split, found)?;
-    Ok(sight.picture(states, &fitted, found, (sigma_of(problem, found), findings)))
+    Ok(sight.picture(states, &fitted, found, (sigma_of(problem, found, &sight), findings)))
 }
 
 /// The picture of a comparison: of its joint fit, and of geometry alone.
@@ -100,7 +100,7 @@ pub fn of_comparison(
     }
     states.push(sight.identified(&fitted, &comparison.joint));
     let findings = examine(problem, measurements, split, &comparison.joint)?;
-    Ok(sight.picture(states, &fitted, &comparison.joint, (sigma_of(problem, &comparison.joint), findings)))
+    Ok(sight.picture(states, &fitted, &comparison.joint, (sigma_of(problem, &comparison.joint, &sight), findings)))
 }
 
 /// The picture of a closed loop, with the cause of every effect that it found.
@@ -120,7 +120,7 @@ pub fn of_closure(
     states.extend(sight.rigid(problem, &before.model)?);
     states.push(sight.identified(&before, &closure.before.fit));
     states.push(sight.state(Stand::Closed, &after));
-    let sigma = sigma_of(&closure.closed, &closure.after);
+    let sigma = sigma_of(&closure.closed, &closure.after, &sight);
     let mut picture = sight.picture(states, &after, &closure.after, (sigma, closure.findings.clone()));
     picture.causes =
         closure.effects.iter().filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &sight)).collect();
@@ -129,10 +129,12 @@ pub fn of_closure(
 }
 
 /// 1 σ of a coordinate in rows without one of their own [m].
-fn sigma_of(problem: &Problem, found: &Identification) -> f64 {
+fn sigma_of(problem: &Problem, found: &Identification, sight: &Sight) -> f64 {
     match found.noise {
         Noise::Estimated(sigma) => sigma,
-        Noise::Declared | Noise::Unknown => problem.data.position_sigma.unwrap_or(1e-3),
+        Noise::Declared | Noise::Unknown => {
+            sight.placement.sigma(sight.measurements, &sight.split.identification, problem)
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use super::active::ActiveConstraint;
 use super::fitting::{FitEnd, Fitting};
 use super::outcome::{Estimate, Identification, Noise, enter};
+use super::placement::UNKNOWN_SIGMA;
 use super::stage::StageError;
 use super::statistics::Statistics;
 use super::trust::{Distrust, misses, underdetermined};
@@ -126,7 +127,7 @@ pub fn identify_model(
         loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
         max_steps: options.max_steps,
-        sigma: declared.unwrap_or(1e-3),
+        sigma: declared.unwrap_or(UNKNOWN_SIGMA),
     };
     if let Some(row) = fitting.without_equilibrium() {
         return Err(measurements.location(row).error(InputErrorKind::NoEquilibrium).into());

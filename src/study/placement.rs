@@ -4,6 +4,10 @@ use crate::arm::Setup;
 use crate::measurement::{Measurements, Split};
 use crate::model::{Model, Pose};
 use crate::parameter::Slot;
+use crate::problem::Problem;
+
+/// Scale of a coordinate's error where no σ is declared and none estimated yet [m].
+pub(super) const UNKNOWN_SIGMA: f64 = 1e-3;
 
 /// Bases and targets of a set of measurements.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,6 +41,13 @@ impl Placement {
     /// Target of a row.
     pub fn target_of(&self, row: usize) -> usize {
         self.target_of_row[row]
+    }
+
+    /// 1 σ of a coordinate of some rows together, as declared [m].
+    pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
+        let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
+        let squares = rows.iter().map(|&row| measurements.sigma.as_ref().map_or(whole, |all| all[row]).powi(2));
+        if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
     /// Rows as poses; `sigma` [m] is that of rows without one of their own.

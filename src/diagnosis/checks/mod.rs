@@ -30,6 +30,8 @@ use judgement::{ALPHA, Trial, Tried, judge};
 use leverage::Leverage;
 use statistic::{Sample, Statistic};
 
+use super::trace::LEAST_SCATTER;
+
 pub use outcome::{Check, Findings, Outcome, Sequence, Test, Untestable};
 
 /// Degrees of freedom below which nothing is tested.
@@ -133,6 +135,10 @@ fn testable(remainder: &Remainder) -> Result<(), Untestable> {
         && [remainder.time.len(), remainder.session.len(), remainder.setup.len()] == [poses; 3];
     if !shapes {
         return Err(Untestable::SizeMismatch);
+    }
+    let size = remainder.residual.norm_squared() / rows.max(1) as f64;
+    if remainder.sigma_is_declared && rows > 0 && size < LEAST_SCATTER.powi(2) {
+        return Err(Untestable::Rounding);
     }
     let finite = remainder.residual.iter().chain(remainder.fitted.iter()).all(|value| value.is_finite());
     if finite { Ok(()) } else { Err(Untestable::NotFinite) }

@@ -55,6 +55,9 @@ pub enum Untestable {
     /// No σ was declared.
     #[error("no σ is declared")]
     NoSigma,
+    /// The residual is below a thousandth of σ.
+    #[error("the residual is below a thousandth of σ: rounding")]
+    Rounding,
     /// No setup was measured more than once.
     #[error("no setup was measured twice")]
     NoRepeats,

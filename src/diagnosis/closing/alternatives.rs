@@ -14,8 +14,8 @@ const UNTOLD: f64 = 6.0;
 pub(super) struct Alternatives {
     /// Best first; of one family only the best at each place.
     pub effects: Vec<Effect>,
-    /// Whether the best of them explains the data better, beyond doubt.
-    pub better: bool,
+    /// The candidate, another time of the same shift included, that explains the data better beyond doubt.
+    pub better: Option<Effect>,
 }
 
 /// What may stand in the place of each added effect, all others kept, in the linear neighbourhood of a fit.
@@ -57,7 +57,8 @@ impl<'f, 'a> Replacements<'f, 'a> {
                 effects.push(candidate.clone());
             }
         }
-        let better = ranking.first().is_some_and(|tried| tried.criterion < own - UNTOLD);
+        let better = ranking.first().filter(|tried| tried.criterion < own - UNTOLD);
+        let better = better.map(|tried| self.scan.effects[tried.index].clone());
         Alternatives { effects, better }
     }
 }

@@ -92,28 +92,13 @@ pub fn close(
         let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
         fitted = rounds.run(next)?;
     }
-    let candidates = Candidates::of(&fitted.problem, &data).testable;
-    if let Some((generic, rest)) = unexplained::withdraw(&fitted, &data, &rounds.added(&fitted), &candidates) {
-        rounds.generics.push(generic);
-        let without = rounds.fit(&fitted, &rest)?;
-        let without = rounds.without_insignificant(without)?;
-        rounds.seen.clear();
-        rounds.note(&without);
-        fitted = rounds.run(without)?;
-    } else if let Some(generic) = unexplained::strongest(&fitted, &data, LEVEL) {
-        // Effects that only stood in for it leave.
-        rounds.generics.push(generic);
-        let without = rounds.without_insignificant(fitted)?;
-        if rounds.is_new(&without) {
-            rounds.note(&without);
-        }
-        fitted = without;
-    }
+    let (fitted, unexplained) = with_generic(&mut rounds, fitted)?;
     let (fitted, wave_sigma) = waves::filled(&rounds, fitted)?;
     let findings = check_fit(&fitted, &data);
-    let unexplained = match rounds.generics.first() {
-        Some(known) => unexplained::localise(&fitted, &data, Some(known), LEVEL),
-        None => unexplained::localise(&fitted, &data, None, LEVEL),
+    let unexplained = if rounds.has_many_poses() {
+        unexplained::localise(&fitted, &data, rounds.generics.first(), LEVEL)
+    } else {
+        unexplained
     };
     let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
     let effects = found(&rounds, &fitted);
@@ -138,6 +123,38 @@ pub fn close(
     })
 }
 
+/// The fit without effects that only stood in for smooth structure of another kind, and that structure; the fit as it was
+/// where in the end there is none.
+fn with_generic(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<Unexplained>), IdentifyError> {
+    let data = rounds.data;
+    let candidates = Candidates::of(&fitted.problem, data).testable;
+    let without =
+        if let Some((generic, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates) {
+            rounds.generics.push(generic);
+            let without = rounds.fit(&fitted, &rest)?;
+            let without = rounds.without_insignificant(without)?;
+            rounds.seen.clear();
+            rounds.note(&without);
+            rounds.run(without)?
+        } else if let Some(generic) = unexplained::strongest(&fitted, data, LEVEL) {
+            rounds.generics.push(generic);
+            let without = rounds.without_insignificant(fitted.clone())?;
+            if rounds.is_new(&without) {
+                rounds.note(&without);
+            }
+            without
+        } else {
+            return Ok((fitted, None));
+        };
+    let left = unexplained::localise(&without, data, rounds.generics.first(), LEVEL);
+    if left.is_some() {
+        return Ok((without, left));
+    }
+    rounds.generics.clear();
+    rounds.note(&fitted);
+    Ok((fitted, None))
+}
+
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
 fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
     let added = rounds.added(fitted);
@@ -150,7 +167,7 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     let replacements = Replacements::new(fitted, &library, &candidates, &generics);
     for effect in &added {
         let other = replacements.of(effect);
-        if let (true, Some(better)) = (other.better, other.effects.first()) {
+        if let Some(better) = &other.better {
             let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
             let next = rounds.fit(fitted, &kept)?;
             let next = rounds.without_insignificant(next)?;

@@ -15,6 +15,8 @@ const RIVAL: f64 = 10.0;
 const OVERWHELMING: f64 = 1e-12;
 /// Poses beyond which rivals are not fitted one by one, nor effects: the linear neighbourhood of so many decides as well.
 pub(super) const MOST_REFITTED: usize = 1000;
+/// Candidates, best first, that may fail the cross-validation before a round adds nothing.
+const MOST_VALIDATED: usize = 8;
 /// Effects that a round adds at most.
 const MOST: usize = 100;
 
@@ -35,7 +37,7 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
         let ranking = scan.ranking();
         let mut standing = ranking.iter().filter(|tried| tried.corrected < LEVEL && tried.criterion < 0.0);
         // The first alone must predict poses that were left out; overwhelming ones after it are judged together.
-        let Some(best) = standing.find(|tried| {
+        let Some(best) = standing.by_ref().take(MOST_VALIDATED).find(|tried| {
             if !picks.is_empty() {
                 return true;
             }

@@ -144,7 +144,7 @@ impl Rounds<'_> {
         }
     }
 
-    /// ν ln(squares) + k ln ν of a fit, with 2 ln(tries) for the effect that was picked.
+    /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect that was picked.
     fn criterion(&self, fitted: &Fitted, picked: &Effect) -> f64 {
         let library = fitted.library(self.data, &[], &self.generics);
         let linear = fitted.linear(&library, &[], &self.generics);
@@ -152,7 +152,8 @@ impl Rounds<'_> {
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
         let rows = linear.rows() as f64;
-        rows * linear.sums().squares.ln() + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
+        let squares = linear.sums().squares.ln() + 2.0 * fitted.sigma.ln();
+        rows * squares + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
     }
 
     /// The same without the effects that have lost their significance.

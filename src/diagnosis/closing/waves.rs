@@ -8,8 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::super::candidates::{covers, joined};
 use super::super::data::Data;
-use super::super::fitted::Fitted;
+use super::super::fitted::{Fitted, with_generics};
+use super::super::generic::Generic;
 use super::rounds::Rounds;
 use crate::parameter::Driver;
 use crate::problem::pattern::matches;
@@ -41,10 +43,11 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     }
     let squares: f64 = waves.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / waves.len() as f64).sqrt();
-    let effects: Vec<Effect> = fitted.effects().into_iter().map(all_orders).collect();
+    let more: Vec<Effect> = rounds.added(&fitted).into_iter().map(|own| all_orders(own, &rounds.declared)).collect();
+    let effects = more.iter().fold(rounds.declared.clone(), |all, own| joined(&all, own));
     let dense = with_scale(fitted.with_effects(&effects), found);
     let dense = rounds.fit_few(dense, &fitted)?;
-    let scale = best_scale(&dense, rounds.data, found);
+    let scale = best_scale(&dense, rounds.data, &rounds.generics, found);
     let scaled = with_scale(fitted.with_effects(&effects), scale);
     Ok((rounds.fit_whole(scaled, &dense)?, Some(scale)))
 }
@@ -66,11 +69,16 @@ fn plain(name: &str) -> String {
     }
 }
 
-/// Several orders become all of them up to the highest.
-fn all_orders(effect: Effect) -> Effect {
+/// Several orders of a joint that were found become all of them up to the highest but those declared.
+fn all_orders(effect: Effect, declared: &[Effect]) -> Effect {
     match effect {
         Effect::JointHarmonic { joint, orders } if orders.len() >= SEVERAL => {
-            Effect::JointHarmonic { joint, orders: (1..=orders.into_iter().max().unwrap_or(1)).collect() }
+            let highest = orders.into_iter().max().unwrap_or(1);
+            let is_known = |&order: &u32| {
+                let wave = Effect::JointHarmonic { joint, orders: vec![order] };
+                declared.iter().any(|known| covers(known, &wave))
+            };
+            Effect::JointHarmonic { joint, orders: (1..=highest).filter(|order| !is_known(order)).collect() }
         }
         other => other,
     }
@@ -100,10 +108,10 @@ struct Part {
 
 /// The scale [rad] of the prior on waves with which parts of the joints' ranges that are left out are
 /// predicted best, in the linear neighbourhood of the fit.
-fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
+fn best_scale(fitted: &Fitted, data: &Data, generics: &[Generic], found: f64) -> f64 {
     let waves = waves(fitted);
-    let library = fitted.library(data, &[], &[]);
-    let (columns, residual) = (library.fitted(), library.residual());
+    let library = fitted.library(data, &[], generics);
+    let (columns, residual) = (with_generics(&library, generics), library.residual());
     let part = |poses: &Vec<usize>| {
         let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
         let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));
@@ -115,7 +123,7 @@ fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
     let at = |j: usize| fitted.unknowns.get(j).map_or(0.0, |&k| fitted.found.x[k]);
     let sigma = |j: usize| match fitted.unknowns.get(j) {
         Some(&k) => fitted.model.parameters[k].sigma,
-        None => library.let_go()[j - fitted.unknowns.len()],
+        None => library.let_go().get(j - fitted.unknowns.len()).copied().flatten(),
     };
     let weights: Vec<f64> = (0..n).map(|j| sigma(j).map_or(0.0, |sigma| sigma.powi(-2))).collect();
     let error = |scale: f64| -> f64 {
@@ -138,7 +146,11 @@ fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
         all.map_or(f64::INFINITY, |all| all.iter().sum())
     };
     let tried: Vec<_> = SCALES.map(|power| found * 2.0_f64.powi(power)).map(|scale| (scale, error(scale))).collect();
-    tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |(scale, _)| scale)
+    tried
+        .into_iter()
+        .filter(|(_, error)| error.is_finite())
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(found, |(scale, _)| scale)
 }
 
 /// Identification poses in each part of each joint's range, as many in each.

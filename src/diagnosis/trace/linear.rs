@@ -7,6 +7,8 @@ use super::score::{Score, Sums};
 
 /// A direction is taken to be spanned by others when less than this part of its length is new.
 const SPANNED: f64 = 1e-9;
+/// A direction is decided by a block alone when less than this part of it is left without the block.
+const LEAST_DECIDED: f64 = 1e-6;
 /// Least diagonal of a Cholesky factor that can be trusted.
 const CLOSE_TO_DEPENDENT: f64 = 1e-6;
 
@@ -161,10 +163,20 @@ impl Linear {
         self.clone().add(columns)
     }
 
+    /// Largest principal angle [rad] between what two sets of columns add to the fit; `None` where one of them adds nothing.
+    pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
+        let (a, b) = (self.directions(one), self.directions(other));
+        if a.is_empty() || b.is_empty() {
+            return None;
+        }
+        let cosines = a.tr_mul(&b).singular_values();
+        cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
+    }
+
     /// Sum of squared residuals of poses that are left out, block by block, from the fit without them.
     ///
     /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's identity
-    /// r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b; `None` where a block alone decides a direction.
+    /// r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. A direction that a block alone decides is left as it was fitted.
     pub fn cross_validate(&self, block: &[usize]) -> Option<f64> {
         let blocks = block.iter().max().map_or(0, |last| last + 1);
         let n = self.basis.ncols();
@@ -172,13 +184,25 @@ impl Linear {
             let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
             let (basis, residual) = (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
             let inner = DMatrix::identity(n, n) - basis.transpose() * &basis;
-            let left_out = &residual + &basis * inner.cholesky()?.solve(&basis.tr_mul(&residual));
-            Some(left_out.norm_squared())
+            let step = solve(inner, &basis.tr_mul(&residual));
+            (residual + basis * step).norm_squared()
         };
-        let sums: Option<Vec<f64>> = (0..blocks).into_par_iter().map(left_out).collect();
-        let sum: f64 = sums?.iter().sum();
+        let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
+        let sum: f64 = sums.iter().sum();
         sum.is_finite().then_some(sum)
     }
+}
+
+/// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly 0.
+fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    if let Some(factor) = matrix.clone().cholesky()
+        && factor.l_dirty().diagonal().iter().all(|value| value * value > LEAST_DECIDED)
+    {
+        return factor.solve(right);
+    }
+    let eigen = matrix.symmetric_eigen();
+    let inverted = eigen.eigenvalues.map(|value| if value > LEAST_DECIDED { value.recip() } else { 0.0 });
+    &eigen.eigenvectors * eigen.eigenvectors.tr_mul(right).component_mul(&inverted)
 }
 
 /// Orthonormal columns with the same span, by Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015]; `None` where

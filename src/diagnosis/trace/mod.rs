@@ -8,4 +8,4 @@ mod score;
 pub(super) use library::Library;
 pub(super) use linear::Linear;
 pub(super) use scan::{Scan, Tried, tries};
-pub(super) use score::Gain;
+pub(super) use score::{Gain, LEAST_SCATTER};

@@ -93,7 +93,7 @@ impl<'a, 'l> Scan<'a, 'l> {
 
     /// Candidates that the fit absorbs, so that nothing is left to show them.
     pub fn absorbed(&self) -> Vec<&Effect> {
-        let gone = |(effect, score)| self.linear.sums().gain(score).is_none().then_some(effect);
+        let gone = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
     }
 
@@ -119,9 +119,7 @@ impl<'a, 'l> Scan<'a, 'l> {
 
     /// Largest principal angle [rad] between what two candidates add to the fit; none where one of them adds nothing.
     pub fn angle(&self, one: usize, other: usize) -> Option<f64> {
-        let (a, b) = (self.linear.directions(&self.columns(one)), self.linear.directions(&self.columns(other)));
-        let cosines = a.tr_mul(&b).singular_values();
-        cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
+        self.linear.angle(&self.columns(one), &self.columns(other))
     }
 }
 

@@ -5,6 +5,8 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 /// A candidate is absorbed by the fit when less than this part of a column's length is new.
 const ABSORBED: f64 = 1e-4;
+/// Scatter, in units of σ, below which the residual is rounding and nothing is sought in it.
+pub(in crate::diagnosis) const LEAST_SCATTER: f64 = 1e-3;
 
 /// What the residual says about columns that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +67,8 @@ impl Sums {
 
     /// What a reduction of the sum of squares by so many new directions means.
     pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
-        let (total, degrees) = (self.squares, self.freedom());
+        let degrees = self.freedom();
+        let total = self.squares.max(LEAST_SCATTER.powi(2) * degrees);
         let left = degrees - freedom as f64;
         if left < 1.0 || freedom == 0 {
             return None;

@@ -13,6 +13,8 @@ struct Document<'a> {
     problem: &'a str,
     verdict: &'static str,
     trusted: bool,
+    /// Whether structure in the residual could be tested for.
+    tested: bool,
     registered: Both,
     before: FitEntry,
     after: FitEntry,
@@ -166,6 +168,7 @@ pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
             Verdict::Unexplained => "unexplained",
         },
         trusted: closure.after.is_trusted(),
+        tested: closure.findings.is_testable(),
         registered: (&closure.before.fit.registered).into(),
         before: (&closure.before.fit).into(),
         after: (&closure.after).into(),

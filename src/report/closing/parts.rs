@@ -137,7 +137,7 @@ pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<S
             ));
             let (factor, unit) = unit(problem, &on);
             sentences.push(format!(
-                "It holds for {on} from {} to {} {unit}, as far as the identification poses reach; nothing is corrected beyond \
+                "It holds for {on} from {} to {}{unit}, as far as the identification poses reach; nothing is corrected beyond \
                  ({beyond} of {} held-out poses).",
                 number(range.0 * factor, 2),
                 number(range.1 * factor, 2),
@@ -151,16 +151,17 @@ pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<S
 /// Factor from SI to the unit in which people read a quantity of the poses.
 fn unit(problem: &Problem, quantity: &str) -> (f64, &'static str) {
     match quantity {
-        "temperature" => (1.0, "°C"),
-        "time" => (1.0 / 3600.0, "h"),
-        "payload" => (1.0, "kg"),
-        "hoist" => (1.0, "N"),
+        "temperature" => (1.0, " °C"),
+        "time" => (1.0 / 3600.0, " h"),
+        "row" => (1.0, ""),
+        "payload" => (1.0, " kg"),
+        "hoist" => (1.0, " N"),
         command => {
             let joint = command.strip_prefix('q').and_then(|number| number.parse::<usize>().ok());
             let joint = joint.and_then(|number| problem.joints.get(number.checked_sub(1)?));
             match joint.map(|joint| joint.kind) {
-                Some(JointKind::Prismatic) => (1e3, "mm"),
-                _ => (180.0 / std::f64::consts::PI, "°"),
+                Some(JointKind::Prismatic) => (1e3, " mm"),
+                _ => (180.0 / std::f64::consts::PI, " °"),
             }
         }
     }
