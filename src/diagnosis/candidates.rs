@@ -5,6 +5,9 @@ use crate::effect::{self, Candidate, FAMILIES};
 use crate::parameter::holds_all;
 use crate::problem::{Effect, Problem};
 
+/// Why an effect that the rules of the problem hold at zero is not looked for.
+pub const HELD_FIXED: &str = "[parameters] holds it fixed";
+
 /// Candidates of the catalogue that are not declared, divided into those that the data can show and the others.
 pub(super) struct Candidates {
     pub testable: Vec<Effect>,
@@ -21,7 +24,7 @@ impl Candidates {
                 _ if problem.effects.iter().any(|declared| covers(&declared.effect, &effect)) => {}
                 Some(reason) => found.untestable.push((effect, reason)),
                 None if holds_all(problem, &effect::parameters_of(&effect, problem)) => {
-                    found.untestable.push((effect, "[parameters] holds it fixed"));
+                    found.untestable.push((effect, HELD_FIXED));
                 }
                 None => found.testable.push(effect),
             }

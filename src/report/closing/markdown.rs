@@ -33,7 +33,7 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
     blocks.extend(rounds(closure));
     blocks.extend(parts::found(closure));
     blocks.push(Block::heading("What remains"));
-    let unexplained = closure.unexplained.iter().flat_map(|rest| parts::unexplained(problem, rest));
+    let unexplained = parts::unexplained(problem, closure).into_iter();
     blocks.push(Block::list(unexplained.chain(findings::all(&closure.findings))));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.push(Block::Table(Table {

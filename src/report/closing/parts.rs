@@ -3,7 +3,7 @@
 use super::super::document::{Block, Point, Table};
 use super::super::effect;
 use super::super::quantity::number;
-use crate::diagnosis::{Closure, Correction, Found, Unexplained, Verdict};
+use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, Unexplained, Verdict};
 use crate::effect::describe;
 use crate::problem::{JointKind, Problem};
 use crate::study::ErrorSummary;
@@ -112,14 +112,21 @@ fn point(found: &Found) -> Point {
 }
 
 /// What no effect explains.
-pub(super) fn unexplained(problem: &Problem, unexplained: &Unexplained) -> Vec<String> {
+pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
+    let Some(unexplained) = &closure.unexplained else { return Vec::new() };
     let Unexplained { place, depends_on, p_value, correction } = unexplained;
     let on = depends_on.join(", ");
     let mut sentences = vec![match on.as_str() {
         "" => format!("Structure is left: {place} ({}).", effect::p(*p_value)),
         on => format!("Structure is left: {place}, depending on {on} ({}).", effect::p(*p_value)),
     }];
-    sentences.push("No effect of the catalogue explains it.".to_owned());
+    let held = closure.before.untestable.iter().filter(|(_, reason)| *reason == HELD_FIXED).count();
+    sentences.push(match held {
+        0 => "No effect of the catalogue explains it.".to_owned(),
+        _ => format!(
+            "No effect of the catalogue explains it; {held} were not tried because [parameters] holds them fixed."
+        ),
+    });
     match correction {
         None => {
             sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());

@@ -25,7 +25,7 @@ pub fn loop_text(problem: &Problem, closure: &Closure) -> String {
     let failed = findings::failed(&closure.findings);
     if closure.unexplained.is_some() || (!failed.is_empty() && !closure.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
-        let unexplained = closure.unexplained.iter().flat_map(|rest| parts::unexplained(problem, rest));
+        let unexplained = parts::unexplained(problem, closure).into_iter();
         // Without effects the checks are those above.
         let failed = failed.into_iter().filter(|_| !closure.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
