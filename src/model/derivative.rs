@@ -2,7 +2,8 @@
 //!
 //! A base or a target moves the position rigidly. On a rigid arm so does every parameter of a link: the point beyond is
 //! carried through its one motion in dual numbers, and the frame before that motion chains on in plain numbers. On an
-//! elastic arm every load moves too, so the parameters go through the whole statics in chunks.
+//! elastic arm every load moves too: what a parameter does to its own part is taken alone, and virtual work tells what that
+//! does to the target; parameters that change loads go through the whole statics, one by one.
 
 use nalgebra::{DVector, Vector3};
 use num_dual::{Dual64, DualSVec64};
@@ -11,16 +12,11 @@ use super::driven::Commands;
 use super::inputs::{Input, inputs};
 use super::observation::Observation;
 use super::{Model, Pose};
-use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Setup, Workspace};
+use crate::arm::{Angle, Arm, Equilibrated, Joint, Part, Response, Sensitivity, Setup, Workspace};
 use crate::fit::Block;
-use crate::parameter::{Driver, JointField, Slot};
+use crate::parameter::{ArmField, BeamField, Driver, JointField, Slot};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, Motion, rotation_axes};
-
-/// Parameters seeded at once on an elastic arm.
-const CHUNK: usize = 10;
-
-type ChunkDual = DualSVec64<CHUNK>;
 
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
@@ -52,16 +48,24 @@ struct Target {
 enum Inner {
     /// Motion by motion; `passed` are those of the pose at hand.
     Rigid { links: Vec<Link>, inputs: Vec<Input>, passed: Vec<Passed> },
-    /// In chunks through the statics.
+    /// Through the statics.
     Elastic(Box<Elastic>),
 }
 
-/// An elastic arm, chunk by chunk, with memory for its walks.
+/// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
 struct Elastic {
+    parts: Option<Parts>,
     response: Response,
-    chunks: Vec<Chunk>,
+    whole: Vec<Whole>,
+    /// Memory for walks.
     real: Workspace<f64>,
-    ws: Workspace<ChunkDual>,
+    ws: Workspace<Dual64>,
+}
+
+/// An arm to be taken apart, and the direction of each input in its part.
+struct Parts {
+    sensitivity: Sensitivity,
+    inputs: Vec<(Input, Part, usize)>,
 }
 
 /// A link of a rigid arm with each of its five parameters seeded, and which input each is.
@@ -77,10 +81,10 @@ struct Passed {
     input: Option<usize>,
 }
 
-/// The arm with up to [`CHUNK`] of its inputs seeded.
-struct Chunk {
-    arm: Arm<ChunkDual>,
-    inputs: Vec<Input>,
+/// An input with the arm that has it seeded.
+struct Whole {
+    arm: Arm<Dual64>,
+    input: Input,
 }
 
 impl Linearised {
@@ -112,21 +116,9 @@ impl Linearised {
                 Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
             }
         }
-        let mut inputs = inputs(model, unknowns);
-        // In the order of the arm: a chunk costs less the further out its first input is, for all before it is constant.
-        inputs.sort_by_key(|input| match input.slot {
-            Slot::Joint { joint, .. } | Slot::Beam { joint, .. } => joint + 1,
-            _ => 0,
-        });
+        let inputs = inputs(model, unknowns);
         let inner = if arm.is_elastic() {
-            let chunks =
-                inputs.chunks(CHUNK).map(|part| Chunk { arm: seed_arm(model, x, part), inputs: part.to_vec() });
-            Inner::Elastic(Box::new(Elastic {
-                response: Response::new(&arm),
-                chunks: chunks.collect(),
-                real: Workspace::default(),
-                ws: Workspace::default(),
-            }))
+            Inner::Elastic(Box::new(Elastic::new(model, x, &arm, inputs)))
         } else {
             Inner::Rigid { links: links(&arm, &inputs), inputs, passed: Vec::new() }
         };
@@ -249,30 +241,81 @@ impl Inner {
                     after = moved.map(|coordinate| coordinate.re);
                 }
             }
-            Self::Elastic(elastic) => {
-                let Elastic { response, chunks, ws, .. } = &mut **elastic;
-                if !chunks.is_empty() {
-                    response.adjoint(setup, &target.position, rest);
-                }
-                for chunk in chunks {
-                    let position = chunk.arm.target_position(setup, &target.position, rest, ws);
-                    let gradients = position.map(|coordinate| gradient(&coordinate));
-                    for (k, input) in chunk.inputs.iter().enumerate() {
-                        rows.put_input(input, commanded, &base.frame.vector(&gradients.map(|g| g[k])));
-                    }
-                }
-            }
+            Self::Elastic(elastic) => elastic.write(commanded, setup, base, target, rest, rows),
         }
     }
 }
 
-/// The arm at `x` with a derivative for each of some inputs.
-fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[Input]) -> Arm<ChunkDual> {
-    let place = |k: usize| inputs.iter().position(|input| input.parameter == Some(k));
-    let mut arm = model.arm(|k| seeded(x[k], place(k)));
-    for (direction, input) in inputs.iter().enumerate() {
+impl Elastic {
+    fn new(model: &Model, x: &DVector<f64>, arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
+        let (mut apart, mut whole) = (Vec::new(), Vec::new());
+        for input in inputs {
+            match part_of(arm, input.slot).filter(|_| Sensitivity::applies_to(arm)) {
+                Some(part) => {
+                    let before = apart.iter().filter(|(_, of, _)| *of == part).count();
+                    apart.push((input, part, part.first_lane() + before));
+                }
+                None => whole.push(Whole { arm: seed_arm(model, x, &[&input]), input }),
+            }
+        }
+        let parts = (!apart.is_empty()).then(|| {
+            let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
+            let seeded = |lane| {
+                let of_lane: Vec<&Input> =
+                    apart.iter().filter(|(_, _, own)| *own == lane).map(|(input, _, _)| input).collect();
+                seed_arm(model, x, &of_lane)
+            };
+            Parts { sensitivity: Sensitivity::new(arm, count, seeded), inputs: apart.clone() }
+        });
+        Self { parts, response: Response::new(arm), whole, real: Workspace::default(), ws: Workspace::default() }
+    }
+
+    fn write(
+        &mut self,
+        commanded: &Setup,
+        setup: &Setup,
+        base: &Base,
+        target: &Target,
+        rest: &mut Equilibrated,
+        rows: &mut Rows,
+    ) {
+        let Self { parts, response, whole, ws, .. } = self;
+        match parts {
+            Some(Parts { sensitivity, inputs }) => {
+                sensitivity.differentiate(setup, &target.position, rest);
+                for (input, part, lane) in inputs {
+                    rows.put_input(input, commanded, &base.frame.vector(&sensitivity.of(*part, *lane)));
+                }
+            }
+            None if !whole.is_empty() => response.adjoint(setup, &target.position, rest),
+            None => {}
+        }
+        for Whole { arm, input } in whole {
+            let position = arm.target_position(setup, &target.position, rest, ws);
+            rows.put_input(input, commanded, &base.frame.vector(&position.map(|coordinate| coordinate.eps)));
+        }
+    }
+}
+
+/// The part on which alone an input acts; none where it changes loads.
+fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Part> {
+    match slot {
+        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Part::Beam(joint)),
+        Slot::Joint { joint, .. } => Some(Part::Joint(joint)),
+        Slot::Beam { field: BeamField::AddedMass, .. } => None,
+        Slot::Beam { joint, .. } => Some(Part::Beam(joint)),
+        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Part::Mounting),
+        _ => None,
+    }
+}
+
+/// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
+fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
+    let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
+    let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
+    for input in inputs {
         if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
-            let seed = seeded(0.0, Some(direction));
+            let seed = Dual64::from(0.0).derivative();
             let joint = &mut arm.joints[joint];
             match field {
                 JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
