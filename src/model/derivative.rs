@@ -9,12 +9,13 @@ use nalgebra::{DVector, Vector3};
 use num_dual::{Dual64, DualSVec64};
 
 use super::driven::Commands;
+use super::elastic::Elastic;
 use super::inputs::{Input, inputs};
 use super::observation::Observation;
 use super::{Model, Pose};
-use crate::arm::{Angle, Arm, Equilibrated, Joint, Part, Response, Sensitivity, Setup, Workspace};
+use crate::arm::{Angle, Arm, Equilibrated, Joint, Setup};
 use crate::fit::Block;
-use crate::parameter::{ArmField, BeamField, Driver, JointField, Slot};
+use crate::parameter::{Driver, JointField, Slot};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, Motion, rotation_axes};
 
@@ -33,14 +34,14 @@ pub(super) struct Linearised {
 }
 
 /// A base frame, how its rotation turns with its rotation vector, and the columns of its six coordinates.
-struct Base {
-    frame: Frame<f64>,
+pub(super) struct Base {
+    pub frame: Frame<f64>,
     turning: [Frame<f64>; 3],
     columns: [Option<usize>; 6],
 }
 
-struct Target {
-    position: Vector3<f64>,
+pub(super) struct Target {
+    pub position: Vector3<f64>,
     columns: [Option<usize>; 3],
 }
 
@@ -50,22 +51,6 @@ enum Inner {
     Rigid { links: Vec<Link>, inputs: Vec<Input>, passed: Vec<Passed> },
     /// Through the statics.
     Elastic(Box<Elastic>),
-}
-
-/// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
-struct Elastic {
-    parts: Option<Parts>,
-    response: Response,
-    whole: Vec<Whole>,
-    /// Memory for walks.
-    real: Workspace<f64>,
-    ws: Workspace<Dual64>,
-}
-
-/// An arm to be taken apart, and the direction of each input in its part.
-struct Parts {
-    sensitivity: Sensitivity,
-    inputs: Vec<(Input, Part, usize)>,
 }
 
 /// A link of a rigid arm with each of its five parameters seeded, and which input each is.
@@ -79,12 +64,6 @@ struct Passed {
     motion: Motion<Dual64>,
     before: Frame<f64>,
     input: Option<usize>,
-}
-
-/// An input with the arm that has it seeded.
-struct Whole {
-    arm: Arm<Dual64>,
-    input: Input,
 }
 
 impl Linearised {
@@ -160,7 +139,7 @@ impl Linearised {
 }
 
 /// Three rows of a block.
-struct Rows<'a> {
+pub(super) struct Rows<'a> {
     block: &'a mut Block,
     row: usize,
     /// From a derivative of the prediction to one of the residual (measured − predicted) / σ.
@@ -180,7 +159,7 @@ impl Rows<'_> {
     }
 
     /// Writes the derivative with respect to an input for each parameter that acts there.
-    fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
+    pub fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
         if let Some(column) = input.column {
             self.put(column, derivative);
         }
@@ -244,89 +223,6 @@ impl Inner {
             Self::Elastic(elastic) => elastic.write(commanded, setup, base, target, rest, rows),
         }
     }
-}
-
-impl Elastic {
-    fn new(model: &Model, x: &DVector<f64>, arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
-        let (mut apart, mut whole) = (Vec::new(), Vec::new());
-        for input in inputs {
-            match part_of(arm, input.slot).filter(|_| Sensitivity::applies_to(arm)) {
-                Some(part) => {
-                    let before = apart.iter().filter(|(_, of, _)| *of == part).count();
-                    apart.push((input, part, part.first_lane() + before));
-                }
-                None => whole.push(Whole { arm: seed_arm(model, x, &[&input]), input }),
-            }
-        }
-        let parts = (!apart.is_empty()).then(|| {
-            let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
-            let seeded = |lane| {
-                let of_lane: Vec<&Input> =
-                    apart.iter().filter(|(_, _, own)| *own == lane).map(|(input, _, _)| input).collect();
-                seed_arm(model, x, &of_lane)
-            };
-            Parts { sensitivity: Sensitivity::new(arm, count, seeded), inputs: apart.clone() }
-        });
-        Self { parts, response: Response::new(arm), whole, real: Workspace::default(), ws: Workspace::default() }
-    }
-
-    fn write(
-        &mut self,
-        commanded: &Setup,
-        setup: &Setup,
-        base: &Base,
-        target: &Target,
-        rest: &mut Equilibrated,
-        rows: &mut Rows,
-    ) {
-        let Self { parts, response, whole, ws, .. } = self;
-        match parts {
-            Some(Parts { sensitivity, inputs }) => {
-                sensitivity.differentiate(setup, &target.position, rest);
-                for (input, part, lane) in inputs {
-                    rows.put_input(input, commanded, &base.frame.vector(&sensitivity.of(*part, *lane)));
-                }
-            }
-            None if !whole.is_empty() => response.adjoint(setup, &target.position, rest),
-            None => {}
-        }
-        for Whole { arm, input } in whole {
-            let position = arm.target_position(setup, &target.position, rest, ws);
-            rows.put_input(input, commanded, &base.frame.vector(&position.map(|coordinate| coordinate.eps)));
-        }
-    }
-}
-
-/// The part on which alone an input acts; none where it changes loads.
-fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Part> {
-    match slot {
-        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Part::Beam(joint)),
-        Slot::Joint { joint, .. } => Some(Part::Joint(joint)),
-        Slot::Beam { field: BeamField::AddedMass, .. } => None,
-        Slot::Beam { joint, .. } => Some(Part::Beam(joint)),
-        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Part::Mounting),
-        _ => None,
-    }
-}
-
-/// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
-fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
-    let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
-    let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
-    for input in inputs {
-        if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
-            let seed = Dual64::from(0.0).derivative();
-            let joint = &mut arm.joints[joint];
-            match field {
-                JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
-                JointField::A => joint.a += seed,
-                JointField::D => joint.d += seed,
-                JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
-                _ => joint.theta += seed,
-            }
-        }
-    }
-    arm
 }
 
 /// The links of a rigid arm, each with its own parameters seeded.
