@@ -33,13 +33,13 @@ fn bench_fit<P: LeastSquares>(bencher: Bencher, threads: usize, problem: &P) {
 mod rigid {
     use super::*;
 
-    #[divan::bench(args = [28, 100, 1000, 10_000, 100_000])]
+    #[divan::bench(args = [28, 100, 1000, 10_000, 100_000, 1_000_000])]
     fn one_thread(bencher: Bencher, poses: usize) {
         let ur10 = Ur10::new(poses);
         bench_fit(bencher, 1, &ur10.residuals(&ur10.identifiable));
     }
 
-    #[divan::bench(args = [28, 100, 1000, 10_000, 100_000])]
+    #[divan::bench(args = [28, 100, 1000, 10_000, 100_000, 1_000_000])]
     fn two_threads(bencher: Bencher, poses: usize) {
         let ur10 = Ur10::new(poses);
         bench_fit(bencher, 2, &ur10.residuals(&ur10.identifiable));

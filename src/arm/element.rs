@@ -49,6 +49,8 @@ pub(super) struct Element<'a, S> {
 pub(super) struct BentElement<'a, S> {
     element: &'a Element<'a, S>,
     cantilever: Cantilever<'a, S>,
+    /// Deflection of the tip.
+    tip: Deflection<S>,
     /// Frame at the root, x along the chord, turned about it by half the twist.
     chord: Frame<S>,
     /// Rotation vector from the undeflected section at the root to the chord's frame [rad].
@@ -117,8 +119,9 @@ impl<S: Scalar> Element<'_, S> {
         };
         let along_root = lean_of(&self.cantilever(root, points).tip());
         let cantilever = self.cantilever(&leaning(&along_root), points);
-        let lean = lean_of(&cantilever.tip());
-        BentElement { element: self, cantilever, chord: leaning(&lean), lean }
+        let tip = cantilever.tip();
+        let lean = lean_of(&tip);
+        BentElement { element: self, cantilever, tip, chord: leaning(&lean), lean }
     }
 
     /// Where a load hangs on the straight element, arm base frame [m].
@@ -147,10 +150,9 @@ impl<S: Scalar> BentElement<'_, S> {
 
     /// Frame at the tip, arm base frame.
     pub fn tip(&self) -> Frame<S> {
-        let Deflection { displacement, rotation } = self.cantilever.tip();
         let mut tip = self.chord;
-        tip.translate_x(self.element.length + displacement.x);
-        tip.rotate(&(rotation - self.lean));
+        tip.translate_x(self.element.length + self.tip.displacement.x);
+        tip.rotate(&(self.tip.rotation - self.lean));
         tip
     }
 }

@@ -3,23 +3,12 @@
 use nalgebra::Vector3;
 
 use super::Wrench;
+use super::apart::{Cut, Part};
 use super::element::{Element, LinkLoad};
 use super::link::{Arm, Beam, Hoist, PointMass, Setup};
+use super::workspace::{Event, Workspace};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
-
-/// What the walk passes, in order from the base outwards.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Event<S> {
-    /// A force [N] at a point [m].
-    Load { at: Vector3<S>, force: Vector3<S> },
-    /// The tip of a beam element: its three moments are unknowns.
-    Tip { at: Vector3<S> },
-    /// A flexible joint: the moment about its axis is an unknown.
-    Axis { at: Vector3<S>, axis: Vector3<S> },
-    /// What tilts about two axes: the moments about them are unknowns.
-    Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
-}
 
 /// How the walk bends the arm.
 #[derive(Debug, Clone, Copy)]
@@ -28,42 +17,11 @@ pub(super) enum Bend<'a, S> {
     Rigid,
     /// By these moments, on the bent arm; records events.
     Bent(&'a [S]),
+    /// The same part by part: each begins at a frame without derivatives, which elements first turn by a rotation
+    /// vector of size zero, if there is one.
+    Apart(&'a [S], Option<&'a Vector3<S>>),
     /// By these moments, with forces resolved in the frames of the last rigid walk; records nothing.
     FirstOrder(&'a [S]),
-}
-
-/// Memory for walks, reused from pose to pose.
-#[derive(Debug, Clone)]
-pub struct Workspace<S> {
-    pub(super) events: Vec<Event<S>>,
-    pub(super) moments: Vec<S>,
-    pub(super) next_moments: Vec<S>,
-    /// Where each hook is, x and y in the arm base frame [m], if ropes may lean: unknowns before all moments.
-    pub(super) hooks: Vec<[S; 2]>,
-    /// Force of each link's rope [N], zero without one.
-    ropes: Vec<Vector3<S>>,
-    /// Force of everything beyond each joint's link [N].
-    beyond: Vec<Vector3<S>>,
-    /// Frame at each link's root in the last rigid walk.
-    rigid_roots: Vec<Frame<S>>,
-    link_loads: Vec<LinkLoad<S>>,
-    points: Vec<(S, Wrench<S>)>,
-}
-
-impl<S> Default for Workspace<S> {
-    fn default() -> Self {
-        Self {
-            events: Vec::new(),
-            moments: Vec::new(),
-            next_moments: Vec::new(),
-            hooks: Vec::new(),
-            ropes: Vec::new(),
-            beyond: Vec::new(),
-            rigid_roots: Vec::new(),
-            link_loads: Vec::new(),
-            points: Vec::new(),
-        }
-    }
 }
 
 /// Where a walk has got to.
@@ -82,15 +40,27 @@ impl<S: Scalar> Walk<'_, S> {
         self.next += N;
         match self.bend {
             Bend::Rigid => None,
-            Bend::Bent(moments) | Bend::FirstOrder(moments) => Some(std::array::from_fn(|k| moments[first + k])),
+            Bend::Bent(moments) | Bend::Apart(moments, _) | Bend::FirstOrder(moments) => {
+                Some(std::array::from_fn(|k| moments[first + k]))
+            }
+        }
+    }
+
+    /// Ends a part that bends by the last `unknowns` moments, if the arm is walked part by part.
+    fn cut(&mut self, part: Part, unknowns: usize, events: &mut Vec<Event<S>>, cuts: &mut Vec<Cut<S>>) {
+        if let Bend::Apart(..) = self.bend {
+            cuts.push(Cut { frame: self.frame, part, unknowns: (self.next - unknowns, unknowns) });
+            events.push(Event::Cut);
+            self.frame = self.frame.constant();
         }
     }
 
     /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half way.
-    fn tilt(&mut self, [about_x, about_y]: &[S; 2], ws: &mut Workspace<S>) {
+    fn tilt(&mut self, [about_x, about_y]: &[S; 2], part: Part, ws: &mut Workspace<S>) {
         let half = self.moments().map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
         if let Some(half) = &half {
             self.frame.rotate(half);
+            self.cut(part, 2, &mut ws.events, &mut ws.cuts);
         }
         if self.records() {
             let [x, y, _] = self.frame.axes;
@@ -98,6 +68,7 @@ impl<S: Scalar> Walk<'_, S> {
         }
         if let Some(half) = &half {
             self.frame.rotate(half);
+            self.cut(part, 2, &mut ws.events, &mut ws.cuts);
         }
     }
 
@@ -155,23 +126,27 @@ impl<S: Scalar> Arm<S> {
         let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns() };
         ws.events.clear();
         ws.hooks.clear();
+        ws.cuts.clear();
         if matches!(bend, Bend::Rigid) {
             ws.rigid_roots.clear();
         }
         if let Some(mounting) = &self.mounting {
-            walk.tilt(mounting, ws);
+            walk.tilt(mounting, Part::Mounting, ws);
         }
         for (i, joint) in self.joints.iter().enumerate() {
             walk.frame.rotate_x(joint.alpha.sin_cos);
             if matches!(bend, Bend::Rigid) {
                 ws.rigid_roots.push(walk.frame);
             }
-            match &joint.beam {
-                None => walk.frame.translate_x(joint.a),
-                Some(beam) => self.walk_beam(beam, i, &mut walk, ws),
+            if joint.beam.is_none() {
+                walk.frame.translate_x(joint.a);
+            }
+            walk.cut(Part::Joint(i), 0, &mut ws.events, &mut ws.cuts);
+            if let Some(beam) = &joint.beam {
+                self.walk_beam(beam, i, &mut walk, ws);
             }
             if let Some(lateral) = &joint.lateral {
-                walk.tilt(lateral, ws);
+                walk.tilt(lateral, Part::Joint(i), ws);
             }
             let (mut twist, mut slip) = (None, None);
             if joint.turns() {
@@ -183,6 +158,7 @@ impl<S: Scalar> Arm<S> {
                 slip = joint.slip(approach);
             }
             joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
+            walk.cut(Part::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
             if walk.records() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
@@ -200,7 +176,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Walks along the beam of joint `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
-        let Workspace { events, hooks, ropes, beyond, rigid_roots, link_loads, points, .. } = ws;
+        let Workspace { events, hooks, cuts, ropes, beyond, rigid_roots, link_loads, points, .. } = ws;
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
@@ -220,7 +196,10 @@ impl<S: Scalar> Arm<S> {
                 loads: link_loads,
                 tip: Wrench { force: beyond[link] + further, moment },
             };
-            let root = walk.frame;
+            let mut root = walk.frame;
+            if let Bend::Apart(_, Some(turn)) = walk.bend {
+                root.rotate(turn);
+            }
             match walk.bend {
                 Bend::FirstOrder(_) => {
                     walk.frame = element.first_order_tip(root, &rigid_roots[link], points);
@@ -239,7 +218,7 @@ impl<S: Scalar> Arm<S> {
                     walk.frame.translate_x(length);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
-                Bend::Bent(_) => {
+                Bend::Bent(_) | Bend::Apart(..) => {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
                     for load in element.own_loads() {
@@ -250,6 +229,7 @@ impl<S: Scalar> Arm<S> {
                         events.push(Event::Load { at, force: load.force });
                     }
                     walk.frame = bent.tip();
+                    walk.cut(Part::Beam(link), 3, events, cuts);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
             }

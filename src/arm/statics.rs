@@ -11,27 +11,22 @@
 //! real fixed point x* (implicit function theorem, in adjoint form).
 
 use nalgebra::Vector3;
-use num_dual::DualSVec64;
+use num_dual::Dual64;
 
 use super::link::{Arm, Setup};
-use super::place::{Bend, Event};
+use super::place::Bend;
 use crate::problem::Equilibrium;
-use crate::scalar::{Scalar, gradient, seeded};
+use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-pub use super::place::Workspace;
+pub use super::workspace::Workspace;
 
 /// Passes after which a fixed point that has not settled is given up: the arm is too soft for its loads.
-const MAX_PASSES: usize = 200;
+pub(super) const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
-const SETTLED: f64 = 1e-13;
+pub(super) const SETTLED: f64 = 1e-13;
 /// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the arm.
 const ROUNDING: f64 = 1e-15;
-/// Directions seeded at once when the response to moments is differentiated.
-const CHUNK: usize = 10;
-
-type Dual = DualSVec64<CHUNK>;
-
 /// Why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StaticsError {
@@ -41,69 +36,17 @@ pub enum StaticsError {
 }
 
 /// A pose in static equilibrium.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Equilibrated {
     /// The last frame, arm base frame.
     pub frame: Frame<f64>,
     /// Moments x* [N·m].
-    moments: Vec<f64>,
+    pub(super) moments: Vec<f64>,
     /// Λ, shape = (3, moments), row after row [m/(N·m)]; empty until asked for.
-    adjoint: Vec<f64>,
+    pub(super) adjoint: Vec<f64>,
     /// `P_x`, shape = (3, moments), and `G_x`, column after column.
     position_response: Vec<f64>,
     moment_response: Vec<f64>,
-}
-
-impl Default for Equilibrated {
-    fn default() -> Self {
-        Self {
-            frame: Frame::identity(),
-            moments: Vec::new(),
-            adjoint: Vec::new(),
-            position_response: Vec::new(),
-            moment_response: Vec::new(),
-        }
-    }
-}
-
-impl Workspace<f64> {
-    /// Sum of the sizes of all moments about the base in the last walk [N·m].
-    fn turning(&self) -> f64 {
-        let term = |event: &Event<f64>| match event {
-            Event::Load { at, force } => at.norm() * force.norm(),
-            Event::Tip { .. } | Event::Axis { .. } | Event::Tilt { .. } => 0.0,
-        };
-        self.events.iter().map(term).sum()
-    }
-}
-
-impl<S: Scalar> Workspace<S> {
-    /// The unknowns as the last walk gives them: places of hooks [m], then moments where something bends [N·m].
-    fn sum_moments(&mut self) {
-        let Self { events, next_moments, hooks, .. } = self;
-        let zero = Vector3::from_element(S::from(0.0));
-        let (mut force_sum, mut moment_sum) = (zero, zero);
-        next_moments.clear();
-        for event in events.iter().rev() {
-            match event {
-                Event::Load { at, force } => {
-                    force_sum += force;
-                    moment_sum += at.cross(force);
-                }
-                Event::Tip { at } => {
-                    let moment = moment_sum - at.cross(&force_sum);
-                    next_moments.extend([moment.z, moment.y, moment.x]);
-                }
-                Event::Axis { at, axis } => next_moments.push(axis.dot(&(moment_sum - at.cross(&force_sum)))),
-                Event::Tilt { at, axes: [x, y] } => {
-                    let moment = moment_sum - at.cross(&force_sum);
-                    next_moments.extend([y.dot(&moment), x.dot(&moment)]);
-                }
-            }
-        }
-        next_moments.extend(hooks.iter().rev().flat_map(|&[x, y]| [y, x]));
-        next_moments.reverse();
-    }
 }
 
 impl Arm<f64> {
@@ -135,6 +78,7 @@ impl Arm<f64> {
         } else {
             None
         };
+        ws.anderson.restart();
         for _ in 0..MAX_PASSES {
             self.lean_ropes(setup, &pose.moments, ws);
             pose.frame = self.walk(setup, Bend::Bent(&pose.moments), ws);
@@ -150,7 +94,7 @@ impl Arm<f64> {
                 }
                 return Ok(());
             }
-            pose.moments.copy_from_slice(&ws.next_moments);
+            ws.anderson.advance(&mut pose.moments, &ws.next_moments);
         }
         Err(StaticsError::NotSettled)
     }
@@ -166,8 +110,8 @@ fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
 /// Differentiates equilibrium with respect to its moments.
 #[derive(Debug, Clone)]
 pub struct Response {
-    arm: Arm<Dual>,
-    ws: Workspace<Dual>,
+    arm: Arm<Dual64>,
+    ws: Workspace<Dual64>,
 }
 
 impl Response {
@@ -184,27 +128,22 @@ impl Response {
         }
         pose.position_response.resize(3 * n, 0.0);
         pose.moment_response.resize(n * n, 0.0);
-        let target = target.map(Dual::from);
+        let target = target.map(Dual64::from);
         let mut moments = std::mem::take(&mut self.ws.moments);
         self.arm.gather_forces(setup, &[], &mut self.ws);
-        for first in (0..n).step_by(CHUNK) {
+        for j in 0..n {
             moments.clear();
-            moments.extend(pose.moments.iter().enumerate().map(|(k, &x)| seeded(x, k.checked_sub(first))));
+            moments.extend(pose.moments.iter().map(|&x| Dual64::from(x)));
+            moments[j] = moments[j].derivative();
             self.arm.lean_ropes(setup, &moments, &mut self.ws);
             let frame = self.arm.walk(setup, Bend::Bent(&moments), &mut self.ws);
             self.ws.sum_moments();
             let position = frame.point(&target);
-            let columns = first..n.min(first + CHUNK);
             for i in 0..3 {
-                let row = gradient(&position[i]);
-                pose.position_response[i * n..(i + 1) * n][columns.clone()]
-                    .copy_from_slice(&row.as_slice()[..columns.len()]);
+                pose.position_response[i * n + j] = position[i].eps;
             }
-            for i in 0..n {
-                let row = gradient(&self.ws.next_moments[i]);
-                for (j, g) in columns.clone().zip(&row) {
-                    pose.moment_response[j * n + i] = *g;
-                }
+            for (response, moment) in pose.moment_response[j * n..].iter_mut().zip(&self.ws.next_moments) {
+                *response = moment.eps;
             }
         }
         self.ws.moments = moments;

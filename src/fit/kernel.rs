@@ -1,4 +1,8 @@
-//! Loops over columns, written so that the compiler keeps independent sums in vector registers.
+//! Loops over columns, written so that the compiler keeps independent sums in vector registers: wide ones where the
+//! processor has them. The order of every sum is written out and products are never fused, so that results are the same
+//! either way.
+
+use multiversion::multiversion;
 
 /// Reflectors applied together to one trailing column.
 pub(super) const PANEL: usize = 4;
@@ -41,7 +45,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The four products vᵢᵀb in one pass over b.
-#[inline]
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
     let (b, rest) = b.as_chunks::<LANES>();
@@ -60,7 +64,7 @@ pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
 }
 
 /// b ← b − Σ sᵢ vᵢ in one pass over b.
-#[inline]
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL]) {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
     let (b, rest) = b.as_chunks_mut::<LANES>();
@@ -77,6 +81,8 @@ pub(super) fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL
 type Chunks<'a> = [&'a [[f64; LANES]]; PANEL];
 
 /// Whole chunks and remainders of the four vectors.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "for every kind of processor")]
 fn split<'a>(vectors: &[&'a [f64]; PANEL]) -> (Chunks<'a>, [&'a [f64]; PANEL]) {
     let parts = vectors.map(<[f64]>::as_chunks::<LANES>);
     (parts.map(|p| p.0), parts.map(|p| p.1))

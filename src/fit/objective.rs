@@ -209,3 +209,54 @@ pub fn jacobian<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DMatrix<f64> 
     problem.linearise(x, 0..problem.items(), &mut block);
     DMatrix::from_column_slice(m, n, &block.values[..m * n])
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    /// A straight line through many points, which remembers the largest part of them that was asked for at once.
+    struct Line {
+        points: usize,
+        largest: AtomicUsize,
+    }
+
+    impl LeastSquares for Line {
+        fn parameters(&self) -> usize {
+            2
+        }
+
+        fn items(&self) -> usize {
+            self.points
+        }
+
+        fn rows_per_item(&self) -> usize {
+            1
+        }
+
+        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+            self.largest.fetch_max(items.len(), Ordering::Relaxed);
+            out.iter_mut().zip(items).for_each(|(out, t)| *out = x[0] + x[1] * t as f64 - 1.0);
+        }
+
+        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+            self.residuals(x, items.clone(), block.column_mut(2));
+            for (row, t) in items.enumerate() {
+                block.column_mut(0)[row] = 1.0;
+                block.column_mut(1)[row] = t as f64;
+            }
+        }
+    }
+
+    #[test]
+    fn no_more_than_a_chunk_of_rows_is_ever_held() {
+        let line = Line { points: 100_000, largest: AtomicUsize::new(0) };
+        let fit = Fit::new(&line);
+        let x = DVector::from_vec(vec![0.5, 1e-6]);
+        let linearisation = fit.linearise(&x);
+        assert_eq!(linearisation.triangle.shape(), (2, 2));
+        assert!((linearisation.cost / fit.cost(&x) - 1.0).abs() < 1e-12);
+        assert_eq!(line.largest.load(Ordering::Relaxed), CHUNK_ITEMS);
+    }
+}

@@ -2,25 +2,22 @@
 //!
 //! A base or a target moves the position rigidly. On a rigid arm so does every parameter of a link: the point beyond is
 //! carried through its one motion in dual numbers, and the frame before that motion chains on in plain numbers. On an
-//! elastic arm every load moves too, so the parameters go through the whole statics in chunks.
+//! elastic arm every load moves too: what a parameter does to its own part is taken alone, and virtual work tells what that
+//! does to the target; parameters that change loads go through the whole statics, one by one.
 
 use nalgebra::{DVector, Vector3};
 use num_dual::{Dual64, DualSVec64};
 
 use super::driven::Commands;
+use super::elastic::Elastic;
 use super::inputs::{Input, inputs};
 use super::observation::Observation;
 use super::{Model, Pose};
-use crate::arm::{Angle, Arm, Equilibrated, Joint, Response, Setup, Workspace};
+use crate::arm::{Angle, Arm, Equilibrated, Joint, Setup};
 use crate::fit::Block;
 use crate::parameter::{Driver, JointField, Slot};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, Motion, rotation_axes};
-
-/// Parameters seeded at once on an elastic arm.
-const CHUNK: usize = 10;
-
-type ChunkDual = DualSVec64<CHUNK>;
 
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
@@ -37,14 +34,14 @@ pub(super) struct Linearised {
 }
 
 /// A base frame, how its rotation turns with its rotation vector, and the columns of its six coordinates.
-struct Base {
-    frame: Frame<f64>,
+pub(super) struct Base {
+    pub frame: Frame<f64>,
     turning: [Frame<f64>; 3],
     columns: [Option<usize>; 6],
 }
 
-struct Target {
-    position: Vector3<f64>,
+pub(super) struct Target {
+    pub position: Vector3<f64>,
     columns: [Option<usize>; 3],
 }
 
@@ -52,16 +49,8 @@ struct Target {
 enum Inner {
     /// Motion by motion; `passed` are those of the pose at hand.
     Rigid { links: Vec<Link>, inputs: Vec<Input>, passed: Vec<Passed> },
-    /// In chunks through the statics.
+    /// Through the statics.
     Elastic(Box<Elastic>),
-}
-
-/// An elastic arm, chunk by chunk, with memory for its walks.
-struct Elastic {
-    response: Response,
-    chunks: Vec<Chunk>,
-    real: Workspace<f64>,
-    ws: Workspace<ChunkDual>,
 }
 
 /// A link of a rigid arm with each of its five parameters seeded, and which input each is.
@@ -75,12 +64,6 @@ struct Passed {
     motion: Motion<Dual64>,
     before: Frame<f64>,
     input: Option<usize>,
-}
-
-/// The arm with up to [`CHUNK`] of its inputs seeded.
-struct Chunk {
-    arm: Arm<ChunkDual>,
-    inputs: Vec<Input>,
 }
 
 impl Linearised {
@@ -112,21 +95,9 @@ impl Linearised {
                 Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
             }
         }
-        let mut inputs = inputs(model, unknowns);
-        // In the order of the arm: a chunk costs less the further out its first input is, for all before it is constant.
-        inputs.sort_by_key(|input| match input.slot {
-            Slot::Joint { joint, .. } | Slot::Beam { joint, .. } => joint + 1,
-            _ => 0,
-        });
+        let inputs = inputs(model, unknowns);
         let inner = if arm.is_elastic() {
-            let chunks =
-                inputs.chunks(CHUNK).map(|part| Chunk { arm: seed_arm(model, x, part), inputs: part.to_vec() });
-            Inner::Elastic(Box::new(Elastic {
-                response: Response::new(&arm),
-                chunks: chunks.collect(),
-                real: Workspace::default(),
-                ws: Workspace::default(),
-            }))
+            Inner::Elastic(Box::new(Elastic::new(model, x, &arm, inputs)))
         } else {
             Inner::Rigid { links: links(&arm, &inputs), inputs, passed: Vec::new() }
         };
@@ -168,7 +139,7 @@ impl Linearised {
 }
 
 /// Three rows of a block.
-struct Rows<'a> {
+pub(super) struct Rows<'a> {
     block: &'a mut Block,
     row: usize,
     /// From a derivative of the prediction to one of the residual (measured − predicted) / σ.
@@ -188,7 +159,7 @@ impl Rows<'_> {
     }
 
     /// Writes the derivative with respect to an input for each parameter that acts there.
-    fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
+    pub fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
         if let Some(column) = input.column {
             self.put(column, derivative);
         }
@@ -249,41 +220,9 @@ impl Inner {
                     after = moved.map(|coordinate| coordinate.re);
                 }
             }
-            Self::Elastic(elastic) => {
-                let Elastic { response, chunks, ws, .. } = &mut **elastic;
-                if !chunks.is_empty() {
-                    response.adjoint(setup, &target.position, rest);
-                }
-                for chunk in chunks {
-                    let position = chunk.arm.target_position(setup, &target.position, rest, ws);
-                    let gradients = position.map(|coordinate| gradient(&coordinate));
-                    for (k, input) in chunk.inputs.iter().enumerate() {
-                        rows.put_input(input, commanded, &base.frame.vector(&gradients.map(|g| g[k])));
-                    }
-                }
-            }
+            Self::Elastic(elastic) => elastic.write(commanded, setup, base, target, rest, rows),
         }
     }
-}
-
-/// The arm at `x` with a derivative for each of some inputs.
-fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[Input]) -> Arm<ChunkDual> {
-    let place = |k: usize| inputs.iter().position(|input| input.parameter == Some(k));
-    let mut arm = model.arm(|k| seeded(x[k], place(k)));
-    for (direction, input) in inputs.iter().enumerate() {
-        if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
-            let seed = seeded(0.0, Some(direction));
-            let joint = &mut arm.joints[joint];
-            match field {
-                JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
-                JointField::A => joint.a += seed,
-                JointField::D => joint.d += seed,
-                JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
-                _ => joint.theta += seed,
-            }
-        }
-    }
-    arm
 }
 
 /// The links of a rigid arm, each with its own parameters seeded.

@@ -5,6 +5,7 @@ mod ablation;
 mod command;
 mod derivative;
 mod driven;
+mod elastic;
 mod enter;
 mod inputs;
 mod observation;

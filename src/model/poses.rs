@@ -3,13 +3,14 @@
 use std::ops::Range;
 
 use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
 
 use super::Model;
 use super::derivative::Linearised;
 use super::driven::Commands;
 use super::observation::Observation;
 use crate::arm::{Equilibrated, Setup, Workspace};
-use crate::fit::{Block, LeastSquares};
+use crate::fit::{Block, CHUNK_ITEMS, LeastSquares};
 
 /// One measured pose as the model sees it.
 #[derive(Debug, Clone, Copy)]
@@ -68,8 +69,21 @@ impl<'a> PoseResiduals<'a> {
 
     /// Residuals measured − predicted, measuring frame [m]; NaN where a pose has no equilibrium.
     pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        let mut errors = Vec::with_capacity(self.poses.len());
-        self.each_prediction(x, 0..self.poses.len(), |pose, predicted| errors.push(pose.measured - predicted));
+        let mut errors = vec![Vector3::zeros(); self.poses.len()];
+        let write = |(chunk, errors): (usize, &mut [Vector3<f64>])| {
+            let first = chunk * CHUNK_ITEMS;
+            let mut left = errors.iter_mut();
+            self.each_prediction(x, first..first + left.len(), |pose, predicted| {
+                if let Some(error) = left.next() {
+                    *error = pose.measured - predicted;
+                }
+            });
+        };
+        if errors.len() <= CHUNK_ITEMS {
+            write((0, &mut errors));
+        } else {
+            errors.par_chunks_mut(CHUNK_ITEMS).enumerate().for_each(write);
+        }
         errors
     }
 

@@ -17,6 +17,12 @@ pub struct Frame<S> {
     pub origin: Vector3<S>,
 }
 
+impl<S: Scalar> Default for Frame<S> {
+    fn default() -> Self {
+        Self::identity()
+    }
+}
+
 impl<S: Scalar> Frame<S> {
     /// The reference frame itself.
     pub fn identity() -> Self {
@@ -87,6 +93,13 @@ impl<S: Scalar> Frame<S> {
     #[must_use]
     pub fn seen(&self, frame: &Self) -> Self {
         Self { axes: frame.axes.map(|axis| self.vector(&axis)), origin: self.point(&frame.origin) }
+    }
+
+    /// The same frame without derivatives.
+    #[must_use]
+    pub fn constant(&self) -> Self {
+        let constant = |vector: &Vector3<S>| vector.map(|coordinate| S::from(coordinate.re()));
+        Self { axes: self.axes.each_ref().map(constant), origin: constant(&self.origin) }
     }
 
     /// This frame's coordinates of a vector given in the reference frame.

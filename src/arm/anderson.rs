@@ -1,0 +1,118 @@
+//! Anderson's acceleration of a contraction.
+
+/// Earlier differences that are used.
+const DEPTH: usize = 4;
+/// A difference that the others explain up to this part, in squares, is rounding.
+const EXPLAINED: f64 = 1e-20;
+/// A pass that shrinks the residual less than this finds no contraction to speed up: it is taken as it is.
+const CONTRACTS: f64 = 0.5;
+
+/// A difference of residuals g(x) − x, orthogonal to the others, with that of the images g(x) it belongs to; its square
+/// is zero where it says nothing.
+#[derive(Debug, Clone, Default)]
+struct Pair {
+    residual: Vec<f64>,
+    image: Vec<f64>,
+    squares: f64,
+}
+
+/// Speeds up x ← g(x) by what earlier passes tell of g's slope: g(x) less the part of the differences of images whose
+/// residuals make up this one.                                                    [Anderson 1965; Walker & Ni 2011]
+#[derive(Debug, Clone, Default)]
+pub(super) struct Anderson {
+    pairs: [Pair; DEPTH],
+    /// Pairs in use, and passes made.
+    used: usize,
+    passes: usize,
+    last: Pair,
+}
+
+impl Anderson {
+    /// Forgets everything.
+    pub fn restart(&mut self) {
+        (self.used, self.passes) = (0, 0);
+    }
+
+    /// Replaces x by the next one to try, given `image` g(x).
+    pub fn advance(&mut self, x: &mut [f64], image: &[f64]) {
+        let Self { pairs, used, passes, last } = self;
+        let residual = |k: usize| image[k] - x[k];
+        let n = x.len();
+        let squares: f64 = (0..n).map(|k| residual(k) * residual(k)).sum();
+        if *passes > 0 && squares < CONTRACTS * CONTRACTS * last.squares {
+            let (oldest, newer) = (*used % DEPTH, (*used).min(DEPTH));
+            let mut pair = std::mem::take(&mut pairs[oldest]);
+            set(&mut pair.residual, n, |k| residual(k) - last.residual[k]);
+            set(&mut pair.image, n, |k| image[k] - last.image[k]);
+            let whole = dot(&pair.residual, &pair.residual);
+            let others = pairs[..newer].iter().enumerate().filter(|(k, other)| *k != oldest && other.squares > 0.0);
+            for (_, other) in others {
+                let part = dot(&pair.residual, &other.residual) / other.squares;
+                subtract(&mut pair.residual, part, &other.residual);
+                subtract(&mut pair.image, part, &other.image);
+            }
+            pair.squares = dot(&pair.residual, &pair.residual);
+            if pair.squares <= EXPLAINED * whole {
+                pair.squares = 0.0;
+            }
+            pairs[oldest] = pair;
+            *used += 1;
+        } else {
+            *used = 0;
+        }
+        set(&mut last.residual, n, residual);
+        set(&mut last.image, n, |k| image[k]);
+        last.squares = squares;
+        *passes += 1;
+        x.copy_from_slice(image);
+        for pair in pairs[..(*used).min(DEPTH)].iter().filter(|pair| pair.squares > 0.0) {
+            subtract(x, dot(&last.residual, &pair.residual) / pair.squares, &pair.image);
+        }
+    }
+}
+
+fn set(list: &mut Vec<f64>, n: usize, value: impl Fn(usize) -> f64) {
+    list.clear();
+    list.extend((0..n).map(value));
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a -= factor * b);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A contraction of three unknowns with two slow directions, a little bent.
+    fn image(x: &[f64]) -> Vec<f64> {
+        let [a, b, c] = [x[0], x[1], x[2]];
+        vec![1.0 + 0.3 * a - 0.1 * b + 0.01 * a * c, 2.0 + 0.1 * a + 0.2 * b, -1.0 + 0.05 * b * b - 0.02 * c]
+    }
+
+    /// Passes until the residual is below rounding, and where.
+    fn passes(mut next: impl FnMut(&mut Vec<f64>, &[f64])) -> (usize, Vec<f64>) {
+        let mut x = vec![0.0; 3];
+        for pass in 1.. {
+            let g = image(&x);
+            if x.iter().zip(&g).all(|(x, g)| (x - g).abs() < 1e-13) {
+                return (pass, x);
+            }
+            next(&mut x, &g);
+        }
+        unreachable!()
+    }
+
+    #[test]
+    fn fewer_passes_lead_to_the_same_point() {
+        let (plain, there) = passes(|x, g| x.copy_from_slice(g));
+        let mut anderson = Anderson::default();
+        let (accelerated, here) = passes(|x, g| anderson.advance(x, g));
+        assert!(2 * accelerated <= plain, "{accelerated} passes, {plain} without");
+        assert!(there.iter().zip(&here).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+}

@@ -1,0 +1,189 @@
+//! A walk part by part, taken down in plain numbers.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::anderson::Anderson;
+use crate::spatial::Frame;
+
+/// One vector for each coordinate of the position.
+pub(super) type Each = [Vector3<f64>; 3];
+
+/// How a part's end moves with one number: point r of everything beyond moves by rotation × r + translation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Column {
+    /// [rad] per unit.
+    pub rotation: Vector3<f64>,
+    /// Of the point at the base origin [m] per unit.
+    pub translation: Vector3<f64>,
+}
+
+/// How a section's moment is taken: along axes of space, or along axes that turn with the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Felt {
+    InSpace,
+    OnTheArm,
+}
+
+/// What a walk passes, in order from the base outwards.
+#[derive(Debug, Clone)]
+pub(super) enum Step {
+    /// A load on a rigid place.
+    Load(usize),
+    /// Moments that are unknowns.
+    Section(Section),
+    /// A part.
+    Part(Part),
+}
+
+/// A part with the places of its numbers: one column for each of its directions, and as many moves as it has loads.
+///
+/// The first three directions of a part that `turns` are those of its root, in its own axes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Part {
+    /// Place in a list of all parts.
+    pub index: usize,
+    pub root: Frame<f64>,
+    pub tip: Frame<f64>,
+    pub turns: bool,
+    /// Moments that bend it, and their first direction.
+    pub unknowns: Range<usize>,
+    pub moment_lane: usize,
+    /// First direction of its parameters, and end of all directions.
+    pub parameter_lane: usize,
+    pub lanes: usize,
+    /// Its loads as events of the walk.
+    pub events: Range<usize>,
+    /// Its loads, columns and moves in the lists of all: known once it is listed.
+    pub loads: Range<usize>,
+    pub first_column: usize,
+    pub first_move: usize,
+}
+
+impl Part {
+    pub fn column(&self, lane: usize) -> usize {
+        self.first_column + lane
+    }
+
+    pub fn moves(&self, lane: usize) -> Range<usize> {
+        let first = self.first_move + lane * self.loads.len();
+        first..first + self.loads.len()
+    }
+}
+
+/// A place where moments are unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct Section {
+    pub at: Vector3<f64>,
+    pub axes: Each,
+    pub unknowns: Range<usize>,
+    pub felt: Felt,
+    /// All loads beyond: force, and moment about the section.
+    pub force: Vector3<f64>,
+    pub moment: Vector3<f64>,
+}
+
+/// A force at a place, base frame, with what a move of it does: the virtual force.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Load {
+    pub at: Vector3<f64>,
+    pub force: Vector3<f64>,
+    pub virtually: Each,
+}
+
+/// A pose at rest taken down part by part, to differentiate its position.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Trail {
+    pub steps: Vec<Step>,
+    pub loads: Vec<Load>,
+    pub columns: Vec<Column>,
+    pub moves: Vec<Vector3<f64>>,
+    /// Λ, the three coordinates of each moment [m/(N·m)], and what the last walk made of it.
+    pub influence: Vec<f64>,
+    pub image: Vec<f64>,
+    pub anderson: Anderson,
+    /// Of the position with respect to the parameters, part after part, direction after direction.
+    pub derivatives: Vec<Vector3<f64>>,
+    /// Directions of each part there.
+    pub stride: usize,
+}
+
+impl Trail {
+    /// For `parts` of at most `lanes` directions.
+    pub fn new(parts: usize, lanes: usize) -> Self {
+        Self { derivatives: vec![Vector3::zeros(); parts * lanes], stride: lanes, ..Self::default() }
+    }
+
+    /// Derivative of the position with respect to the parameter in a direction of a part.
+    pub fn derivative(&self, part: usize, lane: usize) -> Vector3<f64> {
+        self.derivatives[part * self.stride + lane]
+    }
+
+    pub fn clear(&mut self) {
+        self.steps.clear();
+        self.loads.clear();
+        self.columns.clear();
+        self.moves.clear();
+        self.influence.clear();
+        self.image.clear();
+        self.derivatives.fill(Vector3::zeros());
+    }
+
+    pub fn load(&mut self, at: Vector3<f64>, force: Vector3<f64>) {
+        self.steps.push(Step::Load(self.loads.len()));
+        self.loads.push(Load { at, force, virtually: [Vector3::zeros(); 3] });
+    }
+
+    pub fn section(&mut self, at: Vector3<f64>, axes: &[Vector3<f64>], felt: Felt) {
+        let first = self.influence.len() / 3;
+        self.influence.resize(3 * (first + axes.len()), 0.0);
+        self.image.resize(self.influence.len(), 0.0);
+        let mut all = [Vector3::zeros(); 3];
+        all[..axes.len()].copy_from_slice(axes);
+        let (force, moment) = (Vector3::zeros(), Vector3::zeros());
+        self.steps.push(Step::Section(Section {
+            at,
+            axes: all,
+            unknowns: first..first + axes.len(),
+            felt,
+            force,
+            moment,
+        }));
+    }
+
+    /// A part; its loads are the last ones.
+    pub fn part(&mut self, mut part: Part) {
+        part.loads = self.loads.len() - part.events.len()..self.loads.len();
+        (part.first_column, part.first_move) = (self.columns.len(), self.moves.len());
+        self.columns.resize(part.first_column + part.lanes, Column::default());
+        self.moves.resize(part.first_move + part.lanes * part.loads.len(), Vector3::zeros());
+        self.steps.truncate(self.steps.len() - part.loads.len());
+        self.steps.push(Step::Part(part));
+    }
+
+    /// Sums the loads beyond every section, once all is taken down.
+    pub fn sum_loads(&mut self) {
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let mut add = |load: &Load| {
+            force += load.force;
+            moment += load.at.cross(&load.force);
+            (force, moment)
+        };
+        let mut sums = (Vector3::zeros(), Vector3::zeros());
+        for step in self.steps.iter_mut().rev() {
+            match step {
+                Step::Load(load) => sums = add(&self.loads[*load]),
+                Step::Part(part) => {
+                    for load in &self.loads[part.loads.clone()] {
+                        sums = add(load);
+                    }
+                }
+                Step::Section(section) => {
+                    section.force = sums.0;
+                    section.moment = sums.1 - section.at.cross(&sums.0);
+                }
+            }
+        }
+    }
+}

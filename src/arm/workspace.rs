@@ -1,0 +1,106 @@
+//! What a walk along the arm leaves behind, and the moments of the loads it has met.
+
+use nalgebra::Vector3;
+
+use super::Wrench;
+use super::anderson::Anderson;
+use super::apart::Cut;
+use super::element::LinkLoad;
+use crate::scalar::Scalar;
+use crate::spatial::Frame;
+
+/// What the walk passes, in order from the base outwards.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Event<S> {
+    /// A force [N] at a point [m].
+    Load { at: Vector3<S>, force: Vector3<S> },
+    /// The tip of a beam element: its three moments are unknowns.
+    Tip { at: Vector3<S> },
+    /// A flexible joint: the moment about its axis is an unknown.
+    Axis { at: Vector3<S>, axis: Vector3<S> },
+    /// What tilts about two axes: the moments about them are unknowns.
+    Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
+    /// The end of a part of the arm that was walked alone.
+    Cut,
+}
+
+/// Memory for walks, reused from pose to pose.
+#[derive(Debug, Clone)]
+pub struct Workspace<S> {
+    pub(super) events: Vec<Event<S>>,
+    pub(super) moments: Vec<S>,
+    pub(super) next_moments: Vec<S>,
+    /// Where each hook is, x and y in the arm base frame [m], if ropes may lean: unknowns before all moments.
+    pub(super) hooks: Vec<[S; 2]>,
+    /// Where the parts of the arm end, if it is walked part by part.
+    pub(super) cuts: Vec<Cut<S>>,
+    /// Force of each link's rope [N], zero without one.
+    pub(super) ropes: Vec<Vector3<S>>,
+    /// Force of everything beyond each joint's link [N].
+    pub(super) beyond: Vec<Vector3<S>>,
+    /// Frame at each link's root in the last rigid walk.
+    pub(super) rigid_roots: Vec<Frame<S>>,
+    pub(super) link_loads: Vec<LinkLoad<S>>,
+    pub(super) points: Vec<(S, Wrench<S>)>,
+    /// What passes towards equilibrium have shown.
+    pub(super) anderson: Anderson,
+}
+
+impl<S> Default for Workspace<S> {
+    fn default() -> Self {
+        Self {
+            events: Vec::new(),
+            moments: Vec::new(),
+            next_moments: Vec::new(),
+            hooks: Vec::new(),
+            cuts: Vec::new(),
+            ropes: Vec::new(),
+            beyond: Vec::new(),
+            rigid_roots: Vec::new(),
+            link_loads: Vec::new(),
+            points: Vec::new(),
+            anderson: Anderson::default(),
+        }
+    }
+}
+
+impl Workspace<f64> {
+    /// Sum of the sizes of all moments about the base in the last walk [N·m].
+    pub(super) fn turning(&self) -> f64 {
+        let term = |event: &Event<f64>| match event {
+            Event::Load { at, force } => at.norm() * force.norm(),
+            Event::Tip { .. } | Event::Axis { .. } | Event::Tilt { .. } | Event::Cut => 0.0,
+        };
+        self.events.iter().map(term).sum()
+    }
+}
+
+impl<S: Scalar> Workspace<S> {
+    /// The unknowns as the last walk gives them: places of hooks [m], then moments where something bends [N·m].
+    pub(super) fn sum_moments(&mut self) {
+        let Self { events, next_moments, hooks, .. } = self;
+        let zero = Vector3::from_element(S::from(0.0));
+        let (mut force_sum, mut moment_sum) = (zero, zero);
+        next_moments.clear();
+        for event in events.iter().rev() {
+            match event {
+                Event::Load { at, force } => {
+                    force_sum += force;
+                    moment_sum += at.cross(force);
+                }
+                Event::Tip { at } => {
+                    let moment = moment_sum - at.cross(&force_sum);
+                    next_moments.extend([moment.z, moment.y, moment.x]);
+                }
+                Event::Axis { at, axis } => next_moments.push(axis.dot(&(moment_sum - at.cross(&force_sum)))),
+                Event::Tilt { at, axes: [x, y] } => {
+                    let moment = moment_sum - at.cross(&force_sum);
+                    next_moments.extend([y.dot(&moment), x.dot(&moment)]);
+                }
+                Event::Cut => {}
+            }
+        }
+        next_moments.extend(hooks.iter().rev().flat_map(|&[x, y]| [y, x]));
+        next_moments.reverse();
+    }
+}

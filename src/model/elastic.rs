@@ -1,0 +1,117 @@
+//! Derivatives of an elastic arm with respect to its own parameters.
+
+use nalgebra::DVector;
+use num_dual::Dual64;
+
+use super::Model;
+use super::derivative::{Base, Rows, Target};
+use super::inputs::Input;
+use crate::arm::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Setup, Workspace};
+use crate::parameter::{ArmField, BeamField, JointField, Slot};
+
+/// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
+pub(super) struct Elastic {
+    parts: Option<Parts>,
+    response: Response,
+    whole: Vec<Whole>,
+    /// Memory for walks.
+    pub real: Workspace<f64>,
+    ws: Workspace<Dual64>,
+}
+
+/// An arm to be taken apart, and the direction of each input in its part.
+struct Parts {
+    sensitivity: Sensitivity,
+    inputs: Vec<(Input, Part, usize)>,
+}
+
+/// An input with the arm that has it seeded.
+struct Whole {
+    arm: Arm<Dual64>,
+    input: Input,
+}
+
+impl Elastic {
+    /// Of `arm`, which is the model's at `x`.
+    pub fn new(model: &Model, x: &DVector<f64>, arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
+        let (mut apart, mut whole) = (Vec::new(), Vec::new());
+        for input in inputs {
+            match part_of(arm, input.slot).filter(|_| Sensitivity::applies_to(arm)) {
+                Some(part) => {
+                    let before = apart.iter().filter(|(_, of, _)| *of == part).count();
+                    apart.push((input, part, part.first_lane() + before));
+                }
+                None => whole.push(Whole { arm: seed_arm(model, x, &[&input]), input }),
+            }
+        }
+        let parts = (!apart.is_empty()).then(|| {
+            let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
+            let seeded = |lane| {
+                let of_lane: Vec<&Input> =
+                    apart.iter().filter(|(_, _, own)| *own == lane).map(|(input, _, _)| input).collect();
+                seed_arm(model, x, &of_lane)
+            };
+            Parts { sensitivity: Sensitivity::new(arm, count, seeded), inputs: apart.clone() }
+        });
+        Self { parts, response: Response::new(arm), whole, real: Workspace::default(), ws: Workspace::default() }
+    }
+
+    /// Writes the derivatives with respect to the inputs at a pose that is at rest.
+    pub fn write(
+        &mut self,
+        commanded: &Setup,
+        setup: &Setup,
+        base: &Base,
+        target: &Target,
+        rest: &mut Equilibrated,
+        rows: &mut Rows,
+    ) {
+        let Self { parts, response, whole, ws, .. } = self;
+        match parts {
+            Some(Parts { sensitivity, inputs }) => {
+                sensitivity.differentiate(setup, &target.position, rest);
+                for (input, part, lane) in inputs {
+                    rows.put_input(input, commanded, &base.frame.vector(&sensitivity.of(*part, *lane)));
+                }
+            }
+            None if !whole.is_empty() => response.adjoint(setup, &target.position, rest),
+            None => {}
+        }
+        for Whole { arm, input } in whole {
+            let position = arm.target_position(setup, &target.position, rest, ws);
+            rows.put_input(input, commanded, &base.frame.vector(&position.map(|coordinate| coordinate.eps)));
+        }
+    }
+}
+
+/// The part on which alone an input acts; none where it changes loads.
+fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Part> {
+    match slot {
+        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Part::Beam(joint)),
+        Slot::Joint { joint, .. } => Some(Part::Joint(joint)),
+        Slot::Beam { field: BeamField::AddedMass, .. } => None,
+        Slot::Beam { joint, .. } => Some(Part::Beam(joint)),
+        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Part::Mounting),
+        _ => None,
+    }
+}
+
+/// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
+fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
+    let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
+    let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
+    for input in inputs {
+        if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
+            let seed = Dual64::from(0.0).derivative();
+            let joint = &mut arm.joints[joint];
+            match field {
+                JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
+                JointField::A => joint.a += seed,
+                JointField::D => joint.d += seed,
+                JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
+                _ => joint.theta += seed,
+            }
+        }
+    }
+    arm
+}
