@@ -77,7 +77,10 @@ pub struct Remainder<'a> {
 /// but are not structure, since no effect explains them.
 pub fn check(remainder: &Remainder, seed: u64) -> Findings {
     let poses = remainder.residual.len() / 3;
-    let leverage = match testable(remainder).and_then(|()| Leverage::of(remainder.fitted)) {
+    let leverage = match testable(remainder)
+        .and_then(|()| Leverage::of(remainder.fitted))
+        .and_then(|all| above_rounding(remainder).map(|()| all))
+    {
         Ok(leverage) => leverage,
         Err(why) => return judge(all_untestable(remainder, &why), Vec::new()),
     };
@@ -136,12 +139,15 @@ fn testable(remainder: &Remainder) -> Result<(), Untestable> {
     if !shapes {
         return Err(Untestable::SizeMismatch);
     }
-    let size = remainder.residual.norm_squared() / rows.max(1) as f64;
-    if remainder.sigma_is_declared && rows > 0 && size < LEAST_SCATTER.powi(2) {
-        return Err(Untestable::Rounding);
-    }
     let finite = remainder.residual.iter().chain(remainder.fitted.iter()).all(|value| value.is_finite());
     if finite { Ok(()) } else { Err(Untestable::NotFinite) }
+}
+
+/// A residual far below a declared σ is rounding.
+fn above_rounding(remainder: &Remainder) -> Result<(), Untestable> {
+    let size = remainder.residual.norm_squared() / remainder.residual.len().max(1) as f64;
+    let is_rounding = remainder.sigma_is_declared && size < LEAST_SCATTER.powi(2);
+    if is_rounding { Err(Untestable::Rounding) } else { Ok(()) }
 }
 
 /// Every check, with the same reason why it is not testable.
