@@ -3,12 +3,16 @@
 use super::super::candidates::covers;
 use super::super::fitted::{Fitted, Given, Normal};
 use super::super::generic::Generic;
-use super::super::trace::{Library, Scan, tries};
+use super::super::trace::{Library, Scan, Tried, tries};
 use super::super::tracing::named_place;
 use crate::problem::Effect;
 
 /// Candidates whose criterion is this close to that of an effect in its place are not told from it: odds of 20 to 1.
 const UNTOLD: f64 = 6.0;
+
+/// Part of what an effect explains from which on another explains as much, where structure is left: then residuals are no
+/// independent noise, and small differences are no evidence.
+const AS_MUCH: f64 = 0.9;
 
 /// The effects that may stand in the place of an added one.
 pub(super) struct Alternatives {
@@ -35,8 +39,8 @@ impl<'f, 'a> Replacements<'f, 'a> {
         Self { fitted, library, generics, normal, scan: Scan::new(library, linear, candidates.to_vec()) }
     }
 
-    /// Those of one effect.
-    pub fn of(&self, effect: &Effect) -> Alternatives {
+    /// Those of one effect; `structured` where the fit leaves more than noise.
+    pub fn of(&self, effect: &Effect, structured: bool) -> Alternatives {
         let Given { directions, part } = self.fitted.given_by(self.library, (&self.normal, self.generics), effect);
         let sums = self.scan.linear.sums_without(&directions, &part);
         let everything: Vec<Effect> = self.scan.effects.iter().chain([effect]).cloned().collect();
@@ -48,7 +52,9 @@ impl<'f, 'a> Replacements<'f, 'a> {
         let is_other = |index: usize| !covers(effect, &self.scan.effects[index]);
         let mut effects: Vec<Effect> = Vec::new();
         let ranking: Vec<_> = ranking.into_iter().filter(|tried| is_other(tried.index)).collect();
-        for tried in ranking.iter().take_while(|tried| tried.criterion < own + UNTOLD) {
+        let as_much = if structured { AS_MUCH * part.norm_squared() } else { f64::INFINITY };
+        let untold = |tried: &&Tried| tried.criterion < own + UNTOLD || tried.gain.squares > as_much;
+        for tried in ranking.iter().filter(untold) {
             let candidate = &self.scan.effects[tried.index];
             let known = |other: &Effect| named_place(other) == named_place(candidate);
             // Other times of the same shift are the same effect; other orders of a harmonic are not.

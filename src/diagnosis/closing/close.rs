@@ -101,7 +101,7 @@ pub fn close(
         unexplained
     };
     let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
-    let effects = found(&rounds, &fitted);
+    let effects = found(&rounds, &fitted, findings.is_structured());
     let verdict = match (&unexplained, effects.is_empty()) {
         (Some(_), _) => Verdict::Unexplained,
         (None, true) => Verdict::NothingFound,
@@ -166,7 +166,7 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     let library = fitted.library(rounds.data, &candidates, &generics);
     let replacements = Replacements::new(fitted, &library, &candidates, &generics);
     for effect in &added {
-        let other = replacements.of(effect);
+        let other = replacements.of(effect, false);
         if let Some(better) = &other.better {
             let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
             let next = rounds.fit(fitted, &kept)?;
@@ -181,7 +181,7 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
 }
 
 /// Every added effect with what is known of it.
-fn found(rounds: &Rounds, fitted: &Fitted) -> Vec<Found> {
+fn found(rounds: &Rounds, fitted: &Fitted, structured: bool) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
     let library = fitted.library(rounds.data, &candidates, &rounds.generics);
     let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
@@ -193,7 +193,7 @@ fn found(rounds: &Rounds, fitted: &Fitted) -> Vec<Found> {
     let one = |effect: Effect| Found {
         p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
         estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
-        alternatives: replacements.of(&effect).effects,
+        alternatives: replacements.of(&effect, structured).effects,
         held_out_after: first_with(&effect),
         effect,
     };
