@@ -103,6 +103,17 @@ fn an_arm_that_misses_is_not_trusted() {
 }
 
 #[test]
+fn a_mirrored_arm_is_not_trusted() {
+    let problem = parallel("'joint*.alpha' = { sigma_deg = 0.2 }\n'base.*' = { free = true }");
+    let (mut rows, split) = measured(&problem, &[("joint3.alpha", 0.001)]);
+    for position in &mut rows.positions {
+        position.swap_rows(0, 1);
+    }
+    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    assert!(found.distrust.is_some());
+}
+
+#[test]
 fn stage_by_stage_settles_on_two_hundred_poses() {
     let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);

@@ -32,6 +32,7 @@ fn score(data: &Data, found: &Identification) -> Score {
         Some(Distrust::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
         Some(Distrust::NotConverged(_) | Distrust::HeldOutNotConverged(_)) => return Score::Failed("not-converged"),
         Some(Distrust::Misses { .. }) => return Score::Failed("misses-the-data"),
+        Some(Distrust::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
         None => {}
     }
     let held_out = &found.fitted.held_out;

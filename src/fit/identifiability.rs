@@ -12,6 +12,8 @@ use super::singular::SingularValues;
 pub const BLIND_BELOW: f64 = 1e-9;
 /// A column of the Jacobian with a norm below this part of the largest, per unit of its scale, counts as zero.
 const ZERO_COLUMN: f64 = 1e-14;
+/// Part of a combination from which an unknown gives it its name.
+const SIZEABLE: f64 = 0.1;
 /// Entries of a combination below this are rounding.
 const NEGLIGIBLE: f64 = 1e-6;
 
@@ -101,21 +103,28 @@ fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// The reduced row echelon form of the null space: a basis that depends on the space alone, with few unknowns in each
-/// combination. Pivots are the earliest unknowns.
+/// combination. Pivots are the earliest unknowns that have a part in a combination worth the name, then any.
 fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
-    for column in 0..n {
+    let mut pivots = Vec::new();
+    for (least, column) in
+        [SIZEABLE, NEGLIGIBLE].into_iter().flat_map(|least| (0..n).map(move |column| (least, column)))
+    {
         if row == rows {
             break;
         }
         let pivot = row + null.column(column).rows_range(row..).iamax();
-        if null[(pivot, column)].abs() < NEGLIGIBLE {
+        let entry = null[(pivot, column)].abs();
+        if entry < NEGLIGIBLE {
             for i in row..rows {
                 null[(i, column)] = 0.0;
             }
+        }
+        if entry < least * null.row(pivot).norm() || entry < NEGLIGIBLE || pivots.contains(&column) {
             continue;
         }
+        pivots.push(column);
         null.swap_rows(row, pivot);
         let divisor = null[(row, column)];
         null.row_mut(row).unscale_mut(divisor);
@@ -127,6 +136,9 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination>
         }
         row += 1;
     }
+    let mut order: Vec<usize> = (0..pivots.len()).collect();
+    order.sort_by_key(|&row| pivots[row]);
+    let null = null.select_rows(&order);
     null.row_iter()
         .map(|combination| {
             let norm = combination.norm();

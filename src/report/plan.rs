@@ -96,8 +96,9 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
     let header = ["parameter", "nominal", "prior ± 1 σ", "random", "planned", "gain", "unit"];
     let meaningful = plan.meaningful();
     let gain = plan.gain(&meaningful).map_or_else(String::new, |gain| {
+        let (factor, than) = if gain < 1.0 { (1.0 / gain, "LARGER") } else { (gain, "smaller") };
         format!(
-            "\nThe {} parameters of the arm that random poses identify to 90 % or more: standard errors {gain:.2} times smaller\n\
+            "\nThe {} parameters of the arm that random poses identify to 90 % or more: standard errors {factor:.2} times {than}\n\
              than with random poses (geometric mean).\n",
             meaningful.len()
         )

@@ -10,7 +10,7 @@ use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::trust::{Distrust, misses, underdetermined};
+use super::trust::{Distrust, beyond_prior, misses, underdetermined};
 use super::{Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{Identifiability, Loss};
@@ -179,7 +179,8 @@ pub fn identify_model(
     let squares = fitting.whole().poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>();
     let declared_sigma = noise_is_declared.then(|| (squares / split.identification.len().max(1) as f64).sqrt());
     let distrust = distrust
-        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, declared_sigma));
+        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, declared_sigma))
+        .or_else(|| beyond_prior(model, &end.x));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,

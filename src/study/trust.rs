@@ -2,18 +2,21 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 
 use super::{ErrorSummary, Placement};
 use crate::measurement::Measurements;
 use crate::model::Model;
-use crate::parameter::Slot;
+use crate::parameter::{JointField, Parameter, Slot};
 use crate::solver::Termination;
 
 /// A fitted arm that misses the measurements by this part of their spread describes another arm.
 const MISSES: f64 = 0.02;
 /// … unless the declared noise is of that size: in units of 1 σ of a position.
 const BEYOND_NOISE: f64 = 100.0;
+
+/// Parameters of an arm that describes the measured one stay within so many σ of their priors.
+const OUT_OF_PROPORTION: f64 = 20.0;
 
 /// Points this close together say nothing about the size of an arm [m].
 const LEAST_SPREAD: f64 = 0.01;
@@ -34,6 +37,13 @@ pub enum Distrust {
     NotConverged(Termination),
     /// The fit of bases and targets of held-out sessions did not converge.
     HeldOutNotConverged(Termination),
+    /// A parameter of the arm's geometry is far beyond its prior.
+    BeyondPrior {
+        /// Which.
+        name: String,
+        /// Its change in units of the prior's σ.
+        sigmas: f64,
+    },
     /// The fitted arm is far from the measurements.
     Misses {
         /// Root mean squared error on the identification poses [m].
@@ -49,7 +59,15 @@ impl fmt::Display for Distrust {
             Self::TooFewEquations { of, coordinates, unknowns } => {
                 write!(f, "{of}: {coordinates} measured coordinates for {unknowns} parameters without a prior")
             }
+            Self::NotConverged(termination @ Termination::DomainEdge) => {
+                write!(f, "{termination}; units, signs of joints, or sessions are wrong, or the table's columns")
+            }
             Self::NotConverged(termination) => write!(f, "{termination}"),
+            Self::BeyondPrior { name, sigmas } => write!(
+                f,
+                "{name} moved by {sigmas:.0} times the σ of its prior; check axes of the measuring frame, signs of joints, \
+                 units, and the prior"
+            ),
             Self::HeldOutNotConverged(termination) => write!(f, "the bases of held-out sessions: {termination}"),
             Self::Misses { rms, spread } => write!(
                 f,
@@ -60,6 +78,19 @@ impl fmt::Display for Distrust {
             ),
         }
     }
+}
+
+/// The parameter of the arm's geometry that lies furthest beyond its prior, if that is out of all proportion.
+pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> {
+    let ratio = |(k, parameter): (usize, &Parameter)| match parameter.slot {
+        Slot::Joint { field, .. } if JointField::GEOMETRY.contains(&field) => {
+            parameter.sigma.map(|sigma| (k, x[k].abs() / sigma))
+        }
+        _ => None,
+    };
+    let ratios = model.parameters.iter().enumerate().filter_map(ratio);
+    let (k, sigmas) = ratios.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (sigmas > OUT_OF_PROPORTION).then(|| Distrust::BeyondPrior { name: model.parameters[k].name.clone(), sigmas })
 }
 
 /// A base, with the targets that no other base of `rows` uses, or a target with fewer measured coordinates in `rows` than
