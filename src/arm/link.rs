@@ -309,6 +309,7 @@ impl<S: Scalar> Joint<S> {
     }
 
     /// The rigid `T_i` as one motion for each of α, a, θ, d, β.
+    #[inline]
     pub fn motions(&self, q: f64) -> [Motion<S>; 5] {
         let (angle, offset) = self.coordinates(q);
         [
@@ -321,6 +322,7 @@ impl<S: Scalar> Joint<S> {
     }
 
     /// θ and d of a configuration: q adds to one of them.
+    #[inline]
     fn coordinates(&self, q: f64) -> (S, S) {
         match self.kind {
             JointKind::Revolute => (self.theta + q, self.d),

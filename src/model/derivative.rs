@@ -107,6 +107,7 @@ impl Linearised {
     }
 
     /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros.
+    #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
         let setup = self.commands.apply(&pose.setup);
@@ -159,6 +160,7 @@ impl Rows<'_> {
     }
 
     /// Writes the derivative with respect to an input for each parameter that acts there.
+    #[inline]
     pub fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
         if let Some(column) = input.column {
             self.put(column, derivative);

@@ -39,16 +39,19 @@ impl<S: Scalar> Frame<S> {
     }
 
     /// Turns about the own x axis, given (sin, cos).
+    #[inline]
     pub fn rotate_x(&mut self, (sin, cos): (S, S)) {
         self.turn(1, 2, sin, cos);
     }
 
     /// Turns about the own y axis, given (sin, cos).
+    #[inline]
     pub fn rotate_y(&mut self, (sin, cos): (S, S)) {
         self.turn(2, 0, sin, cos);
     }
 
     /// Turns about the own z axis, given (sin, cos).
+    #[inline]
     pub fn rotate_z(&mut self, (sin, cos): (S, S)) {
         self.turn(0, 1, sin, cos);
     }
@@ -65,11 +68,13 @@ impl<S: Scalar> Frame<S> {
     }
 
     /// Moves along the own x axis by `distance` [m].
+    #[inline]
     pub fn translate_x(&mut self, distance: S) {
         self.origin += self.axes[0] * distance;
     }
 
     /// Moves along the own z axis by `distance` [m].
+    #[inline]
     pub fn translate_z(&mut self, distance: S) {
         self.origin += self.axes[2] * distance;
     }
@@ -80,11 +85,13 @@ impl<S: Scalar> Frame<S> {
     }
 
     /// Reference coordinates of a point [m] given in this frame.
+    #[inline]
     pub fn point(&self, point: &Vector3<S>) -> Vector3<S> {
         self.origin + self.vector(point)
     }
 
     /// Reference coordinates of a vector given in this frame.
+    #[inline]
     pub fn vector(&self, vector: &Vector3<S>) -> Vector3<S> {
         self.axes[0] * vector.x + self.axes[1] * vector.y + self.axes[2] * vector.z
     }

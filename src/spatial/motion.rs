@@ -23,6 +23,7 @@ pub enum Motion<S> {
 
 impl<S: Scalar> Motion<S> {
     /// Moves `frame`.
+    #[inline]
     pub fn apply(self, frame: &mut Frame<S>) {
         match self {
             Self::RotateX(sin_cos) => frame.rotate_x(sin_cos),
@@ -34,6 +35,7 @@ impl<S: Scalar> Motion<S> {
     }
 
     /// Coordinates before the motion of a point [m] given after it.
+    #[inline]
     pub fn carry(self, point: &Vector3<f64>) -> Vector3<S> {
         let turn = |(sin, cos): (S, S), u: f64, v: f64| (cos * u - sin * v, sin * u + cos * v);
         let [x, y, z] = [point.x, point.y, point.z];
@@ -58,6 +60,7 @@ impl<S: Scalar> Motion<S> {
 
 impl Motion<Dual64> {
     /// The motion without its derivative.
+    #[inline]
     pub fn re(self) -> Motion<f64> {
         let real = |(sin, cos): (Dual64, Dual64)| (sin.re, cos.re);
         match self {
