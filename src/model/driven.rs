@@ -47,6 +47,7 @@ impl Commands {
     }
 
     /// The pose as the joints take it.
+    #[inline]
     pub fn apply<'b>(&'b mut self, setup: &Setup<'b>) -> Setup<'b> {
         if self.all.is_empty() {
             return *setup;

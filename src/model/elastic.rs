@@ -1,21 +1,27 @@
 //! Derivatives of an elastic arm with respect to its own parameters.
+//!
+//! What a parameter does to its own part is taken alone, and virtual work tells what that does to the target; parameters
+//! that change loads go through the whole statics, one by one.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use num_dual::Dual64;
 
 use super::Model;
-use super::derivative::{Base, Rows, Target};
+use super::derivative::Rows;
 use super::inputs::Input;
 use crate::arm::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Setup, Workspace};
 use crate::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::spatial::Frame;
 
 /// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
 pub(super) struct Elastic {
     parts: Option<Parts>,
     response: Response,
     whole: Vec<Whole>,
+    arm: Arm<f64>,
+    rest: Equilibrated,
     /// Memory for walks.
-    pub real: Workspace<f64>,
+    real: Workspace<f64>,
     ws: Workspace<Dual64>,
 }
 
@@ -33,10 +39,10 @@ struct Whole {
 
 impl Elastic {
     /// Of `arm`, which is the model's at `x`.
-    pub fn new(model: &Model, x: &DVector<f64>, arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
+    pub fn new(model: &Model, x: &DVector<f64>, arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let (mut apart, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
-            match part_of(arm, input.slot).filter(|_| Sensitivity::applies_to(arm)) {
+            match part_of(&arm, input.slot).filter(|_| Sensitivity::applies_to(&arm)) {
                 Some(part) => {
                     let before = apart.iter().filter(|(_, of, _)| *of == part).count();
                     apart.push((input, part, part.first_lane() + before));
@@ -51,36 +57,39 @@ impl Elastic {
                     apart.iter().filter(|(_, _, own)| *own == lane).map(|(input, _, _)| input).collect();
                 seed_arm(model, x, &of_lane)
             };
-            Parts { sensitivity: Sensitivity::new(arm, count, seeded), inputs: apart.clone() }
+            Parts { sensitivity: Sensitivity::new(&arm, count, seeded), inputs: apart.clone() }
         });
-        Self { parts, response: Response::new(arm), whole, real: Workspace::default(), ws: Workspace::default() }
+        let (response, rest) = (Response::new(&arm), Equilibrated::default());
+        Self { parts, response, whole, arm, rest, real: Workspace::default(), ws: Workspace::default() }
     }
 
-    /// Writes the derivatives with respect to the inputs at a pose that is at rest.
+    /// Writes the derivatives of the `target` [m] of a pose; returns the last frame, measuring frame, `None` where the pose
+    /// has no equilibrium.
     pub fn write(
         &mut self,
         commanded: &Setup,
         setup: &Setup,
-        base: &Base,
-        target: &Target,
-        rest: &mut Equilibrated,
+        base: &Frame<f64>,
+        target: &Vector3<f64>,
         rows: &mut Rows,
-    ) {
-        let Self { parts, response, whole, ws, .. } = self;
+    ) -> Option<Frame<f64>> {
+        let Self { parts, response, whole, arm, rest, real, ws } = self;
+        arm.equilibrate(setup, real, rest).ok()?;
         match parts {
             Some(Parts { sensitivity, inputs }) => {
-                sensitivity.differentiate(setup, &target.position, rest);
+                sensitivity.differentiate(setup, target, rest);
                 for (input, part, lane) in inputs {
-                    rows.put_input(input, commanded, &base.frame.vector(&sensitivity.of(*part, *lane)));
+                    rows.put_input(input, commanded, &base.vector(&sensitivity.of(*part, *lane)));
                 }
             }
-            None if !whole.is_empty() => response.adjoint(setup, &target.position, rest),
+            None if !whole.is_empty() => response.adjoint(setup, target, rest),
             None => {}
         }
         for Whole { arm, input } in whole {
-            let position = arm.target_position(setup, &target.position, rest, ws);
-            rows.put_input(input, commanded, &base.frame.vector(&position.map(|coordinate| coordinate.eps)));
+            let position = arm.target_position(setup, target, rest, ws);
+            rows.put_input(input, commanded, &base.vector(&position.map(|coordinate| coordinate.eps)));
         }
+        Some(base.seen(&rest.frame))
     }
 }
 

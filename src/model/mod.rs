@@ -10,6 +10,7 @@ mod enter;
 mod inputs;
 mod observation;
 mod poses;
+mod rigid;
 mod terms;
 
 pub use ablation::Ablation;

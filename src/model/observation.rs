@@ -30,6 +30,7 @@ impl Observation {
     }
 
     /// What is measured of a position, measuring frame [m].
+    #[inline]
     pub fn of(&self, position: &Vector3<f64>, setup: &Setup) -> Vector3<f64> {
         let mut seen = position * (1.0 + self.scale);
         for &(axis, driver, size) in &self.shifts {

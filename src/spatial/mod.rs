@@ -1,9 +1,7 @@
 //! Frames and rotations in three dimensions, generic over the scalar and differentiable everywhere they are used.
 
 mod frame;
-mod motion;
 mod rotation;
 
 pub use frame::Frame;
-pub use motion::Motion;
-pub use rotation::{rotate, rotation_axes};
+pub use rotation::{rotate, rotation_axes, turn_x, turn_y, turn_z};

@@ -35,6 +35,33 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
     ]
 }
 
+/// A plain vector turned about the x axis, given (sin, cos).
+#[inline]
+pub fn turn_x<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+    let (y, z) = turn(sin_cos, vector.y, vector.z);
+    Vector3::new(S::from(vector.x), y, z)
+}
+
+/// A plain vector turned about the y axis, given (sin, cos).
+#[inline]
+pub fn turn_y<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+    let (z, x) = turn(sin_cos, vector.z, vector.x);
+    Vector3::new(x, S::from(vector.y), z)
+}
+
+/// A plain vector turned about the z axis, given (sin, cos).
+#[inline]
+pub fn turn_z<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+    let (x, y) = turn(sin_cos, vector.x, vector.y);
+    Vector3::new(x, y, S::from(vector.z))
+}
+
+/// Coordinates in a plane turned by an angle, given (sin, cos).
+#[inline]
+fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
+    (cos * u - sin * v, sin * u + cos * v)
+}
+
 /// (sin φ / φ, (1 − cos φ) / φ²) from φ² [rad²].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < SERIES_BELOW {

@@ -1,0 +1,123 @@
+//! Derivatives of a rigid arm with respect to its own parameters.
+//!
+//! Every parameter belongs to one motion. Inwards, the target is carried through each motion in dual numbers, which tells
+//! what its parameter does in the frame before it; outwards, that frame chains on in plain numbers.
+
+use nalgebra::Vector3;
+use num_dual::Dual64;
+
+use super::derivative::Rows;
+use super::inputs::Input;
+use crate::arm::{Angle, Arm, Coordinates, Joint, Setup};
+use crate::parameter::{JointField, Slot};
+use crate::spatial::{Frame, turn_x, turn_y, turn_z};
+
+/// A rigid arm, motion by motion.
+pub(super) struct Rigid {
+    links: Vec<Link>,
+    inputs: Vec<Input>,
+    /// Of the pose at hand, from the last link to the first.
+    carried: Vec<Carried>,
+}
+
+/// A link with each of its five parameters seeded, and which input each is.
+struct Link {
+    joint: Joint<Dual64>,
+    inputs: [Option<usize>; 5],
+}
+
+/// What the parameters of a link do to the target, each in the frame before its own motion, and where q puts the joint.
+struct Carried {
+    derivatives: [Vector3<f64>; 5],
+    coordinates: Coordinates<Dual64>,
+}
+
+impl Rigid {
+    /// Of an arm whose own parameters are `inputs`.
+    pub fn new(arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
+        let mut links: Vec<Link> = arm.joints.iter().map(Link::seeded).collect();
+        for (index, input) in inputs.iter().enumerate() {
+            if let Slot::Joint { joint, field } = input.slot
+                && let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field)
+            {
+                links[joint].inputs[place] = Some(index);
+            }
+        }
+        Self { links, inputs, carried: Vec::new() }
+    }
+
+    /// Writes the derivatives of the `target` [m] of a pose; returns the last frame, measuring frame.
+    #[inline]
+    pub fn write(
+        &mut self,
+        commanded: &Setup,
+        setup: &Setup,
+        base: &Frame<f64>,
+        target: &Vector3<f64>,
+        rows: &mut Rows,
+    ) -> Frame<f64> {
+        let Self { links, inputs, carried } = self;
+        carried.clear();
+        let mut point = *target;
+        for (link, &q) in links.iter().zip(setup.configuration).rev() {
+            let coordinates = link.joint.coordinates(q);
+            let derivatives;
+            (derivatives, point) = link.carry(&coordinates, &point);
+            carried.push(Carried { derivatives, coordinates });
+        }
+        let mut frame = *base;
+        for (link, Carried { derivatives, coordinates }) in links.iter().zip(carried.iter().rev()) {
+            link.advance(coordinates, &mut frame, |place, frame| {
+                if let Some(input) = link.inputs[place] {
+                    rows.put_input(&inputs[input], commanded, &frame.vector(&derivatives[place]));
+                }
+            });
+        }
+        frame
+    }
+}
+
+impl Link {
+    fn seeded(joint: &Joint<f64>) -> Self {
+        let seed = |value: f64| Dual64::from(value).derivative();
+        let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
+        let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
+        let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
+        Self { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, inputs: [None; 5] }
+    }
+
+    /// Carries a point [m] from the frame after the link to the frame before it, with what α, a, θ, d, β do to it.
+    #[inline]
+    fn carry(&self, at: &Coordinates<Dual64>, point: &Vector3<f64>) -> ([Vector3<f64>; 5], Vector3<f64>) {
+        let Joint { alpha, a, beta, .. } = &self.joint;
+        let (by_beta, point) = derivative(&turn_y(beta.sin_cos, point));
+        let (by_d, point) = derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
+        let (by_theta, point) = derivative(&turn_z(at.angle, &point));
+        let (by_a, point) = derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
+        let (by_alpha, point) = derivative(&turn_x(alpha.sin_cos, &point));
+        ([by_alpha, by_a, by_theta, by_d, by_beta], point)
+    }
+
+    /// Moves `frame` through the link; `before` sees it before each motion.
+    #[inline]
+    fn advance(&self, at: &Coordinates<Dual64>, frame: &mut Frame<f64>, mut before: impl FnMut(usize, &Frame<f64>)) {
+        let Joint { alpha, a, beta, .. } = &self.joint;
+        let real = |(sin, cos): (Dual64, Dual64)| (sin.re, cos.re);
+        before(0, frame);
+        frame.rotate_x(real(alpha.sin_cos));
+        before(1, frame);
+        frame.translate_x(a.re);
+        before(2, frame);
+        frame.rotate_z(real(at.angle));
+        before(3, frame);
+        frame.translate_z(at.offset.re);
+        before(4, frame);
+        frame.rotate_y(real(beta.sin_cos));
+    }
+}
+
+/// The derivative of a vector, and its value.
+#[inline]
+fn derivative(vector: &Vector3<Dual64>) -> (Vector3<f64>, Vector3<f64>) {
+    (vector.map(|coordinate| coordinate.eps), vector.map(|coordinate| coordinate.re))
+}
