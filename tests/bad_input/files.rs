@@ -1,0 +1,84 @@
+//! Whole problems and files that cannot be read.
+
+use std::fs;
+use std::path::PathBuf;
+
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+use tempfile::TempDir;
+
+use super::reading::{ARM, check, problem};
+
+#[test]
+fn whole_problems() {
+    let mistakes: [(&str, &[&str]); 13] = [
+        ("", &["problem.toml:1: name: missing"]),
+        ("name = ''", &[":1: name: empty"]),
+        ("name = 'a/b'", &[":1: name: ", "cannot name a folder"]),
+        ("name = '..'", &[":1: name: "]),
+        ("name = 3", &[":1: name: expected text", "found a number"]),
+        ("name = 'arm'", &["joint: ", "at least one joint"]),
+        ("name = 'arm'\njoint = []", &["joint: ", "at least one joint"]),
+        ("name = 'arm'\n[joint]\na_m = 1", &[":2: joint: ", "double brackets"]),
+        ("name = 'arm'\nname = 'leg'", &[":2: not valid TOML: duplicate key, near `name`"]),
+        ("name = 'arm'\n\n[[joint]", &[":3: not valid TOML"]),
+        ("name = 'arm", &[":1: not valid TOML"]),
+        ("name = 'arm'\nmass_kg = 3\n[[joint]]", &[":2: mass_kg: unknown key", "gravity_m_s2"]),
+        ("name = 'arm'\ngravity = [0, 0, 1]\n[[joint]]", &[":2: gravity: ", "needs a unit", "gravity_m_s2"]),
+    ];
+    for (text, words) in mistakes {
+        check(&problem(text).expect_err(text), text, words);
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = TempDir::new().unwrap();
+    let error = Problem::read(folder.path()).unwrap_err();
+    check(&error, "no problem.toml", &["problem.toml: no such file"]);
+    let file = folder.path().join("elsewhere.toml");
+    check(&Problem::read(&file).unwrap_err(), "no file", &["elsewhere.toml: no such file"]);
+    fs::write(&file, b"name = 'arm'\ntitle = '\xff'\n").unwrap();
+    check(&Problem::read(&file).unwrap_err(), "binary", &["elsewhere.toml:2: not UTF-8"]);
+
+    let read = |text: &str| {
+        let problem = problem(text).unwrap();
+        Measurements::read(&problem.data.files, &problem).unwrap_err()
+    };
+    let named = format!("{ARM}[data]\nfiles = ['nowhere.csv']");
+    check(&read(&named), "missing data file", &["problem.toml:4: data.files: no such file: nowhere.csv"]);
+    check(&read(&format!("{ARM}[data]")), "no files", &["problem.toml:3: data: no measurements"]);
+    check(&read(ARM), "no data", &["problem.toml: data: no measurements"]);
+
+    let problem = problem(ARM).unwrap();
+    let other = PathBuf::from("other.csv");
+    let error = Measurements::read(std::slice::from_ref(&other), &problem).unwrap_err();
+    check(&error, "missing file", &["other.csv: no such file"]);
+    let error = Measurements::read(&[folder.path().to_owned()], &problem).unwrap_err();
+    check(&error, "a folder", &["cannot be read"]);
+}
+
+#[test]
+fn files_that_differ() {
+    let folder = TempDir::new().unwrap();
+    let files = ["1.csv", "2.csv"].map(|name| folder.path().join(name));
+    let problem = problem(ARM).unwrap();
+    let read = |first: &str, second: &str| {
+        fs::write(
+            &files[0],
+            format!("q1_deg,x_m,y_m,z_m{first}\n0,0,0,0{}\n", if first.is_empty() { "" } else { ",1" }),
+        )
+        .unwrap();
+        fs::write(
+            &files[1],
+            format!("q1_rad,z_m,y_m,x_m{second}\n0,0,0,0{}\n", if second.is_empty() { "" } else { ",1" }),
+        )
+        .unwrap();
+        Measurements::read(&files, &problem)
+    };
+    check(&read("", ",session").unwrap_err(), "more", &["2.csv:1: column session: ", "1.csv does not have it"]);
+    check(&read(",hoist_N", "").unwrap_err(), "fewer", &["2.csv:1: column hoist_N: ", "1.csv has it"]);
+    assert!(read("", "").is_ok() && read(",pose", "").is_ok() && read(",note", "").is_ok());
+    let twice = [files[0].clone(), files[0].clone()];
+    check(&Measurements::read(&twice, &problem).unwrap_err(), "twice", &["1.csv: named twice"]);
+}

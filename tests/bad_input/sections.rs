@@ -1,0 +1,182 @@
+//! Sections of a problem.
+
+use super::reading::check_problems;
+
+#[test]
+fn joints_and_beams() {
+    const BEAM: &str = "a_m = 1\n[joint.beam]\nname = 'A'\n";
+    let beam = |text: &str| format!("{BEAM}{text}");
+    let below: [(&str, &[&str]); 11] = [
+        ("mass_kg = -1", &[":6: joint[1].beam.mass_kg: -1 is below zero"]),
+        ("EA_N = 0", &[":6: joint[1].beam.EA_N: 0 is not above zero"]),
+        ("EI_N_m2 = 1e4", &[":6: joint[1].beam.EI_N_m2: unknown key", "EIy_N_m2"]),
+        ("EA = 1", &[":6: joint[1].beam.EA: ", "EA_N"]),
+        ("mass = 1", &[":6: joint[1].beam.mass: a mass needs a unit; write mass_kg"]),
+        ("[[joint.beam.mass]]\nmass_kg = 1", &[":6: joint[1].beam.mass[1].at: missing", "at_m or at_mm"]),
+        ("[[joint.beam.mass]]\nat_m = [0, 0, 0]", &[":6: joint[1].beam.mass[1].mass_kg: missing"]),
+        ("[joint.beam.hoist]\nforce_N = 1", &[":6: joint[1].beam.hoist.at: missing"]),
+        ("hoist = { at_m = [0, 0, 0], direction = [0, 0, 0] }", &[":6: joint[1].beam.hoist.direction: "]),
+        ("hoist = { at_m = [0, 0, 0], rope = 3 }", &[":6: joint[1].beam.hoist.rope: unknown key"]),
+        ("[[joint]]\na_m = 1\nbeam.name = 'A'", &[":8: joint[2].beam.name: ", "another beam"]),
+    ];
+    for (text, words) in below {
+        check_problems(&[(&beam(text), words)]);
+    }
+    check_problems(&[
+        ("alpha = 90", &["problem.toml:3: joint[1].alpha: an angle needs a unit; write alpha_deg or alpha_rad"]),
+        ("d = 1", &[":3: joint[1].d: a length needs a unit; write d_m or d_mm"]),
+        ("a_deg = 1", &[":3: joint[1].a_deg: a length is not given in deg"]),
+        ("a_m = 1\n\na_mm = 1000", &[":5: joint[1].a_mm: given already as a_m"]),
+        ("a_m = nan", &[":3: joint[1].a_m: nan is not a finite number"]),
+        ("a_m = -inf", &[":3: joint[1].a_m: -inf is not a finite number"]),
+        ("a_m = 1e999", &[":3: joint[1].a_m: 1e999 is not a finite number"]),
+        ("a_m = '1'", &[":3: joint[1].a_m: expected a number, found text"]),
+        ("stiffness_N_m_per_rad = 0", &[":3: joint[1].stiffness_N_m_per_rad: 0 is not above zero"]),
+        ("kind = 'spherical'", &[":3: joint[1].kind: \"spherical\" is none of revolute, prismatic, fixed"]),
+        ("length_m = 1", &[":3: joint[1].length_m: unknown key"]),
+        ("beam.name = 'A'", &[":3: joint[1].beam: ", "a_m or a_mm"]),
+        ("a_m = 1\nbeam.mass_kg = 1", &[":4: joint[1].beam.name: missing"]),
+        ("a_m = 1\nbeam.name = 'A.B'", &[":4: joint[1].beam.name: ", "cannot name a beam"]),
+        ("a_m = 1\nbeam.name = 'tool'", &[":4: joint[1].beam.name: ", "other parameters"]),
+        ("a_m = 1\nbeam.name = 'joint2'", &[":4: joint[1].beam.name: ", "other parameters"]),
+        ("[[joint.body]]\nmass_kg = -0.5", &[":4: joint[1].body[1].mass_kg: -0.5 is below zero"]),
+        ("[[joint.body]]\nmass_kg = 1\nat_m = [0, 0, 0]", &[":5: joint[1].body[1].at_m: unknown key", "com_m"]),
+        ("[[joint]]\n[[joint.body]]", &[":4: joint[2].body[1].mass_kg: missing"]),
+    ]);
+}
+
+#[test]
+fn other_sections() {
+    check_problems(&[
+        ("[statics]\nequilibrium = 'bent'", &[":4: statics.equilibrium: \"bent\" is none of deflected, undeflected"]),
+        ("[statics]\nbeam_elements = 0", &[":4: statics.beam_elements: 0 is not a whole number"]),
+        ("[statics]\nbeam_elements = 1.5", &[":4: statics.beam_elements: 1.5 is not a whole number"]),
+        ("[statics]\nbeam_elements = 1_000_000", &[":4: statics.beam_elements: 1000000 is too large"]),
+        ("[statics]\nelements = 1", &[":4: statics.elements: unknown key"]),
+        ("[tool]\ntarget_m = [1, 2]", &[":4: tool.target_m: a vector has 3 numbers, found 2"]),
+        ("[tool]\ntarget_m = [\n1,\n2,\nnan]", &[":7: tool.target_m[3]: nan"]),
+        ("[tool]\ntarget = [1, 2, 3]", &[":4: tool.target: a length needs a unit"]),
+        ("[tool]\npayload_kg = -1", &[":4: tool.payload_kg: -1 is below zero"]),
+        ("[tool]\npayload_g = 1", &[":4: tool.payload_g: unknown key"]),
+        ("[base]\nrotation_m = [0, 0, 0]", &[":4: base.rotation_m: an angle is not given in m"]),
+        ("[base]\nyaw_deg = 1", &[":4: base.yaw_deg: unknown key"]),
+        ("[data]\nposition_sigma_mm = 0", &[":4: data.position_sigma_mm: 0 is not above zero"]),
+        ("[data]\nposition_sigma_deg = 1", &[":4: data.position_sigma_deg: a length is not given in deg"]),
+        ("[data]\nposition_sigma = 1", &[":4: data.position_sigma: a length needs a unit"]),
+        ("[data]\nreference_temperature = 1", &[":4: data.reference_temperature: a temperature needs a unit"]),
+        ("[data]\nfiles = 'a.csv'", &[":4: data.files: expected a list"]),
+        ("[data]\nfiles = [1]", &[":4: data.files[1]: expected text"]),
+        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key"]),
+        ("[data]\nheld_out = {}", &[":4: data.held_out: give one of"]),
+        ("[data]\nheld_out = { seed = 1 }", &[":4: data.held_out: give one of"]),
+        ("[data]\nheld_out = { column = 'a', session = 'b' }", &[":4: data.held_out: give one of"]),
+        ("[data]\nheld_out = { fraction = 1 }", &[":4: data.held_out.fraction: 1 is not between 0 and 1"]),
+        ("[data]\nheld_out = { fraction = 0.3, seed = -1 }", &[":4: data.held_out.seed: -1 is not a whole number"]),
+        ("[data]\nheld_out = { rows = 3 }", &[":4: data.held_out.rows: unknown key"]),
+        ("[data]\nheld_out = 'split'", &[":4: data.held_out: expected a table, found text"]),
+    ]);
+}
+
+#[test]
+fn rules_of_parameters() {
+    let rules: [(&str, &[&str]); 14] = [
+        ("'tool.x' = {}", &[":4: parameters.\"tool.x\": says nothing"]),
+        ("'tool.x' = true", &[":4: parameters.\"tool.x\": expected a table"]),
+        ("tool.x = { free = true }", &[":4: parameters.tool: ", "in quotes: \"tool.x\""]),
+        ("a = { sigma = 1 }", &[":4: parameters.a.sigma: ", "needs a unit", "sigma_mm"]),
+        ("a = { sigma_mm = 0 }", &[":4: parameters.a.sigma_mm: 0 is not above zero"]),
+        ("a = { sigma_kg = 1 }", &[":4: parameters.a.sigma_kg: unknown key", "sigma_relative"]),
+        ("a = { sigma_mm = 1, sigma_m = 1 }", &[":4: parameters.a.sigma_m", "given already as sigma_m"]),
+        ("a = { sigma_mm = 'x' }", &[":4: parameters.a.sigma_mm: expected a number"]),
+        ("a = { min_mm = 2, max_mm = 1 }", &[":4: parameters.a.min_mm: min 0.002 is above max 0.001"]),
+        ("a = { min_relative = 0 }", &[":4: parameters.a.min_relative: 0 is not above zero"]),
+        ("a = { sigma_mm = 1, fixed = true }", &[":4: parameters.a: ", "leave out sigma_mm"]),
+        ("a = { free = false, fixed = false }", &[":4: parameters.a: ", "leave out fixed"]),
+        ("a = { free = 1 }", &[":4: parameters.a.free: expected true or false"]),
+        ("a = { free = true }\na = { free = true }", &[":5: not valid TOML: duplicate key"]),
+    ];
+    for (rule, words) in rules {
+        check_problems(&[(&format!("[parameters]\n{rule}"), words)]);
+    }
+}
+
+#[test]
+fn robust_loss() {
+    check_problems(&[
+        ("[robust]", &[":3: robust.loss: missing", "huber"]),
+        ("[robust]\nloss = 'cauchy'", &[":4: robust.loss: ", "\"cauchy\" is none of huber, l1"]),
+        ("[robust]\nloss = 'l1'\nthreshold_sigma = 0", &[":5: robust.threshold_sigma: 0 is not above zero"]),
+        ("[robust]\nloss = 'l1'\nthreshold = 1", &[":5: robust.threshold: unknown key", "threshold_sigma"]),
+        ("robust = 'l1'", &[":3: ", "robust"]),
+    ]);
+}
+
+#[test]
+fn constraints() {
+    let constraints: [(&str, &[&str]); 11] = [
+        ("", &[":3: constraint[1].terms: missing"]),
+        ("terms = {}", &[":4: constraint[1].terms: no terms"]),
+        ("terms = 1", &[":4: constraint[1].terms: expected a table"]),
+        ("terms = { A.EI = 1 }", &[":4: constraint[1].terms.A: ", "in quotes: \"A.EI\""]),
+        ("terms = { a = 0 }\nat_least = 0", &[":4: constraint[1].terms.a: a coefficient of 0"]),
+        ("terms = { a = 'x' }", &[":4: constraint[1].terms.a: expected a number"]),
+        ("terms = { a = 1 }", &[":3: constraint[1]: no limit; write at_least or at_most"]),
+        ("terms = { a = 1 }\nat_least = nan", &[":5: constraint[1].at_least: nan is not a finite number"]),
+        (
+            "terms = { a = 1 }\nat_least = 2\nat_most = 1",
+            &[":5: constraint[1].at_least: at_least 2 is above at_most 1"],
+        ),
+        ("terms = { a = 1 }\nat_least = 2\nat_least_mm = 1", &[":6: constraint[1].at_least_mm: given already"]),
+        ("terms = { a = 1 }\nat_least = 2\nabove = 1", &[":6: constraint[1].above: unknown key", "at_most"]),
+    ];
+    for (constraint, words) in constraints {
+        check_problems(&[(&format!("[[constraint]]\n{constraint}"), words)]);
+    }
+}
+
+#[test]
+fn effects() {
+    let effects: [(&str, &[&str]); 26] = [
+        ("", &[":3: effect[1]: an effect is one key", "found 0"]),
+        ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
+        ("wobble = {}", &[":4: effect[1].wobble: unknown effect", "backlash"]),
+        ("payload-mass = { joint = 1 }", &[":4: effect[1].payload-mass.joint: unknown key"]),
+        ("payload-mass = false", &[":4: effect[1].payload-mass: expected a table"]),
+        ("backlash = {}", &[":4: effect[1].backlash.joint: missing"]),
+        ("backlash = true", &[":4: effect[1].backlash.joint: missing"]),
+        ("backlash = { joint = 2 }", &[":4: effect[1].backlash.joint: no joint 2; the arm has 1"]),
+        ("backlash = { joint = 0 }", &[":4: effect[1].backlash.joint: no joint 0"]),
+        ("unmodelled-mass = { link = 'A' }", &[":4: effect[1].unmodelled-mass.link: no beam is called \"A\""]),
+        ("joint-harmonic = { joint = 1, orders = [] }", &[":4: effect[1].joint-harmonic.orders: no order"]),
+        ("joint-harmonic = { joint = 1, orders = [0] }", &[":4: effect[1].joint-harmonic.orders[1]: 0 is not"]),
+        ("joint-harmonic = { joint = 1, orders = [1, 1] }", &[":4: effect[1].joint-harmonic.orders[2]: order 1"]),
+        ("joint-harmonic = { joint = 1, order = 1 }", &[":4: effect[1].joint-harmonic.orders: missing"]),
+        ("joint-coupling = { joint = 1, from = 1 }", &[":4: effect[1].joint-coupling: ", "gear-ratio"]),
+        ("station-shift = { at_time = 3 }", &[":4: effect[1].station-shift.at_time: a time needs a unit"]),
+        ("link-bending = { joint = 1 }", &[":4: effect[1].link-bending: joint 1 has no link", "its a is 0"]),
+        ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
+        ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
+        ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
+        ),
+        ("backlash = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].backlash.joint: joint 2 is fixed"]),
+        (
+            "joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-coupling.from: joint 2 is fixed"],
+        ),
+        (
+            "joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"],
+        ),
+        ("hoist-force = {}\n[[effect]]\nhoist-force = {}", &[":6: effect[2].hoist-force: declared already on line 4"]),
+    ];
+    for (effect, words) in effects {
+        check_problems(&[(&format!("[[effect]]\n{effect}"), words)]);
+    }
+}

@@ -1,0 +1,92 @@
+//! Tables of measurements.
+
+use super::reading::{ARM, check, table};
+
+#[test]
+fn headers() {
+    let headers: [(&str, &[&str]); 15] = [
+        ("", &["rows.csv:1: the file is empty"]),
+        ("\n\n", &["rows.csv:1: the file is empty"]),
+        ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
+        ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
+        ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
+        ("q1,x_m,y_m,z_m\n", &["rows.csv:1: column q1: an angle needs a unit; write q1_deg or q1_rad"]),
+        ("q1_mm,x_m,y_m,z_m\n", &["rows.csv:1: column q1_mm: an angle is not given in mm"]),
+        ("\nq1_deg,x,y_m,z_m\n", &["rows.csv:2: column x: a length needs a unit"]),
+        ("q1_deg,x_m,x_mm,y_m,z_m\n", &["rows.csv:1: column x_mm: given already as column x_m"]),
+        ("q1_deg,x_m,y_m,z_m,y_m\n", &["rows.csv:1: column y_m: given already"]),
+        ("q1_deg,x_m,y_m,z_m,note,note\n", &["rows.csv:1: column note: given already"]),
+        ("q1_deg;x_m;y_m;z_m\n", &["rows.csv:1: columns are set apart by commas, not by ';'"]),
+        ("q1_deg,x_m,y_m,z_m,sigma\n", &["rows.csv:1: column sigma: a length needs a unit"]),
+        ("q1_deg,x_m,y_m,z_m,sigma_deg\n", &["rows.csv:1: column sigma_deg: a length is not given in deg"]),
+        ("q1_deg,x_m,y_m,z_m,rx_mm\n", &["rows.csv:1: column rx_mm: an angle is not given in mm"]),
+    ];
+    for (text, words) in headers {
+        check(&table(ARM, text.as_bytes()).expect_err(text), text, words);
+    }
+    check(&table(ARM, b"q1_deg,\xff\xfe\n").unwrap_err(), "binary header", &["rows.csv:1: ", "not UTF-8"]);
+}
+
+#[test]
+fn rows() {
+    let rows: [(&str, &[&str]); 20] = [
+        ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
+        ("1,\"1,5\",2,3,", &["rows.csv:3: column x_mm: \"1,5\" is not a number"]),
+        ("1,NaN,2,3,", &["rows.csv:3: column x_mm: NaN is not a finite number"]),
+        ("1,1,inf,3,", &["rows.csv:3: column y_mm: inf is not a finite number"]),
+        ("1,1,2,-1e999,", &["rows.csv:3: column z_mm: -1e999 is not a finite number"]),
+        ("1,,2,3,", &["rows.csv:3: column x_mm: the cell is empty"]),
+        ("1,2,3", &["rows.csv:3: the row has 3 fields, the header 5"]),
+        ("1,2,3,4,5,6", &["rows.csv:3: the row has 6 fields, the header 5"]),
+        ("1,2,3,\"4,5", &["rows.csv:3: a quote is opened and never closed"]),
+        ("\0\0\0", &["rows.csv:3: the row has 1 fields"]),
+        ("\0,1,2,3,", &["rows.csv:3: column q1_deg: \"\\u{0}\" is not a number"]),
+        ("1,1,2,3,train|split", &["rows.csv:3: column split: \"train\" is neither identification nor validation"]),
+        ("1,1,2,3,|split", &["rows.csv:3: column split: the cell is empty"]),
+        ("1,1,2,3,|session", &["rows.csv:3: column session: the cell is empty"]),
+        ("1,1,2,3,|target", &["rows.csv:3: column target: the cell is empty"]),
+        ("1,1,2,3,-1|payload_kg", &["rows.csv:3: column payload_kg: -1 is below zero"]),
+        ("1,1,2,3,0|sigma_mm", &["rows.csv:3: column sigma_mm: 0 is not above zero"]),
+        ("1,1,2,3,0.5|approach1", &["rows.csv:3: column approach1: 0.5 is not a direction"]),
+        ("1,1,2,3,x|rx_deg", &["rows.csv:3: column rx_deg: \"x\" is not a number"]),
+        ("1,1,2,3,noon|time_s", &["rows.csv:3: column time_s: \"noon\" is not a number"]),
+    ];
+    let valid = |column: &str| match column {
+        "split" => "validation",
+        _ => "1",
+    };
+    for (row, words) in rows {
+        let (row, column) = row.split_once('|').unwrap_or((row, "note"));
+        let text = format!("q1_deg,x_mm,y_mm,z_mm,{column}\n1,1,2,3,{}\n{row}\n", valid(column));
+        check(&table(ARM, text.as_bytes()).expect_err(row), row, words);
+    }
+    let binary = b"q1_deg,x_mm,y_mm,z_mm,note\r\n1,1,2,3,\r\n1,1,2,\xc3\x28,\r\n";
+    check(&table(ARM, binary).unwrap_err(), "binary row", &["rows.csv:3: column z_mm: not UTF-8"]);
+    let binary = b"q1_deg,x_mm,y_mm,z_mm,note\r\n1,1,2,3,\xff\r\n";
+    check(&table(ARM, binary).unwrap_err(), "binary note", &["rows.csv:2: column note: not UTF-8"]);
+}
+
+#[test]
+fn splits() {
+    let held_out = |text: &str| format!("{ARM}[data]\nheld_out = {{ {text} }}\n");
+    let rows = |column: &str, words: [&str; 2]| {
+        format!("q1_deg,x_m,y_m,z_m,{column}\n1,2,3,4,{}\n1,2,3,4,{}\n", words[0], words[1])
+    };
+    let column = held_out("column = 'split'");
+    let session = held_out("session = 'D'");
+    let place = "problem.toml:4: data.held_out: ";
+    let cases: [(&str, String, &[&str]); 9] = [
+        (&column, rows("note", ["", ""]), &["rows.csv:1: column split: missing", "problem.toml:4: data.held_out"]),
+        (&column, rows("split", ["validation"; 2]), &[place, "no rows are left to fit", "column split", "validation"]),
+        (&column, rows("split", ["identification"; 2]), &[place, "no rows are held out", "column split"]),
+        (&session, rows("session", ["A", "B"]), &[place, "no session is called \"D\"; there is A, B"]),
+        (&session, rows("note", ["A", "B"]), &[place, "no column session"]),
+        (&session, rows("session", ["D", "D"]), &[place, "no rows are left to fit", "session \"D\""]),
+        (&held_out("fraction = 0.5"), rows("note", ["", ""]), &[place, "2 rows have 1 joint configurations"]),
+        (ARM, rows("note", ["", ""]), &["problem.toml: data: no row is said to be held out"]),
+        (ARM, rows("split", ["validation"; 2]), &["problem.toml: data: no rows are left to fit"]),
+    ];
+    for (problem, rows, words) in cases {
+        check(&table(problem, rows.as_bytes()).expect_err(&rows), &rows, words);
+    }
+}

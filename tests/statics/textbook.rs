@@ -1,0 +1,85 @@
+//! Single beams and joints against formulas of the textbook.
+
+use std::f64::consts::FRAC_PI_2;
+
+use flexcal::arm::{Angle, Arm, Flexibility, Hoist, Joint, PointMass};
+use nalgebra::Vector3;
+
+use super::bench::{GRAVITY, LENGTH, STIFF, arm, beam, frame, joint, position};
+
+fn near(value: f64, expected: f64, relative: f64, what: &str) {
+    let error = (value / expected - 1.0).abs();
+    assert!(error < relative, "{what}: {value:e} instead of {expected:e}");
+}
+
+#[test]
+fn a_hanging_beam_stretches_under_its_own_weight() {
+    // δ = q L² / (2 EA), downwards; upright it is pressed together by as much.
+    for (beta, sign) in [(FRAC_PI_2, -1.0), (-FRAC_PI_2, 1.0)] {
+        for elements in [1, 5] {
+            let turned = Joint { beta: Angle::new(beta), ..joint(0.0) };
+            let mut arm = arm(vec![turned, beam(LENGTH, 12.0, STIFF)]);
+            arm.beam_elements = elements;
+            let moved = position(&arm, &[], &Vector3::zeros()).z - sign * LENGTH;
+            let expected = 12.0 * GRAVITY / LENGTH * LENGTH.powi(2) * STIFF.axial / 2.0;
+            near(moved, -expected, 1e-8, "change of length");
+        }
+    }
+}
+
+#[test]
+fn a_horizontal_beam_sags_as_in_the_textbook() {
+    // q L⁴/(8 EI) with the slope q L³/(6 EI); F L³/(3 EI) with F L²/(2 EI); F s² (3 L − s)/(6 EI) with F s²/(2 EI).
+    let (weight, s) = (12.0 * GRAVITY, 0.7);
+    for (alpha, flexibility) in [(0.0, STIFF.about_y), (FRAC_PI_2, STIFF.about_z)] {
+        for elements in [1, 4] {
+            let made = |mass: f64| {
+                let link = Joint { alpha: Angle::new(alpha), ..beam(LENGTH, mass, STIFF) };
+                let mut arm = arm(vec![link]);
+                arm.beam_elements = elements;
+                arm
+            };
+            let check = |arm: &Arm<f64>, sag: f64, slope: f64, what: &str| {
+                let tip = frame(arm, &[]).unwrap();
+                near(-tip.origin.z, sag, 1e-6, what);
+                near(-tip.axes[0].z, slope, 1e-6, what);
+            };
+            let (l, k) = (LENGTH, flexibility);
+            check(&made(12.0), weight * l.powi(3) * k / 8.0, weight * l.powi(2) * k / 6.0, "own weight");
+            let mut loaded = made(0.0);
+            loaded.payload_mass = 12.0;
+            check(&loaded, weight * l.powi(3) * k / 3.0, weight * l.powi(2) * k / 2.0, "load at the tip");
+            let mut carrying = made(0.0);
+            let carried = PointMass { mass: 12.0, at: Vector3::new(s, 0.0, 0.0) };
+            carrying.joints[0].beam.as_mut().unwrap().masses.push(carried);
+            let (sag, slope) = (weight * s * s * (3.0 * l - s) * k / 6.0, weight * s * s * k / 2.0);
+            check(&carrying, sag, slope, "load on the beam");
+            let mut hoisted = made(0.0);
+            let hoist = Hoist { at: Vector3::new(s, 0.0, 0.0), force: weight, direction: Vector3::new(0.0, 0.0, -1.0) };
+            hoisted.joints[0].beam.as_mut().unwrap().hoist = Some(hoist);
+            check(&hoisted, sag, slope, "rope that pulls down");
+        }
+    }
+}
+
+#[test]
+fn a_mass_beside_the_beam_twists_it() {
+    // φ = m g e L / GJ: a point at the height h beside the axis moves sideways by φ h.
+    let (mass, lever, height) = (3.0, 0.4, 0.25);
+    let only_twist = Flexibility { axial: 0.0, about_y: 0.0, about_z: 0.0, ..STIFF };
+    let mut arm = arm(vec![beam(LENGTH, 0.0, only_twist)]);
+    (arm.payload_mass, arm.payload_at) = (mass, Vector3::new(0.0, lever, 0.0));
+    let moved = position(&arm, &[], &Vector3::new(0.0, 0.0, height)).y;
+    near(moved, mass * GRAVITY * lever * LENGTH * STIFF.twist * height, 1e-6, "twist");
+}
+
+#[test]
+fn a_flexible_joint_turns_by_moment_over_stiffness() {
+    // A horizontal axis, a load at the lever L: the load sinks by F L²/k.
+    let (stiffness, mass) = (1e7, 4.0);
+    let axis = Joint { alpha: Angle::new(FRAC_PI_2), flexibility: Some(1.0 / stiffness), ..joint(0.0) };
+    let mut arm = arm(vec![axis, joint(LENGTH)]);
+    arm.payload_mass = mass;
+    let sag = -position(&arm, &[], &Vector3::zeros()).z;
+    near(sag, mass * GRAVITY * LENGTH.powi(2) / stiffness, 1e-5, "sag");
+}
