@@ -11,8 +11,8 @@ mod resolve;
 pub use constraint::{LinearConstraint, constrain};
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
-pub(crate) use resolve::holds_all;
 pub use resolve::{EffectParameter, resolve};
+pub(crate) use resolve::{holds_all, rule_of};
 
 /// A free parameter.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,6 +44,13 @@ pub struct EffectParameter {
     pub sigma: f64,
 }
 
+impl EffectParameter {
+    /// Kind of quantity.
+    pub fn unit(&self) -> Unit {
+        unit(self.slot, self.driver)
+    }
+}
+
 /// Free parameters of `problem` with one base per name in `bases` and one target per name in `targets`.
 ///
 /// A single unnamed base or target (the empty word) goes without brackets: `base.x`.
@@ -103,16 +110,18 @@ pub fn resolve(
     Ok(parameters)
 }
 
+/// The rule of `problem` that decides on a parameter of an effect, declared or not.
+pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<&'a ParameterRule> {
+    let speaks = |rule: &&ParameterRule| {
+        let named = matches(&rule.pattern, &parameter.name) || matches(&rule.pattern, &parameter.plain);
+        named && fits(rule, parameter.unit())
+    };
+    problem.parameters.iter().rev().find(speaks)
+}
+
 /// Whether the rules of `problem` hold all of these parameters of an effect that it does not declare.
 pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
-    let held = |parameter: &EffectParameter| {
-        let kind = unit(parameter.slot, parameter.driver);
-        let speaks = |rule: &&ParameterRule| {
-            (matches(&rule.pattern, &parameter.name) || matches(&rule.pattern, &parameter.plain)) && fits(rule, kind)
-        };
-        let last = problem.parameters.iter().rev().find(speaks);
-        last.is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
-    };
+    let held = |parameter| rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed));
     !parameters.is_empty() && parameters.iter().all(held)
 }
 

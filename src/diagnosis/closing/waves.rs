@@ -13,8 +13,8 @@ use super::super::data::Data;
 use super::super::fitted::{Fitted, with_generics};
 use super::super::generic::Generic;
 use super::rounds::Rounds;
-use crate::parameter::Driver;
-use crate::problem::pattern::matches;
+use crate::effect;
+use crate::parameter::{Driver, EffectParameter, Unit, rule_of};
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 use crate::study::IdentifyError;
 
@@ -35,38 +35,33 @@ pub const WAVES: &str = "joint-harmonic.*";
 /// are few or the problem has a word of its own on them.
 pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
     let waves = waves(&fitted);
-    let said = |rule: &ParameterRule| {
-        waves.iter().any(|&j| matches(&rule.pattern, &fitted.model.parameters[fitted.unknowns[j]].name))
-    };
-    if waves.len() < MANY || !rounds.has_many_poses() || fitted.problem.parameters.iter().any(said) {
+    let more: Vec<Effect> = rounds.added(&fitted).into_iter().map(|own| all_orders(own, &rounds.declared)).collect();
+    let effects = more.iter().fold(rounds.declared.clone(), |all, own| joined(&all, own));
+    let dense = fitted.with_effects(&effects);
+    if waves.len() < MANY || !rounds.has_many_poses() || !takes_prior(&dense) {
         return Ok((rounds.settled(fitted)?, None));
     }
     let squares: f64 = waves.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / waves.len() as f64).sqrt();
-    let more: Vec<Effect> = rounds.added(&fitted).into_iter().map(|own| all_orders(own, &rounds.declared)).collect();
-    let effects = more.iter().fold(rounds.declared.clone(), |all, own| joined(&all, own));
-    let dense = with_scale(fitted.with_effects(&effects), found);
-    let dense = rounds.fit_few(dense, &fitted)?;
-    let scale = best_scale(&dense, rounds.data, &rounds.generics, found);
-    let scaled = with_scale(fitted.with_effects(&effects), scale);
-    Ok((rounds.fit_whole(scaled, &dense)?, Some(scale)))
+    let first = rounds.fit_few(with_scale(dense.clone(), found), &fitted)?;
+    let scale = best_scale(&first, rounds.data, &rounds.generics, found);
+    Ok((rounds.fit_whole(with_scale(dense, scale), &first)?, Some(scale)))
+}
+
+fn is_wave(driver: Driver) -> bool {
+    matches!(driver, Driver::Sine(..) | Driver::Cosine(..))
 }
 
 /// Places of the coefficients of waves among the unknowns.
 fn waves(fitted: &Fitted) -> Vec<usize> {
-    let is_wave = |&j: &usize| {
-        let parameter = &fitted.model.parameters[fitted.unknowns[j]];
-        matches!(parameter.driver, Driver::Sine(..) | Driver::Cosine(..)) && matches(WAVES, &plain(&parameter.name))
-    };
-    (0..fitted.unknowns.len()).filter(is_wave).collect()
+    let driver = |j: usize| fitted.model.parameters[fitted.unknowns[j]].driver;
+    (0..fitted.unknowns.len()).filter(|&j| is_wave(driver(j))).collect()
 }
 
-/// A name without the place in brackets.
-fn plain(name: &str) -> String {
-    match (name.find('['), name.find(']')) {
-        (Some(from), Some(to)) => format!("{}{}", &name[..from], &name[to + 1..]),
-        _ => name.to_owned(),
-    }
+/// Whether one prior in angles can hold all waves of a problem: none is of a joint that slides, and no rule speaks of any.
+fn takes_prior(problem: &Problem) -> bool {
+    let takes = |own: &EffectParameter| own.unit() == Unit::Angle && rule_of(problem, own).is_none();
+    effect::parameters(problem).iter().filter(|own| is_wave(own.driver)).all(takes)
 }
 
 /// Several orders of a joint that were found become all of them up to the highest but those declared.
@@ -118,7 +113,7 @@ fn best_scale(fitted: &Fitted, data: &Data, generics: &[Generic], found: f64) ->
         Part { gram: j.transpose() * &j, product: j.tr_mul(&r), squares: r.norm_squared(), rows: rows.len() }
     };
     let whole = part(&(0..data.rows().len()).collect());
-    let parts: Vec<Part> = parts_of_ranges(data).par_iter().map(part).collect();
+    let parts: Vec<Part> = parts_of_ranges(&fitted.problem, data).par_iter().map(part).collect();
     let n = columns.ncols();
     let at = |j: usize| fitted.unknowns.get(j).map_or(0.0, |&k| fitted.found.x[k]);
     let sigma = |j: usize| match fitted.unknowns.get(j) {
@@ -153,14 +148,42 @@ fn best_scale(fitted: &Fitted, data: &Data, generics: &[Generic], found: f64) ->
         .map_or(found, |(scale, _)| scale)
 }
 
-/// Identification poses in each part of each joint's range, as many in each.
-fn parts_of_ranges(data: &Data) -> Vec<Vec<usize>> {
-    let rows = data.rows();
+/// Identification poses in each part of the range of each joint that moves, as many in each.
+fn parts_of_ranges(problem: &Problem, data: &Data) -> Vec<Vec<usize>> {
+    let (rows, conditions) = (data.rows(), data.conditions(problem));
     let coordinate = |pose: usize, joint: usize| data.measurements.configuration(rows[pose])[joint];
     let of_joint = |joint: usize| {
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by(|&a, &b| coordinate(a, joint).total_cmp(&coordinate(b, joint)));
         order.chunks(rows.len().div_ceil(PARTS).max(1)).map(<[usize]>::to_vec).collect::<Vec<_>>()
     };
-    (0..data.measurements.joints).flat_map(of_joint).collect()
+    (0..data.measurements.joints).filter(|&joint| conditions.moves(joint)).flat_map(of_joint).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_rule_of_their_own_or_a_slide_keeps_waves_from_the_common_prior() {
+        let takes = |kind: &str, rule: &str| {
+            let text = format!(
+                "name = 'arm'\n[[joint]]\n[[joint]]\nkind = '{kind}'\n[[effect]]\njoint-harmonic = {{ joint = 1, orders = [1, 2] }}\n\
+                 [[effect]]\njoint-harmonic = {{ joint = 2, orders = [3] }}\n[parameters]\n'joint*.theta' = {{ free = true }}\n{rule}"
+            );
+            takes_prior(&Problem::parse(&text, Path::new("problem.toml")).unwrap())
+        };
+        assert!(takes("revolute", "") && takes("revolute", "'*.sin*' = { sigma_mm = 1 }"));
+        assert!(!takes("prismatic", ""));
+        for rule in [
+            "'joint-harmonic.*' = { sigma_deg = 0.01 }",
+            "'joint-harmonic[2].*' = { sigma_deg = 0.01 }",
+            "'joint-harmonic[1].sin2' = { fixed = true }",
+            "'*.cos3' = { free = true }",
+        ] {
+            assert!(!takes("revolute", rule), "{rule}");
+        }
+    }
 }
