@@ -1,7 +1,6 @@
 //! Joints with waves of many orders, measured over part of their turn: all orders, one prior, and no harm where nothing was measured.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
-#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
 mod common;
 

@@ -1,9 +1,54 @@
 //! `[[constraint]]`: linear inequalities between parameters.
 
 use super::section::Section;
-use super::{Constraint, ConstraintTerm, Limit, LimitKind};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ANGLE, LENGTH};
+
+/// `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
+#[derive(Debug, Clone)]
+pub struct Constraint {
+    /// Parameters and their coefficients.
+    pub terms: Vec<ConstraintTerm>,
+    /// Lower limit.
+    pub at_least: Option<Limit>,
+    /// Upper limit.
+    pub at_most: Option<Limit>,
+    /// For errors.
+    pub location: Location,
+}
+
+/// One term of a constraint.
+#[derive(Debug, Clone)]
+pub struct ConstraintTerm {
+    /// Name of the parameter.
+    pub name: String,
+    /// Its coefficient, not zero.
+    pub coefficient: f64,
+    /// For errors.
+    pub location: Location,
+}
+
+/// A limit of a constraint.
+#[derive(Debug, Clone)]
+pub struct Limit {
+    /// Value [rad], [m] or of the logarithm.
+    pub value: f64,
+    /// What it limits.
+    pub kind: LimitKind,
+    /// For errors.
+    pub location: Location,
+}
+
+/// What a constraint adds up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitKind {
+    /// Angles [rad].
+    Angle,
+    /// Lengths [m].
+    Length,
+    /// Logarithms of stiffnesses and rigidities in SI units.
+    Logarithm,
+}
 
 /// Every constraint, in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<Constraint>, InputError> {

@@ -2,9 +2,46 @@
 
 use super::item::Item;
 use super::section::Section;
-use super::{Freedom, ParameterRule, Quantities};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ANGLE, Kind, LENGTH, RELATIVE};
+
+/// One line of `[parameters]`.
+#[derive(Debug, Clone)]
+pub struct ParameterRule {
+    /// Name with `*` for any run of characters.
+    pub pattern: String,
+    /// What the rule says.
+    pub freedom: Freedom,
+    /// For errors.
+    pub location: Location,
+}
+
+/// What a rule makes of the parameters it matches.
+#[derive(Debug, Clone)]
+pub enum Freedom {
+    /// Held at its nominal value.
+    Fixed,
+    /// Free, with or without prior and bounds.
+    Free {
+        /// 1 σ of a Gaussian prior about the nominal value.
+        sigma: Quantities,
+        /// Lower bound on the deviation from nominal (relative: multiple of nominal).
+        min: Quantities,
+        /// Upper bound on the deviation from nominal (relative: multiple of nominal).
+        max: Quantities,
+    },
+}
+
+/// The same thing said for each kind of parameter that a pattern may match.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Quantities {
+    /// Angles [rad].
+    pub angle: Option<f64>,
+    /// Lengths [m].
+    pub length: Option<f64>,
+    /// Relative to nominal; a σ is that of ln(value / nominal).
+    pub relative: Option<f64>,
+}
 
 const KINDS: [&Kind; 3] = [&ANGLE, &LENGTH, &RELATIVE];
 /// Where the nominal value lies on the scale of each kind: no deviation, or once the nominal.

@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 use super::item::Document;
 use super::section::Section;
 use super::{
-    BasePose, Data, EffectDeclaration, Equilibrium, HeldOut, Problem, Statics, Tool, arm, constraints, effects,
-    parameters, robust,
+    BasePose, EffectDeclaration, Equilibrium, Problem, Statics, Tool, arm, constraints, data, effects, parameters,
+    robust,
 };
-use crate::error::{InputError, InputErrorKind, Location};
-use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS, TEMPERATURE};
+use crate::error::{InputError, InputErrorKind};
+use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS};
 
 impl Problem {
     /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
@@ -57,7 +57,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let effects = effects::read(&mut root, &joints)?;
     let parameters = parameters::read(&mut root)?;
     let constraints = constraints::read(&mut root)?;
-    let data = data(&mut root)?;
+    let data = data::read(&mut root)?;
     let robust = robust::read(&mut root)?;
     root.finish()?;
     effects::check(&effects, statics, &joints, &data)?;
@@ -108,61 +108,4 @@ fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
     base.rotation = section.vector("rotation", &ANGLE)?.unwrap_or_default();
     section.finish()?;
     Ok(base)
-}
-
-fn data(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
-    let file = root.location();
-    let Some(mut section) = root.section("data")? else {
-        let location = Location::file(file.file).with_key("data");
-        return Ok(Data {
-            files: Vec::new(),
-            position_sigma: None,
-            held_out: None,
-            reference_temperature: None,
-            files_location: location.clone(),
-            held_out_location: location.clone(),
-            location,
-        });
-    };
-    let location = section.location();
-    let mut files = Vec::new();
-    let mut files_location = location.clone();
-    if let Some(item) = section.get("files") {
-        let folder = file.file.parent().unwrap_or(Path::new(""));
-        for element in item.list("a list of file names")? {
-            files.push(folder.join(element.text()?));
-        }
-        files_location = item.location();
-    }
-    let position_sigma = section.positive("position_sigma", &LENGTH, |value| InputErrorKind::NotPositive { value })?;
-    let mut held_out = None;
-    let mut held_out_location = location.clone();
-    if let Some(item) = section.get("held_out") {
-        held_out_location = item.location();
-        held_out = Some(held_out_rows(item.section()?)?);
-    }
-    let reference_temperature = section.number("reference_temperature", &TEMPERATURE)?;
-    section.finish()?;
-    Ok(Data { files, position_sigma, held_out, reference_temperature, files_location, held_out_location, location })
-}
-
-fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
-    let column = section.get("column");
-    let fraction = section.get("fraction");
-    let session = section.get("session");
-    let seed = section.get("seed");
-    section.finish()?;
-    match (column, fraction, session, seed) {
-        (Some(column), None, None, None) => Ok(HeldOut::Column(column.text()?.trim().to_owned())),
-        (None, None, Some(session), None) => Ok(HeldOut::Session(session.text()?.trim().to_owned())),
-        (None, Some(item), None, seed) => {
-            let fraction = item.number()?;
-            if fraction <= 0.0 || fraction >= 1.0 {
-                return Err(item.error(InputErrorKind::NotAFraction { value: fraction }));
-            }
-            let seed = seed.map_or(Ok(0), |seed| seed.whole(0))?;
-            Ok(HeldOut::Fraction { fraction, seed })
-        }
-        _ => Err(section.error(InputErrorKind::NotOneHeldOut)),
-    }
 }

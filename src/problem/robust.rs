@@ -1,8 +1,25 @@
 //! `[robust]`: how much a residual counts.
 
 use super::section::Section;
-use super::{Robust, RobustLoss};
 use crate::error::{InputError, InputErrorKind};
+
+/// `[robust]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Robust {
+    /// What residuals count.
+    pub loss: RobustLoss,
+    /// `threshold_sigma`: the length of a residual from which it counts less than its square [σ]; `None`: the usual one.
+    pub threshold: Option<f64>,
+}
+
+/// What the residual of a pose counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobustLoss {
+    /// Its square up to the threshold, its length beyond.
+    Huber,
+    /// Its length, rounded off below the threshold.
+    L1,
+}
 
 /// The section, if it is there.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<Robust>, InputError> {

@@ -2,39 +2,22 @@
 
 use std::sync::Arc;
 
-use argmin::core::observers::Observe;
-use argmin::core::{Error, KV, State as _};
 use nalgebra::{DMatrix, DVector};
 
 use super::SolverChoice;
 use super::active::Held;
+use super::progress::{ProgressSink, Reporter};
 use crate::fit::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Parameter;
 use crate::solver::{
     self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings, Settings,
-    Solution, State,
+    Solution,
 };
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
 /// metres measured in units of their noise, and far below what any estimate's error would show.
 const COST_TOLERANCE: f64 = 1e-11;
-
-/// How far a fit has come.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// Steps tried in the fit at hand.
-    pub iteration: u64,
-    /// Number of unknowns of the fit at hand.
-    pub unknowns: usize,
-    /// Number of poses of the fit at hand.
-    pub poses: usize,
-    /// ½‖r‖².
-    pub cost: f64,
-}
-
-/// Where progress goes; the library itself prints nothing.
-pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
 
 /// A stage that cannot be set up.
 #[derive(Debug, thiserror::Error)]
@@ -86,24 +69,6 @@ pub(super) struct Gauge {
     pub visible: Vec<f64>,
 }
 
-struct Reporter {
-    sink: ProgressSink,
-    unknowns: usize,
-    poses: usize,
-}
-
-impl Observe<State> for Reporter {
-    fn observe_iter(&mut self, state: &State, _kv: &KV) -> Result<(), Error> {
-        (self.sink)(Progress {
-            iteration: state.get_iter(),
-            unknowns: self.unknowns,
-            poses: self.poses,
-            cost: state.get_cost(),
-        });
-        Ok(())
-    }
-}
-
 impl<'a> Stage<'a> {
     /// The parameters that vary.
     pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
@@ -150,47 +115,6 @@ impl<'a> Stage<'a> {
             gauge.visible[k] = found.visible[j];
         }
         gauge
-    }
-
-    /// The model's constraints on the unknowns, with the other parameters as in `at`; which they are, and their rows.
-    fn constraints(&self, at: &DVector<f64>) -> Result<(Vec<usize>, Inequalities), InequalitiesError> {
-        let n = self.unknowns.len();
-        let (mut which, mut rows, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (index, constraint) in self.model.constraints.iter().enumerate() {
-            let varies = |&(k, _): &(usize, f64)| self.unknowns.contains(&k);
-            if !self.counts_fixed && !constraint.terms.iter().all(varies) {
-                continue;
-            }
-            let (mut row, mut rest) = (vec![0.0; n], 0.0);
-            for &(k, coefficient) in &constraint.terms {
-                match self.unknowns.iter().position(|&unknown| unknown == k) {
-                    Some(j) => row[j] += coefficient,
-                    None => rest += coefficient * at[k],
-                }
-            }
-            if row.iter().any(|coefficient| *coefficient != 0.0) {
-                which.push(index);
-                rows.extend(row);
-                lower.push(constraint.lower - rest);
-                upper.push(constraint.upper - rest);
-            }
-        }
-        let matrix = DMatrix::from_row_slice(which.len(), n, &rows);
-        Ok((which, Inequalities::new(matrix, DVector::from_vec(lower), DVector::from_vec(upper))?))
-    }
-
-    /// The constraints that hold the unknowns back at the full parameter vector `at`.
-    ///
-    /// # Errors
-    /// Constraints make no sense.
-    pub fn held(&self, at: &DVector<f64>) -> Result<Vec<Held>, StageError> {
-        let (which, rows) = self.constraints(at)?;
-        let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
-        let held = |(i, constraint)| {
-            let row = rows.matrix().row(i).iter().copied().collect();
-            Some(Held { constraint, side: rows.at(&x, i)?, row })
-        };
-        Ok(which.into_iter().enumerate().filter_map(held).collect())
     }
 
     /// Minimises from the full parameter vector `start`.

@@ -1,0 +1,100 @@
+//! `[data]`: where the measurements are and how they are used.
+
+use std::path::{Path, PathBuf};
+
+use super::section::Section;
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::units::{LENGTH, TEMPERATURE};
+
+/// `[data]`.
+#[derive(Debug, Clone)]
+pub struct Data {
+    /// Measurement files, already resolved against the problem's folder.
+    pub files: Vec<PathBuf>,
+    /// 1 σ of a measured coordinate [m]; `None`: not known.
+    pub position_sigma: Option<f64>,
+    /// Which rows never take part in fitting or choosing; `None` where the file says nothing.
+    pub held_out: Option<HeldOut>,
+    /// T₀ [°C].
+    pub reference_temperature: Option<f64>,
+    /// Where `files` stands, or `[data]`, for errors.
+    pub files_location: Location,
+    /// Where `held_out` stands, or `[data]`, for errors.
+    pub held_out_location: Location,
+    /// Where `[data]` stands, for errors.
+    pub location: Location,
+}
+
+/// `held_out` of `[data]`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HeldOut {
+    /// Rows whose column says `validation`.
+    Column(String),
+    /// A random part of the joint configurations; rows of one configuration stay together.
+    Fraction {
+        /// Part of the rows, in (0, 1).
+        fraction: f64,
+        /// Seed of the choice.
+        seed: u64,
+    },
+    /// Every row of one session.
+    Session(String),
+}
+
+/// The section; empty where it is not there.
+pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
+    let file = root.location();
+    let Some(mut section) = root.section("data")? else {
+        let location = Location::file(file.file).with_key("data");
+        return Ok(Data {
+            files: Vec::new(),
+            position_sigma: None,
+            held_out: None,
+            reference_temperature: None,
+            files_location: location.clone(),
+            held_out_location: location.clone(),
+            location,
+        });
+    };
+    let location = section.location();
+    let mut files = Vec::new();
+    let mut files_location = location.clone();
+    if let Some(item) = section.get("files") {
+        let folder = file.file.parent().unwrap_or(Path::new(""));
+        for element in item.list("a list of file names")? {
+            files.push(folder.join(element.text()?));
+        }
+        files_location = item.location();
+    }
+    let position_sigma = section.positive("position_sigma", &LENGTH, |value| InputErrorKind::NotPositive { value })?;
+    let mut held_out = None;
+    let mut held_out_location = location.clone();
+    if let Some(item) = section.get("held_out") {
+        held_out_location = item.location();
+        held_out = Some(held_out_rows(item.section()?)?);
+    }
+    let reference_temperature = section.number("reference_temperature", &TEMPERATURE)?;
+    section.finish()?;
+    Ok(Data { files, position_sigma, held_out, reference_temperature, files_location, held_out_location, location })
+}
+
+fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
+    let column = section.get("column");
+    let fraction = section.get("fraction");
+    let session = section.get("session");
+    let seed = section.get("seed");
+    section.finish()?;
+    match (column, fraction, session, seed) {
+        (Some(column), None, None, None) => Ok(HeldOut::Column(column.text()?.trim().to_owned())),
+        (None, None, Some(session), None) => Ok(HeldOut::Session(session.text()?.trim().to_owned())),
+        (None, Some(item), None, seed) => {
+            let fraction = item.number()?;
+            if fraction <= 0.0 || fraction >= 1.0 {
+                return Err(item.error(InputErrorKind::NotAFraction { value: fraction }));
+            }
+            let seed = seed.map_or(Ok(0), |seed| seed.whole(0))?;
+            Ok(HeldOut::Fraction { fraction, seed })
+        }
+        _ => Err(section.error(InputErrorKind::NotOneHeldOut)),
+    }
+}
