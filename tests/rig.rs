@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::float_cmp, reason = "what is written reads back exactly")]
 
+mod common;
+
 #[path = "rig/bench.rs"]
 mod bench;
 #[path = "rig/effects.rs"]

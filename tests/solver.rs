@@ -4,6 +4,8 @@
 
 mod collections;
 
+#[path = "solver/bench.rs"]
+mod bench;
 #[path = "solver/bounds.rs"]
 mod bounds;
 #[path = "solver/derivatives.rs"]

@@ -8,7 +8,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use common::arms::parse;
-use common::made::{at_random, normal, predicted};
+use common::made::{normal, predicted};
+use flexcal::campaign::table;
 use flexcal::diagnosis::{WAVES, close};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{Effect, EffectDeclaration, Freedom, Problem};
@@ -47,11 +48,7 @@ fn measured(problem: &Problem, random: &mut ChaCha8Rng) -> Measurements {
         }
     }
     let truth = Truth::parse(&text, Path::new("TRUTH.toml"), problem).unwrap();
-    let seen = simulate(problem, &truth, POSES, 3).unwrap().rows;
-    let mut measured = at_random(problem, POSES, 1.0, random);
-    measured.configurations = seen.iter().flat_map(|row| row.conditions.configuration.clone()).collect();
-    measured.positions = seen.iter().map(|row| row.position).collect();
-    measured
+    table(&simulate(problem, &truth, POSES, 3).unwrap().rows)
 }
 
 /// Orders of a declared effect.

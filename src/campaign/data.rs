@@ -75,8 +75,8 @@ fn by_rig(arm: Problem, truth: &Truth, rows: &[Row]) -> Option<Vec<Vector3<f64>>
     rows.iter().map(|row| rig.position(&row.conditions).ok()).collect()
 }
 
-/// Rows as a table of measurements.
-fn table(rows: &[Row]) -> Measurements {
+/// What the virtual test rig measured, as a table of measurements.
+pub fn table(rows: &[Row]) -> Measurements {
     let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
     let approach: Vec<f64> = rows.iter().flat_map(|row| row.conditions.approach.iter().copied()).collect();
     Measurements {

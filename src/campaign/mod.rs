@@ -16,6 +16,7 @@ mod run;
 mod store;
 mod tally;
 
+pub use data::table;
 pub use part::{Part, Shard, ShardError};
 pub use plan::{Campaign, Cell, Source};
 pub use results::{CellResult, ParameterResult, Results, Timing};

@@ -1,14 +1,14 @@
 //! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor scaled.
 
 use argmin::core::observers::Observe;
-use argmin::core::{Error, KV, Problem, Solver, State as _, TerminationReason};
+use argmin::core::{Error, KV, Problem, Solver};
 use argmin::kv;
 use nalgebra::DVector;
 
 use super::divergence::Watch;
 use super::execute::{Ends, Silent, run};
 use super::spectrum::Spectrum;
-use super::trust_region::take_point;
+use super::trust_region::{stopped, take_point};
 use super::{Divergence, Solution, State, Termination};
 use crate::fit::{Linearisation, Objective};
 
@@ -58,11 +58,7 @@ impl PseudoInverse {
 
     fn stop(&mut self, state: State, termination: Termination) -> State {
         self.termination = Some(termination);
-        state.terminate_with(if termination.converged() {
-            TerminationReason::SolverConverged
-        } else {
-            TerminationReason::SolverExit(termination.to_string())
-        })
+        stopped(state, termination)
     }
 
     /// Looks at a new point; the reason to stop there, if there is one.

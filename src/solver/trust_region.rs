@@ -92,11 +92,7 @@ impl<S: Subproblem> TrustRegion<S> {
 
     fn stop(&mut self, state: State, termination: Termination) -> State {
         self.termination = Some(termination);
-        state.terminate_with(if termination.converged() {
-            TerminationReason::SolverConverged
-        } else {
-            TerminationReason::SolverExit(termination.to_string())
-        })
+        stopped(state, termination)
     }
 
     /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is one.
@@ -202,6 +198,15 @@ impl Trial {
             radius
         }
     }
+}
+
+/// The state of a solver that stops for a reason of its own.
+pub(super) fn stopped(state: State, termination: Termination) -> State {
+    state.terminate_with(if termination.converged() {
+        TerminationReason::SolverConverged
+    } else {
+        TerminationReason::SolverExit(termination.to_string())
+    })
 }
 
 /// x out of argmin's state.

@@ -57,33 +57,12 @@ pub fn labels<'a>(words: impl Iterator<Item = &'a str>) -> Labels {
     labels
 }
 
-/// The rows with these numbers.
+/// The rows with these numbers, with no sessions and targets but their own.
 pub fn part(measurements: &Measurements, rows: impl IntoIterator<Item = usize>) -> Measurements {
-    let rows: Vec<usize> = rows.into_iter().collect();
-    let n = measurements.joints;
-    let pick = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
-    let wide = |column: &[f64]| rows.iter().flat_map(|&row| column[row * n..(row + 1) * n].to_vec()).collect();
-    let label = |all: &Labels| labels(rows.iter().map(|&row| all.names[all.of_row[row]].as_str()));
-    Measurements {
-        files: measurements.files.clone(),
-        origin: rows.iter().map(|&row| measurements.origin[row]).collect(),
-        joints: n,
-        configurations: wide(&measurements.configurations),
-        positions: rows.iter().map(|&row| measurements.positions[row]).collect(),
-        sigma: measurements.sigma.as_deref().map(pick),
-        payload: measurements.payload.as_deref().map(pick),
-        hoist: measurements.hoist.as_deref().map(pick),
-        temperature: measurements.temperature.as_deref().map(pick),
-        time: pick(&measurements.time),
-        time_measured: measurements.time_measured,
-        approach: measurements.approach.as_deref().map(wide),
-        session: label(&measurements.session),
-        target: measurements.target.as_ref().map(label),
-        marked_held_out: measurements
-            .marked_held_out
-            .as_ref()
-            .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
-    }
+    let mut part = measurements.select(&rows.into_iter().collect::<Vec<usize>>());
+    let own = |all: &Labels| labels(all.of_row.iter().map(|&word| all.names[word].as_str()));
+    (part.session, part.target) = (own(&part.session), part.target.as_ref().map(own));
+    part
 }
 
 /// The model of a problem with the bases and targets of its measurements.

@@ -3,4 +3,5 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 pub mod arms;
+pub mod effects;
 pub mod made;

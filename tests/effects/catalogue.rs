@@ -12,41 +12,15 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::arms::{ODD, golden_problem, parse};
+use crate::common::effects::{Strong, of_lunar_sampler};
 use crate::common::made::at_random;
-
-/// An effect and its strength in SI units.
-pub type Strong = (Effect, Vec<f64>);
 
 /// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts on it.
 pub fn lunar() -> (Problem, Vec<Strong>) {
     let mut arm = golden_problem();
     arm.joints[1].a = 0.3;
     arm.data.reference_temperature = Some(20.0);
-    let link = || "B".to_owned();
-    let all = vec![
-        (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
-        (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
-        (Effect::GearRatio { joint: 3 }, vec![4e-4]),
-        (Effect::Backlash { joint: 3 }, vec![5e-4]),
-        (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),
-        (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
-        (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
-        (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
-        (Effect::LinkBending { joint: 2 }, vec![1e-5]),
-        (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
-        (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
-        (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),
-        (Effect::PayloadMass, vec![0.1]),
-        (Effect::HoistForce, vec![0.05]),
-        (Effect::HoistDirection, vec![0.02, 0.01, 0.03]),
-        (Effect::BaseCompliance, vec![1e-6, 2e-6]),
-        (Effect::GravityDirection, vec![0.01, 0.02]),
-        (Effect::DeflectedEquilibrium, vec![1.0]),
-        (Effect::TrackerScale, vec![5e-5]),
-        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
-        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
-    ];
-    (arm, all)
+    (arm, of_lunar_sampler())
 }
 
 /// The arm with every kind of joint, a link along −x and a leaning rope.

@@ -10,8 +10,9 @@ use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::catalogue::{Strong, declared, lunar, odd, of_effects, poses, strengths};
+use crate::catalogue::{declared, lunar, odd, of_effects, poses, strengths};
 use crate::common::arms::path;
+use crate::common::effects::Strong;
 use crate::common::made::{labels, model_of};
 
 /// Largest difference of a column of the Jacobian, relative to its norm.

@@ -7,7 +7,8 @@ use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::catalogue::{Strong, conditions, declared, in_truth, lunar, odd, poses, strengths};
+use crate::catalogue::{conditions, declared, in_truth, lunar, odd, poses, strengths};
+use crate::common::effects::Strong;
 use crate::common::made::{model_of, predicted};
 
 /// Part of an effect by which model and rig may differ.

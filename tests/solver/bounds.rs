@@ -1,56 +1,10 @@
 //! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the answers of `SciPy`.
 
 use flexcal::fit::{Fit, Linearisation, Objective};
-use flexcal::solver::{AtBound, Bounds, Settings, Termination, minimise, minimise_bounded};
+use flexcal::solver::{AtBound, Bounds, Termination, minimise, minimise_bounded};
 use nalgebra::DVector;
-use num_dual::Dual64;
 
-use crate::collections::Analytic;
-use crate::collections::functions as f;
-
-macro_rules! analytic {
-    ($function:ident, $unknowns:expr, $rows:expr) => {
-        Analytic { unknowns: $unknowns, rows: $rows, value: f::$function::<f64>, dual: f::$function::<Dual64> }
-    };
-}
-
-fn vector(values: &[f64]) -> DVector<f64> {
-    DVector::from_column_slice(values)
-}
-
-fn tight() -> Settings {
-    Settings { gradient_tolerance: 1e-13, cost_tolerance: 1e-15, step_tolerance: 1e-13, ..Settings::default() }
-}
-
-/// Fails the test when it is evaluated outside the bounds.
-struct Guarded<'a, O> {
-    objective: O,
-    bounds: &'a Bounds,
-}
-
-impl<O: Objective> Guarded<'_, O> {
-    fn check(&self, x: &DVector<f64>) {
-        for (j, x) in x.iter().enumerate() {
-            assert!((self.bounds.lower()[j]..=self.bounds.upper()[j]).contains(x), "unknown {j} = {x} out of bounds");
-        }
-    }
-}
-
-impl<O: Objective> Objective for Guarded<'_, O> {
-    fn parameters(&self) -> usize {
-        self.objective.parameters()
-    }
-
-    fn cost(&self, x: &DVector<f64>) -> f64 {
-        self.check(x);
-        self.objective.cost(x)
-    }
-
-    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        self.check(x);
-        self.objective.linearise(x)
-    }
-}
+use super::bench::{Guarded, analytic, tight, vector};
 
 #[test]
 fn without_active_bounds_as_without_bounds() {
@@ -64,7 +18,7 @@ fn without_active_bounds_as_without_bounds() {
     for (problem, start) in cases {
         let free = minimise(Fit::new(&problem), vector(&start), &tight());
         let wide = Bounds::new(free.x.map(|x| x - 20.0), free.x.map(|x| x + 20.0)).unwrap();
-        let guarded = Guarded { objective: Fit::new(&problem), bounds: &wide };
+        let guarded = Guarded { objective: Fit::new(&problem), bounds: &wide, rows: None };
         let bounded = minimise_bounded(guarded, vector(&start), &wide, &tight());
         assert!(bounded.termination.converged());
         assert!((&bounded.x - &free.x).amax() <= 1e-8 * free.x.amax(), "{} against {}", bounded.x, free.x);
@@ -120,7 +74,7 @@ fn several_active_bounds_as_scipy() {
     for (start, lower, upper, x, cost, active) in cases {
         let problem = analytic!(watson, x.len(), 31);
         let bounds = Bounds::new(vector(&lower), vector(&upper)).unwrap();
-        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds };
+        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
         let solution = minimise_bounded(guarded, vector(&start), &bounds, &tight());
         println!("{} iterations, {}, cost {:.15}", solution.iterations, solution.termination, solution.cost);
         assert!(solution.termination.converged());
@@ -147,7 +101,7 @@ fn optimality_conditions_on_many_boxes() {
         let lower = DVector::from_fn(11, |j, _| start[j] * (0.8 + 0.3 * shift(j)).min(1.0));
         let upper = DVector::from_fn(11, |j, _| lower[j] + 0.25 * start[j]);
         let bounds = Bounds::new(lower, upper).unwrap();
-        let fit = Guarded { objective: Fit::new(&problem), bounds: &bounds };
+        let fit = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
         let solution = minimise_bounded(&fit, start.clone(), &bounds, &tight());
         assert!(solution.termination.converged(), "case {case}: {}", solution.termination);
         let Linearisation { cost, triangle, projected } = fit.linearise(&solution.x);

@@ -2,66 +2,13 @@
 
 use flexcal::fit::{Fit, Linearisation, Objective};
 use flexcal::solver::{
-    AtBound, Bounds, Inequalities, Settings, Termination, minimise, minimise_bounded, minimise_constrained, nearest,
+    AtBound, Bounds, Inequalities, Termination, minimise, minimise_bounded, minimise_constrained, nearest,
 };
 use nalgebra::{DMatrix, DVector};
-use num_dual::Dual64;
 
-use crate::collections::Analytic;
-use crate::collections::functions as f;
+use super::bench::{Guarded, analytic, tight, vector};
 
 const FREE: f64 = f64::INFINITY;
-
-macro_rules! analytic {
-    ($function:ident, $unknowns:expr, $rows:expr) => {
-        Analytic { unknowns: $unknowns, rows: $rows, value: f::$function::<f64>, dual: f::$function::<Dual64> }
-    };
-}
-
-fn vector(values: &[f64]) -> DVector<f64> {
-    DVector::from_column_slice(values)
-}
-
-fn tight() -> Settings {
-    Settings { gradient_tolerance: 1e-13, cost_tolerance: 1e-15, step_tolerance: 1e-13, ..Settings::default() }
-}
-
-/// Fails the test when it is evaluated outside of bounds, or of rows by more than rounding.
-struct Guarded<'a, O> {
-    objective: O,
-    bounds: &'a Bounds,
-    rows: &'a Inequalities,
-}
-
-impl<O: Objective> Guarded<'_, O> {
-    fn check(&self, x: &DVector<f64>) {
-        for (j, x) in x.iter().enumerate() {
-            assert!((self.bounds.lower()[j]..=self.bounds.upper()[j]).contains(x), "unknown {j} = {x} out of bounds");
-        }
-        let values = self.rows.matrix() * x;
-        for (i, value) in values.iter().enumerate() {
-            let rounding = 1e-13 * (1.0 + x.amax());
-            let (lower, upper) = (self.rows.lower()[i] - rounding, self.rows.upper()[i] + rounding);
-            assert!((lower..=upper).contains(value), "row {i} = {value} not in {lower} to {upper}");
-        }
-    }
-}
-
-impl<O: Objective> Objective for Guarded<'_, O> {
-    fn parameters(&self) -> usize {
-        self.objective.parameters()
-    }
-
-    fn cost(&self, x: &DVector<f64>) -> f64 {
-        self.check(x);
-        self.objective.cost(x)
-    }
-
-    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        self.check(x);
-        self.objective.linearise(x)
-    }
-}
 
 /// Rows around a point, `room` wide on either side.
 fn rows_around(x: &DVector<f64>, room: f64) -> Inequalities {
@@ -84,7 +31,7 @@ fn without_active_rows_as_without_rows() {
         let bounds = Bounds::none(start.len());
         for room in [100.0, 4.0] {
             let rows = rows_around(&free.x, room);
-            let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: &rows };
+            let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
             let found = minimise_constrained(guarded, vector(&start), &bounds, &rows, &tight());
             assert!(found.termination.converged());
             assert!((&found.x - &free.x).amax() <= 1e-8 * free.x.amax(), "{} against {}", found.x, free.x);
@@ -169,7 +116,7 @@ fn active_rows_as_scipy() {
     ];
     for (start, bounds, rows, x, cost, active) in cases {
         let problem = analytic!(watson, x.len(), 31);
-        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: &rows };
+        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let found = minimise_constrained(guarded, vector(&start), &bounds, &rows, &tight());
         println!("{} iterations, {}, cost {:.15}", found.iterations, found.termination, found.cost);
         assert!(found.termination.converged());
@@ -187,7 +134,7 @@ fn active_rows_as_scipy() {
         }
         // A start far outside is moved to the nearest point within.
         let start = DVector::from_fn(x.len(), |j, _| 3.0 - j as f64);
-        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: &rows };
+        let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let again = minimise_constrained(guarded, start, &bounds, &rows, &tight());
         assert!(again.termination.converged() && (again.cost / cost - 1.0).abs() < 1e-9, "{}", again.cost);
     }
@@ -206,7 +153,7 @@ fn optimality_conditions_on_many_polyhedra() {
         let centre = &matrix * &start;
         let lower = DVector::from_fn(5, |i, _| centre[i] - 0.1 * (1.0 + (i as f64 + f64::from(case)).cos()));
         let rows = Inequalities::new(matrix.clone(), lower, centre.add_scalar(0.1)).unwrap();
-        let fit = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: &rows };
+        let fit = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let found = minimise_constrained(&fit, start.clone(), &bounds, &rows, &tight());
         assert!(found.termination.converged(), "case {case}: {}", found.termination);
         let Linearisation { cost, triangle, projected } = fit.linearise(&found.x);

@@ -1,10 +1,11 @@
 //! Sets of measurements of the lunar sampler on the rig.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::campaign::table;
+use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{Cause, Row, Shape, TrueEffect, Truth, simulate};
+use flexcal::rig::{Cause, Shape, TrueEffect, Truth, simulate};
 
 use crate::common::arms::path;
 
@@ -101,28 +102,6 @@ pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     let rows = simulated.rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
     Set { measurements: table(&rows), split: Split { identification, held_out } }
-}
-
-fn table(rows: &[Row]) -> Measurements {
-    let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
-    let configurations: Vec<f64> = rows.iter().flat_map(|row| row.conditions.configuration.clone()).collect();
-    Measurements {
-        files: vec![PathBuf::from("rig.csv")],
-        origin: (2_u32..).take(rows.len()).map(|line| (0, line)).collect(),
-        joints: configurations.len() / rows.len(),
-        configurations,
-        positions: rows.iter().map(|row| row.position).collect(),
-        sigma: None,
-        payload: of(|row| row.conditions.payload),
-        hoist: of(|row| row.conditions.hoist),
-        temperature: of(|row| row.conditions.temperature),
-        time: rows.iter().map(|row| row.conditions.time).collect(),
-        time_measured: true,
-        approach: Some(rows.iter().flat_map(|row| row.conditions.approach.clone()).collect()),
-        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
-        target: None,
-        marked_held_out: None,
-    }
 }
 
 /// An effect of the catalogue with its strengths in SI units.

@@ -1,0 +1,34 @@
+//! Every effect of the catalogue with a strength of a realistic size.
+
+use flexcal::problem::Effect;
+
+/// An effect and its strength in SI units.
+pub type Strong = (Effect, Vec<f64>);
+
+/// Every family on the lunar sampler, for which its second link, which is rigid, has a length.
+pub fn of_lunar_sampler() -> Vec<Strong> {
+    let link = || "B".to_owned();
+    vec![
+        (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
+        (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::GearRatio { joint: 3 }, vec![4e-4]),
+        (Effect::Backlash { joint: 3 }, vec![5e-4]),
+        (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),
+        (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
+        (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
+        (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
+        (Effect::LinkBending { joint: 2 }, vec![1e-5]),
+        (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
+        (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
+        (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),
+        (Effect::PayloadMass, vec![0.1]),
+        (Effect::HoistForce, vec![0.05]),
+        (Effect::HoistDirection, vec![0.02, 0.01, 0.03]),
+        (Effect::BaseCompliance, vec![1e-6, 2e-6]),
+        (Effect::GravityDirection, vec![0.01, 0.02]),
+        (Effect::DeflectedEquilibrium, vec![1.0]),
+        (Effect::TrackerScale, vec![5e-5]),
+        (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
+        (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+    ]
+}
