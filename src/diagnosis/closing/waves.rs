@@ -32,7 +32,7 @@ const HELD: f64 = 1e-10;
 pub const WAVES: &str = "joint-harmonic.*";
 
 /// The fit with every order of the joints whose waves are many, and 1 σ of their prior [rad]; the fit, settled, where they
-/// are few or the problem has a word of its own on them.
+/// are few or no common prior can hold them.
 pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
     let waves = waves(&fitted);
     let more: Vec<Effect> = rounds.added(&fitted).into_iter().map(|own| all_orders(own, &rounds.declared)).collect();
