@@ -103,14 +103,14 @@ fn joints_and_beams() {
     let below: [(&str, &[&str]); 11] = [
         ("mass_kg = -1", &[":6: joint[1].beam.mass_kg: -1 is below zero"]),
         ("EA_N = 0", &[":6: joint[1].beam.EA_N: 0 is not above zero"]),
-        ("EI_N_m2 = 1e4", &[":6: joint[1].beam.EI_N_m2: unknown key", "EIy_N_m2"]),
+        ("EI_N_m2 = 1e4", &[":6: joint[1].beam.EI_N_m2: unknown key (did you mean EIy_N_m2?); known here: "]),
         ("EA = 1", &[":6: joint[1].beam.EA: ", "EA_N"]),
         ("mass = 1", &[":6: joint[1].beam.mass: a mass needs a unit; write mass_kg"]),
         ("[[joint.beam.mass]]\nmass_kg = 1", &[":6: joint[1].beam.mass[1].at: missing", "at_m or at_mm"]),
         ("[[joint.beam.mass]]\nat_m = [0, 0, 0]", &[":6: joint[1].beam.mass[1].mass_kg: missing"]),
         ("[joint.beam.hoist]\nforce_N = 1", &[":6: joint[1].beam.hoist.at: missing"]),
         ("hoist = { at_m = [0, 0, 0], direction = [0, 0, 0] }", &[":6: joint[1].beam.hoist.direction: "]),
-        ("hoist = { at_m = [0, 0, 0], rope = 3 }", &[":6: joint[1].beam.hoist.rope: unknown key"]),
+        ("hoist = { at_m = [0, 0, 0], rope = 3 }", &[":6: joint[1].beam.hoist.rope: unknown key; known here: "]),
         ("[[joint]]\na_m = 1\nbeam.name = 'A'", &[":8: joint[2].beam.name: ", "another beam"]),
     ];
     for (text, words) in below {
@@ -146,7 +146,7 @@ fn other_sections() {
         ("[statics]\nbeam_elements = 0", &[":4: statics.beam_elements: 0 is not a whole number"]),
         ("[statics]\nbeam_elements = 1.5", &[":4: statics.beam_elements: 1.5 is not a whole number"]),
         ("[statics]\nbeam_elements = 1_000_000", &[":4: statics.beam_elements: 1000000 is too large"]),
-        ("[statics]\nelements = 1", &[":4: statics.elements: unknown key"]),
+        ("[statics]\nelements = 1", &[":4: statics.elements: unknown key (did you mean beam_elements?)"]),
         ("[tool]\ntarget_m = [1, 2]", &[":4: tool.target_m: a vector has 3 numbers, found 2"]),
         ("[tool]\ntarget_m = [\n1,\n2,\nnan]", &[":7: tool.target_m[3]: nan"]),
         ("[tool]\ntarget = [1, 2, 3]", &[":4: tool.target: a length needs a unit"]),
@@ -160,7 +160,7 @@ fn other_sections() {
         ("[data]\nreference_temperature = 1", &[":4: data.reference_temperature: a temperature needs a unit"]),
         ("[data]\nfiles = 'a.csv'", &[":4: data.files: expected a list"]),
         ("[data]\nfiles = [1]", &[":4: data.files[1]: expected text"]),
-        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key"]),
+        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key (did you mean files?)"]),
         ("[data]\nheld_out = {}", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { seed = 1 }", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { column = 'a', session = 'b' }", &[":4: data.held_out: give one of"]),
@@ -230,10 +230,11 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 26] = [
+    let effects: [(&str, &[&str]); 27] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
-        ("wobble = {}", &[":4: effect[1].wobble: unknown effect", "backlash"]),
+        ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
+        ("gear_ratios = {}", &[":4: effect[1].gear_ratios: unknown effect (did you mean gear-ratio?)"]),
         ("payload-mass = { joint = 1 }", &[":4: effect[1].payload-mass.joint: unknown key"]),
         ("payload-mass = false", &[":4: effect[1].payload-mass: expected a table"]),
         ("backlash = {}", &[":4: effect[1].backlash.joint: missing"]),
@@ -244,7 +245,10 @@ fn effects() {
         ("joint-harmonic = { joint = 1, orders = [] }", &[":4: effect[1].joint-harmonic.orders: no order"]),
         ("joint-harmonic = { joint = 1, orders = [0] }", &[":4: effect[1].joint-harmonic.orders[1]: 0 is not"]),
         ("joint-harmonic = { joint = 1, orders = [1, 1] }", &[":4: effect[1].joint-harmonic.orders[2]: order 1"]),
-        ("joint-harmonic = { joint = 1, order = 1 }", &[":4: effect[1].joint-harmonic.orders: missing"]),
+        (
+            "joint-harmonic = { joint = 1, order = 1 }",
+            &["orders: missing; write orders = [1], the harmonics (is it order?)"],
+        ),
         ("joint-coupling = { joint = 1, from = 1 }", &[":4: effect[1].joint-coupling: ", "gear-ratio"]),
         ("station-shift = { at_time = 3 }", &[":4: effect[1].station-shift.at_time: a time needs a unit"]),
         ("link-bending = { joint = 1 }", &[":4: effect[1].link-bending: joint 1 has no link", "its a is 0"]),
@@ -277,12 +281,14 @@ fn effects() {
 
 #[test]
 fn headers() {
-    let headers: [(&str, &[&str]); 15] = [
+    let headers: [(&str, &[&str]); 17] = [
         ("", &["rows.csv:1: the file is empty"]),
         ("\n\n", &["rows.csv:1: the file is empty"]),
         ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
         ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
+        ("q1_deg,X_mm,y_m,z_m\n", &["rows.csv:1: column x: missing; add x_m or x_mm (is it column X_mm?)"]),
+        ("q1deg,x_m,y_m,z_m\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad (is it column q1deg?)"]),
         ("q1,x_m,y_m,z_m\n", &["rows.csv:1: column q1: an angle needs a unit; write q1_deg or q1_rad"]),
         ("q1_mm,x_m,y_m,z_m\n", &["rows.csv:1: column q1_mm: an angle is not given in mm"]),
         ("\nq1_deg,x,y_m,z_m\n", &["rows.csv:2: column x: a length needs a unit"]),

@@ -216,7 +216,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         (
             "pattern that matches nothing",
             |b| b.edit(PROBLEM, "\"B.*\"", "\"C.*\""),
-            &["problem.toml:77", "C.*", "matches no parameter"],
+            &["problem.toml:77", "C.*", "matches no parameter of this arm; they are"],
         ),
         (
             "min above max",

@@ -76,7 +76,8 @@ pub fn resolve(
                     known.push(plain);
                 }
             }
-            return Err(rule.location.clone().error(InputErrorKind::MatchesNothing { known }));
+            let pattern = rule.pattern.clone();
+            return Err(rule.location.clone().error(InputErrorKind::MatchesNothing { pattern, known }));
         }
         check_kinds(rule, &candidates)?;
     }

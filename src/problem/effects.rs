@@ -141,7 +141,7 @@ pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Resul
         "tracker-scale" => Effect::TrackerScale,
         "tracker-drift" => Effect::TrackerDrift,
         "station-shift" => Effect::StationShift { at_time: arguments.time("at_time")? },
-        _ => return Err(item.error(InputErrorKind::UnknownEffect { known: &NAMES })),
+        _ => return Err(item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: &NAMES })),
     };
     arguments.section.finish()?;
     Ok(effect)

@@ -119,6 +119,10 @@ fn rules_that_do_not_fit_are_mistakes() {
         ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width takes _deg or _rad"),
         ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width takes _mm or _m"),
         ("\"gear-ratio[2].error\" = { free = true }", "matches no parameter"),
+        (
+            "\"joint*.alfa\" = { free = true }",
+            "matches no parameter of this arm (did you mean joint1.alpha?); they are",
+        ),
         ("\"hoist-force.*\" = { free = true }", "matches no parameter"),
     ] {
         let error = resolved(rule).unwrap_err();
