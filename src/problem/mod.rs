@@ -5,6 +5,7 @@
 
 mod arm;
 mod constraints;
+pub(crate) mod digest;
 pub(crate) mod effects;
 pub(crate) mod item;
 mod parameters;
