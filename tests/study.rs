@@ -307,6 +307,15 @@ fn the_rig_measures_what_the_model_lacks() {
 }
 
 #[test]
+fn a_folder_without_a_study_is_told_where_to_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let assert = command.args(["study", "."]).current_dir(folder.path()).assert().code(2);
+    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(message.contains("STUDY.toml: no such file") && message.contains("docs/study.md"), "{message}");
+}
+
+#[test]
 fn bad_studies_are_named_and_leave_nothing_behind() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("seed = 7", "sed = 7", &["seed", "missing", "(is it sed?)"]),

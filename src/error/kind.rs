@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::near::nearest;
+use super::near::{instead, meant, question};
 
 /// What is wrong with the input.
 ///
@@ -20,7 +20,7 @@ pub enum InputErrorKind {
     ProblemMissing,
     #[error("no such file; give the TRUTH.toml that describes the simulation")]
     TruthMissing,
-    #[error("no such file; give a STUDY.toml or the folder that holds one")]
+    #[error("no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one")]
     StudyMissing,
     #[error("no such file: {}; paths are relative to the study's folder", path.display())]
     StudyFileMissing { path: PathBuf },
@@ -90,6 +90,8 @@ pub enum InputErrorKind {
     // Effects.
     #[error("an effect is one key, as in `payload-mass = {{}}`; found {found}")]
     NotOneEffect { found: usize },
+    #[error("needs arguments; write {write}")]
+    NeedsArguments { write: String },
     #[error("unknown effect{}; known: {}", meant(name, *known), known.join(", "))]
     UnknownEffect { name: String, known: &'static [&'static str] },
     #[error("no joint {joint}; the arm has {joints}, counted from 1")]
@@ -133,6 +135,11 @@ pub enum InputErrorKind {
         list("they are", known, "it has none")
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
+    #[error(
+        "the pattern matches no parameter of this arm; those of {effects} are there once an [[effect]] declares it, \
+         as in {write}"
+    )]
+    EffectNotDeclared { effects: String, write: String },
     #[error("{parameter} takes {suffixes}; give that too, or a rule of its own")]
     QuantityMissing { parameter: String, suffixes: &'static str },
     #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
@@ -255,19 +262,12 @@ pub enum WarningKind {
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]
     UnitIgnored { write: String },
+    #[error("commanded beyond its limits ({limits}) in {rows} row{}, first here; used all the same", plural(*rows))]
+    BeyondLimits { rows: usize, limits: String },
 }
 
-/// ` (did you mean …?)`, where a known word is near.
-fn meant<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> String {
-    question(nearest(word, known).as_ref().map(AsRef::as_ref))
-}
-
-fn instead(noun: &str, near: Option<&str>) -> String {
-    near.map_or_else(String::new, |near| format!(" (is it {noun}{near}?)"))
-}
-
-fn question(meant: Option<&str>) -> String {
-    meant.map_or_else(String::new, |meant| format!(" (did you mean {meant}?)"))
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
 }
 
 fn near(text: &str) -> String {

@@ -17,3 +17,18 @@ pub(crate) fn nearest<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item =
     }
     best.map(|(_, candidate)| candidate)
 }
+
+/// ` (did you mean …?)`, where a known word is near.
+pub(super) fn meant<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> String {
+    question(nearest(word, known).as_ref().map(AsRef::as_ref))
+}
+
+/// ` (is it …?)`, where something near was found.
+pub(super) fn instead(noun: &str, near: Option<&str>) -> String {
+    near.map_or_else(String::new, |near| format!(" (is it {noun}{near}?)"))
+}
+
+/// ` (did you mean …?)`, where something is meant.
+pub(super) fn question(meant: Option<&str>) -> String {
+    meant.map_or_else(String::new, |meant| format!(" (did you mean {meant}?)"))
+}

@@ -216,17 +216,17 @@ impl Numbering {
             };
         }
         let (base, suffix) = split_unit(name);
-        let (role, kind, strict) = match MEASURED.iter().find(|(known, ..)| *known == base) {
-            Some(&(_, role, kind, strict)) => (role, kind, strict),
-            None => {
-                let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
-                let joint = self.joint(number);
-                let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
-                else {
-                    return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
-                };
-                (Role::Joint(joint), kind, true)
-            }
+        let measured = MEASURED.iter().find(|(known, ..)| *known == base);
+        let (role, kind, strict) = if let Some(&(_, role, kind, strict)) = measured {
+            (role, kind, strict)
+        } else {
+            let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
+            let joint = self.joint(number);
+            let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
+            else {
+                return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
+            };
+            (Role::Joint(joint), kind, true)
         };
         let write = || kind.spelled(base);
         match suffix {

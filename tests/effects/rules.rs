@@ -123,7 +123,12 @@ fn rules_that_do_not_fit_are_mistakes() {
             "\"joint*.alfa\" = { free = true }",
             "matches no parameter of this arm (did you mean joint1.alpha?); they are",
         ),
-        ("\"hoist-force.*\" = { free = true }", "matches no parameter"),
+        (
+            "\"hoist-force.*\" = { free = true }",
+            "those of hoist-force are there once an [[effect]] declares it, as in hoist-force = true",
+        ),
+        ("\"link-th*\" = { free = true }", "those of link-thermal-bending, link-thermal-expansion are there"),
+        ("\"joint-com*[2].*\" = { free = true }", "declares it, as in joint-compliance = { joint = "),
     ] {
         let error = resolved(rule).unwrap_err();
         assert!(error.contains(words), "{rule}: {error}");
