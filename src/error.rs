@@ -1,6 +1,7 @@
 //! Mistakes in the input, each with the place where it stands.
 
 mod kind;
+mod near;
 
 use std::fmt;
 use std::ops::Range;
@@ -8,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use kind::{InputErrorKind, NoRows, WarningKind};
+pub(crate) use near::nearest;
 
 /// A place in an input file.
 #[derive(Debug, Clone, PartialEq, Eq)]

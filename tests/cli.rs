@@ -72,6 +72,8 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     let json: Value =
         serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
     assert_eq!(json["held_out"]["n"], 50);
+    assert_eq!((&json["solver"], &json["solver_reason"]), (&"levenberg-marquardt".into(), &"no bounds".into()));
+    assert!(!out.contains("no standard error"), "every value has one:\n{out}");
     assert!(json["held_out"]["rms_mm"]["norm"].as_f64().unwrap() < 0.14);
     for key in ["problem", "strategy", "solver", "termination", "iterations", "seconds", "reduced_chi2", "rank"] {
         assert!(!json[key].is_null(), "{key}");
@@ -129,7 +131,9 @@ fn strategies_and_solvers_are_what_they_say() {
         "\"A.*\" = { min_relative = 0.9, max_relative = 1.1 }",
     );
     let (_, json) = rms(&[]);
-    assert_eq!(json["solver"], "bounded");
+    assert_eq!((&json["solver"], &json["solver_reason"]), (&"bounded".into(), &"bounds to keep".into()));
+    let told = text(&bench.identify(&[]).get_output().stdout);
+    assert!(told.contains("\n  –: no standard error: "), "{told}");
     let parameters = json["parameters"].as_array().unwrap();
     let stiff = parameters.iter().find(|p| p["name"] == "A.EI").unwrap();
     assert_eq!(stiff["at_bound"], "upper");
@@ -216,7 +220,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         (
             "pattern that matches nothing",
             |b| b.edit(PROBLEM, "\"B.*\"", "\"C.*\""),
-            &["problem.toml:77", "C.*", "matches no parameter"],
+            &["problem.toml:77", "C.*", "matches no parameter of this arm; they are"],
         ),
         (
             "min above max",

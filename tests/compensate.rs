@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use assert_cmd::Command;
 use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::Model;
@@ -65,6 +66,80 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     println!("{} targets: {:.3} mm before, {:.4} mm after", misses.len(), mean(0), mean(1));
     assert_eq!(misses.len(), 50);
     assert!(mean(0) > 10.0 && mean(1) < 0.2);
+}
+
+/// The case's problem with one piece of its text replaced.
+fn changed(from: &str, to: &str) -> String {
+    let text = fs::read_to_string(case("problem.toml")).unwrap();
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1)
+}
+
+#[test]
+fn the_digest_is_of_what_predictions_depend_on() {
+    let digest = |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
+    let own = digest("", "");
+    // On every machine.
+    assert_eq!(own, "acf16d31b0face3ce4209750a7f142b173819235c112bd74036354955c545e35");
+    for (from, to) in [
+        ("name = \"elbow\"", "name = \"knee\"\nmax_deg = 300"),
+        ("a_m = 1.95", "a_mm = 1950"),
+        ("position_sigma_mm = 0.05", "position_sigma_mm = 0.5"),
+        ("\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_mm = 6.0 }"),
+        ("reference_temperature_C = 20.0", "reference_temperature_C = 25.0"),
+        ("a-none.csv", "other.csv"),
+    ] {
+        assert_eq!(digest(from, to), own, "{to}");
+    }
+    let drift = "[[effect]]\njoint-thermal-drift = { joint = 2 }\n[parameters]";
+    let mut seen = vec![own];
+    for (from, to) in [
+        ("a_m = 1.95", "a_m = 1.950001"),
+        ("stiffness_N_m_per_rad = 5.2e4", ""),
+        ("mass_kg = 4.2", "mass_kg = 4.3"),
+        ("beam_elements = 1", "beam_elements = 2"),
+        ("-9.80665", "-9.81"),
+        ("[tool]\n", "[tool]\npayload_kg = 1\n"),
+        ("[parameters]", drift),
+    ] {
+        seen.push(digest(from, to));
+    }
+    let warm =
+        changed("[parameters]", drift).replace("reference_temperature_C = 20.0", "reference_temperature_C = 25.0");
+    seen.push(Problem::parse(&warm, Path::new("problem.toml")).unwrap().digest());
+    let count = seen.len();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), count);
+}
+
+#[test]
+fn an_estimate_of_another_arm_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(folder.path()).args(arguments).assert()
+    };
+    fs::write(path("problem.toml"), changed("", "")).unwrap();
+    fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
+    run(&["identify", ".", "--quiet", "--out", "."]).success();
+    let text = fs::read_to_string(path("estimate.json")).unwrap();
+    let few: Vec<String> =
+        fs::read_to_string(path("a-none.csv")).unwrap().lines().take(4).map(|line| format!("{line}\n")).collect();
+    fs::write(path("targets.csv"), few.concat()).unwrap();
+    let compensate =
+        || run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
+    compensate().success();
+    fs::write(path("problem.toml"), changed("mass_kg = 4.2", "mass_kg = 4.3")).unwrap();
+    let assert = compensate().code(2);
+    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(message.contains("estimate.json: was identified with another declared arm"), "{message}");
+    // What older versions wrote says nothing of the arm.
+    let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(old.as_object_mut().unwrap().remove("arm_digest").is_some());
+    fs::write(path("estimate.json"), old.to_string()).unwrap();
+    compensate().success();
 }
 
 #[test]

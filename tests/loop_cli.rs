@@ -13,6 +13,8 @@ use serde_json::Value;
 const THERMAL: &str = "c-link-thermal-bending.csv";
 /// A case without any effect.
 const NONE: &str = "a-none.csv";
+/// A case with two effects.
+const TWO: &str = "f-two.csv";
 /// A case with an effect that the catalogue does not hold.
 const OUTSIDE: &str = "g-not-in-catalogue.csv";
 
@@ -220,6 +222,43 @@ fn the_trace_ranks_and_says_why_not() {
     assert!(told.contains("- joint-thermal-drift of joints 1, 2, 3, 4: no temperature"), "{told}");
     let told = Bench::new(NONE).told(&["trace", "arm"]);
     assert!(told.contains("candidates stands out"), "{told}");
+    let told = Bench::new(TWO).told(&["trace", "arm"]);
+    assert!(told.contains("more that stand out are left out here; trace.json holds them all."), "{told}");
+}
+
+#[test]
+fn rows_stand_for_times_that_nobody_measured() {
+    let bench = Bench::new(NONE);
+    let truth = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml")).unwrap();
+    let moved = "[[effect]]\nstation-shift = { at_time_s = 3000 }\nx_mm = 2\ny_mm = 1\nz_mm = 0\n";
+    fs::write(bench.path("TRUTH.toml"), format!("{truth}\n{moved}")).unwrap();
+    bench.told(&["simulate", "arm", "--truth", "TRUTH.toml", "--poses", "78", "--seed", "3", "--out", "."]);
+    bench.edit("measurements.csv", |text| text.replace(",time_s", ",seconds"));
+    let trace = ["trace", "arm", "--data", "measurements.csv"];
+    let told = bench.told(&trace);
+    assert!(told.contains("1. the measuring station moved after row "), "{told}");
+    let json = bench.json(&trace);
+    assert!(json["ranking"][0]["description"].as_str().unwrap().contains("after row "), "{json}");
+}
+
+#[test]
+fn commands_beyond_the_limits_are_named_joint_by_joint() {
+    let bench = Bench::new(NONE);
+    let limits = "name = \"shoulder\"\nmin_deg = -10\nmax_deg = 60\n";
+    bench.edit("arm/problem.toml", |text| text.replace("name = \"shoulder\"\n", limits));
+    let data = fs::read_to_string(bench.path("arm/data.csv")).unwrap();
+    let outside = |line: &str| !(-10.0..=60.0).contains(&line.split(',').nth(3).unwrap().parse::<f64>().unwrap());
+    let lines: Vec<usize> = data.lines().enumerate().skip(1).filter(|(_, l)| outside(l)).map(|(k, _)| k + 1).collect();
+    assert!(lines.len() > 3);
+    for command in ["identify", "trace"] {
+        let warned = text(&bench.run(&[command, "arm"]).success().get_output().stderr);
+        let expected = format!(
+            "data.csv:{}: joint 2: commanded beyond its limits (min_deg = -10, max_deg = 60) in {} rows",
+            lines[0],
+            lines.len()
+        );
+        assert!(warned.contains(&expected) && warned.matches("beyond").count() == 1, "{warned}");
+    }
 }
 
 #[test]

@@ -307,10 +307,19 @@ fn the_rig_measures_what_the_model_lacks() {
 }
 
 #[test]
+fn a_folder_without_a_study_is_told_where_to_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let assert = command.args(["study", "."]).current_dir(folder.path()).assert().code(2);
+    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(message.contains("STUDY.toml: no such file") && message.contains("docs/study.md"), "{message}");
+}
+
+#[test]
 fn bad_studies_are_named_and_leave_nothing_behind() {
     let cases: &[(&str, &str, &[&str])] = &[
-        ("seed = 7", "sed = 7", &["seed", "missing"]),
-        ("seed = 7", "seed = 7\nsteps = 3", &["STUDY.toml:5", "steps", "unknown key"]),
+        ("seed = 7", "sed = 7", &["seed", "missing", "(is it sed?)"]),
+        ("seed = 7", "seed = 7\nstrategy = 3", &["STUDY.toml:5", "strategy", "unknown key (did you mean strategies?)"]),
         ("repetitions = 120", "repetitions = 0", &["STUDY.toml:5", "repetitions"]),
         ("repetitions = 120", "repetitions = 2000000", &["STUDY.toml:5", "too large"]),
         ("[0.05, 0.2]", "[0.05, 0.0]", &["STUDY.toml:6", "position_sigma_mm[2]", "above zero"]),

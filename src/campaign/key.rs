@@ -1,11 +1,8 @@
 //! Which inputs a kept part belongs to.
 
-use std::fmt::Write as _;
-
-use sha2::{Digest as _, Sha256};
-
 use super::part::Part;
 use super::plan::{Campaign, Cell};
+use crate::problem::digest::hexadecimal;
 
 impl Campaign {
     /// A digest of everything that the fits of a part depend on, 64 hexadecimal digits: the version of flexcal, the
@@ -20,10 +17,6 @@ impl Campaign {
             "{version} {source:?} {seed} {held_out} {sigma:?} {poses} {strategy:?} {solver:?} {repetitions:?}\n\
              {truth:?}\n{problem_text}"
         );
-        Sha256::digest(inputs).iter().fold(String::new(), |mut text, byte| {
-            // Writing to a text cannot fail.
-            let _ = write!(text, "{byte:02x}");
-            text
-        })
+        hexadecimal(&inputs)
     }
 }

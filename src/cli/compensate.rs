@@ -35,6 +35,8 @@ pub struct Arguments {
 #[derive(Debug, Deserialize)]
 struct Estimates {
     problem: String,
+    /// Not there in what older versions wrote.
+    arm_digest: Option<String>,
     trusted: bool,
     parameters: Vec<Estimated>,
 }
@@ -59,6 +61,8 @@ enum EstimateError {
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
+    #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
+    OtherArm { file: PathBuf },
     #[error("{}: {name} was identified, but is not free in the problem; identify again", file.display())]
     NotFree { file: PathBuf, name: String },
     #[error("no targets; name them with --data")]
@@ -126,6 +130,9 @@ fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String
             let (name, found, expected) = (entry.name.clone(), entry.nominal, own.nominal);
             return Err(EstimateError::OtherNominal { file, name, found, expected });
         }
+    }
+    if estimates.arm_digest.is_some_and(|digest| digest != problem.digest()) {
+        return Err(EstimateError::OtherArm { file });
     }
     let values = estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect();
     Ok((values, estimates.trusted))

@@ -8,6 +8,7 @@ use super::data::{Data, SEED};
 use super::fitted::Fitted;
 use super::trace::{Scan, Tried};
 use super::unexplained::named;
+use crate::effect;
 use crate::measurement::{Measurements, Split};
 use crate::problem::{Effect, Problem};
 use crate::study::{Identification, IdentifyError, Noise, Options};
@@ -55,6 +56,15 @@ pub struct Trace {
     pub untestable: Vec<(Effect, &'static str)>,
     /// Candidates that the fitted parameters absorb: nothing is left to show them.
     pub absorbed: Vec<Effect>,
+    /// Whether times were measured; where not, the order of the rows stands for them.
+    pub time_measured: bool,
+}
+
+impl Trace {
+    /// What an effect is in these data, in words.
+    pub fn describe(&self, effect: &Effect) -> String {
+        effect::describe_in(effect, self.time_measured)
+    }
 }
 
 /// Traces the residual of `problem`, from the identification rows alone; changes nothing.
@@ -129,6 +139,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         level: LEVEL,
         untestable,
         absorbed,
+        time_measured: data.measurements.time_measured,
     }
 }
 

@@ -160,6 +160,16 @@ pub fn describe(effect: &Effect) -> String {
     family.map_or_else(String::new, |family| (family.describe)(effect))
 }
 
+/// The same where times may not have been measured: the order of the rows stands for them then, counted from 1.
+pub fn describe_in(effect: &Effect, time_measured: bool) -> String {
+    match effect {
+        Effect::StationShift { at_time } if !time_measured => {
+            format!("the measuring station moved after row {}", at_time.ceil())
+        }
+        _ => describe(effect),
+    }
+}
+
 /// The parameters of an effect by that name at a `place`, empty for the whole: `name[place].term`.
 pub fn named(name: &str, place: &str, terms: Vec<Term>) -> Vec<EffectParameter> {
     let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };

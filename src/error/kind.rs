@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::near::{instead, meant, question};
+
 /// What is wrong with the input.
 ///
 /// The message of a variant says what it stands for and how to mend it; the place comes from
@@ -18,7 +20,7 @@ pub enum InputErrorKind {
     ProblemMissing,
     #[error("no such file; give the TRUTH.toml that describes the simulation")]
     TruthMissing,
-    #[error("no such file; give a STUDY.toml or the folder that holds one")]
+    #[error("no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one")]
     StudyMissing,
     #[error("no such file: {}; paths are relative to the study's folder", path.display())]
     StudyFileMissing { path: PathBuf },
@@ -34,10 +36,10 @@ pub enum InputErrorKind {
     Syntax { message: String, near_text: String },
 
     // Keys.
-    #[error("unknown key; known here: {}", known.join(", "))]
-    UnknownKey { known: Vec<String> },
-    #[error("missing; write {write}")]
-    MissingKey { write: String },
+    #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]
+    UnknownKey { key: String, known: Vec<String> },
+    #[error("missing; write {write}{}", instead("", near.as_deref()))]
+    MissingKey { write: String, near: Option<String> },
     #[error("expected {expected}, found {found}")]
     WrongType { expected: &'static str, found: &'static str },
     #[error("{noun} needs a unit; write {write}")]
@@ -88,8 +90,10 @@ pub enum InputErrorKind {
     // Effects.
     #[error("an effect is one key, as in `payload-mass = {{}}`; found {found}")]
     NotOneEffect { found: usize },
-    #[error("unknown effect; known: {}", known.join(", "))]
-    UnknownEffect { known: &'static [&'static str] },
+    #[error("needs arguments; write {write}")]
+    NeedsArguments { write: String },
+    #[error("unknown effect{}; known: {}", meant(name, *known), known.join(", "))]
+    UnknownEffect { name: String, known: &'static [&'static str] },
     #[error("no joint {joint}; the arm has {joints}, counted from 1")]
     UnknownJoint { joint: u64, joints: usize },
     #[error("no beam is called \"{link}\"; there {}", list("is", links, "are none"))]
@@ -125,8 +129,17 @@ pub enum InputErrorKind {
     #[error("min {min} is above max {max} (in SI units)")]
     MinAboveMax { min: f64, max: f64 },
 
-    #[error("the pattern matches no parameter of this arm; {}", list("they are", known, "it has none"))]
-    MatchesNothing { known: Vec<String> },
+    #[error(
+        "the pattern matches no parameter of this arm{}; {}",
+        meant(pattern, known),
+        list("they are", known, "it has none")
+    )]
+    MatchesNothing { pattern: String, known: Vec<String> },
+    #[error(
+        "the pattern matches no parameter of this arm; those of {effects} are there once an [[effect]] declares it, \
+         as in {write}"
+    )]
+    EffectNotDeclared { effects: String, write: String },
     #[error("{parameter} takes {suffixes}; give that too, or a rule of its own")]
     QuantityMissing { parameter: String, suffixes: &'static str },
     #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
@@ -143,8 +156,8 @@ pub enum InputErrorKind {
     NoLimit,
     #[error("at_least {least} is above at_most {most} (in SI units)")]
     LimitsCross { least: f64, most: f64 },
-    #[error("no such parameter; {}", list("there are", known, "the arm has none"))]
-    UnknownParameter { known: Vec<String> },
+    #[error("no such parameter{}; {}", meant(name, known), list("there are", known, "the arm has none"))]
+    UnknownParameter { name: String, known: Vec<String> },
     #[error(
         "does not add up with {other}: angles, lengths and logarithms of stiffnesses go in constraints of their own"
     )]
@@ -206,8 +219,8 @@ pub enum InputErrorKind {
     NoRowsBelowHeader,
     #[error("columns are set apart by commas, not by {found:?}")]
     NotCommas { found: char },
-    #[error("missing; add {write}")]
-    MissingColumn { write: String },
+    #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
+    MissingColumn { write: String, near: Option<String> },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
     #[error("{}; give every file the same columns", difference(other, *has))]
@@ -243,12 +256,18 @@ pub enum NoRows {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum WarningKind {
-    #[error("not a column that is known; ignored")]
-    ColumnIgnored,
+    #[error("not a column that is known{}; ignored", question(meant.as_deref()))]
+    ColumnIgnored { meant: Option<String> },
     #[error("joint {joint} takes no q; ignored")]
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]
     UnitIgnored { write: String },
+    #[error("commanded beyond its limits ({limits}) in {rows} row{}, first here; used all the same", plural(*rows))]
+    BeyondLimits { rows: usize, limits: String },
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
 }
 
 fn near(text: &str) -> String {

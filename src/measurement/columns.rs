@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest};
 use crate::problem::{HeldOut, JointKind, Problem};
 use crate::units::{self, ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
 
@@ -25,6 +25,25 @@ pub(super) enum Role {
     Target,
     Pose,
 }
+
+/// Columns without a unit.
+const PLAIN: [(&str, Role); 4] =
+    [("split", Role::Split), ("session", Role::Session), ("target", Role::Target), ("pose", Role::Pose)];
+
+/// Columns with a unit, and whether they need one: a column such as `time` may be about something else.
+const MEASURED: [(&str, Role, &Kind, bool); 11] = [
+    ("x", Role::Position(0), &LENGTH, true),
+    ("y", Role::Position(1), &LENGTH, true),
+    ("z", Role::Position(2), &LENGTH, true),
+    ("sigma", Role::Sigma, &LENGTH, true),
+    ("rx", Role::Orientation(0), &ANGLE, true),
+    ("ry", Role::Orientation(1), &ANGLE, true),
+    ("rz", Role::Orientation(2), &ANGLE, true),
+    ("payload", Role::Payload, &MASS, false),
+    ("hoist", Role::Hoist, &FORCE, false),
+    ("temperature", Role::Temperature, &TEMPERATURE, false),
+    ("time", Role::Time, &TIME, false),
+];
 
 /// A column that is read.
 #[derive(Clone, Copy)]
@@ -62,6 +81,7 @@ impl Columns {
         let mut found: BTreeMap<Role, &str> = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut columns = Self { read: Vec::new(), marked: None };
+        let mut unknown = Vec::new();
         for (place, name) in table.header.iter().enumerate() {
             let error = |kind| table.column(name).error(kind);
             if !name.is_empty() && !names.insert(name) {
@@ -78,26 +98,33 @@ impl Columns {
                     }
                     columns.read.push(Column { role, place, to_si });
                 }
-                Meaning::Ignored(_) if is_marked => {}
+                Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
                 Meaning::Ignored(kind) => warnings.push(Warning { location: table.column(name), kind }),
+                Meaning::Unknown => {
+                    unknown.push(name.as_str());
+                    let kind = WarningKind::ColumnIgnored { meant: numbering.meant(name, table, problem) };
+                    warnings.push(Warning { location: table.column(name), kind });
+                }
             }
         }
         columns.read.sort_by_key(|column| column.role);
-        columns.require(table, problem, measured, &numbering)?;
+        columns.require(table, problem, measured, &numbering, &unknown)?;
         Ok(columns)
     }
 
-    /// Whether every column is there that has to be.
+    /// Whether every column is there that has to be; one of the `unknown` may be meant by it.
     fn require(
         &self,
         table: &Table,
         problem: &Problem,
         measured: bool,
         numbering: &Numbering,
+        unknown: &[&str],
     ) -> Result<(), InputError> {
+        let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
         let missing = |base: &str, kind: &Kind| {
-            let write = kind.spelled(base);
-            Err(table.column(base).error(InputErrorKind::MissingColumn { write }))
+            let (write, near) = (kind.spelled(base), spellings(base, kind).find_map(|name| near(&name)));
+            Err(table.column(base).error(InputErrorKind::MissingColumn { write, near }))
         };
         for (index, joint) in problem.joints.iter().enumerate() {
             if let Some(kind) = kind_of(joint.kind)
@@ -118,7 +145,7 @@ impl Columns {
             && self.marked.is_none()
         {
             let write = format!("it, or change held_out in {}", problem.data.held_out_location);
-            return Err(table.column(name).error(InputErrorKind::MissingColumn { write }));
+            return Err(table.column(name).error(InputErrorKind::MissingColumn { write, near: near(name) }));
         }
         Ok(())
     }
@@ -132,6 +159,8 @@ impl Columns {
 enum Meaning {
     Read(Role, fn(f64) -> f64),
     Ignored(WarningKind),
+    /// Nothing.
+    Unknown,
 }
 
 /// Which joint a number in the name of a column means.
@@ -161,15 +190,24 @@ impl Numbering {
         self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
     }
 
+    /// The column that an unknown name is meant to be, of those that the table does not have.
+    fn meant(&self, name: &str, table: &Table, problem: &Problem) -> Option<String> {
+        let joints = problem.joints.iter().enumerate().filter_map(|(index, joint)| Some((index, kind_of(joint.kind)?)));
+        let joints = joints.map(|(index, kind)| (self.number(index), kind));
+        let plain = PLAIN.iter().map(|(name, _)| (*name).to_owned());
+        let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
+        let measured = MEASURED.iter().map(|&(base, _, kind, _)| (base.to_owned(), kind));
+        let measured = measured.chain(joints.map(|(number, kind)| (format!("q{number}"), kind)));
+        let measured = measured.flat_map(|(base, kind)| spellings(&base, kind).collect::<Vec<_>>());
+        let there = |name: &String| table.header.iter().any(|own| split_unit(own).0 == split_unit(name).0);
+        nearest(name, plain.chain(approach).chain(measured).filter(|name| !there(name)))
+    }
+
     /// What the name of a column means.
     fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
         let plain = |role| Ok(Meaning::Read(role, identity));
-        match name {
-            "split" => return plain(Role::Split),
-            "session" => return plain(Role::Session),
-            "target" => return plain(Role::Target),
-            "pose" => return plain(Role::Pose),
-            _ => {}
+        if let Some((_, role)) = PLAIN.iter().find(|(known, _)| *known == name) {
+            return plain(*role);
         }
         if let Some(number) = numbered(name, "approach") {
             return match self.joint(number).filter(|&joint| problem.joints[joint].kind != JointKind::Fixed) {
@@ -178,28 +216,17 @@ impl Numbering {
             };
         }
         let (base, suffix) = split_unit(name);
-        // Lengths and angles need a unit; a column such as `time` may be about something else.
-        let (role, kind, strict) = match base {
-            "x" => (Role::Position(0), &LENGTH, true),
-            "y" => (Role::Position(1), &LENGTH, true),
-            "z" => (Role::Position(2), &LENGTH, true),
-            "sigma" => (Role::Sigma, &LENGTH, true),
-            "rx" => (Role::Orientation(0), &ANGLE, true),
-            "ry" => (Role::Orientation(1), &ANGLE, true),
-            "rz" => (Role::Orientation(2), &ANGLE, true),
-            "payload" => (Role::Payload, &MASS, false),
-            "hoist" => (Role::Hoist, &FORCE, false),
-            "temperature" => (Role::Temperature, &TEMPERATURE, false),
-            "time" => (Role::Time, &TIME, false),
-            _ => {
-                let Some(number) = numbered(base, "q") else { return Ok(Meaning::Ignored(WarningKind::ColumnIgnored)) };
-                let joint = self.joint(number);
-                let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
-                else {
-                    return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
-                };
-                (Role::Joint(joint), kind, true)
-            }
+        let measured = MEASURED.iter().find(|(known, ..)| *known == base);
+        let (role, kind, strict) = if let Some(&(_, role, kind, strict)) = measured {
+            (role, kind, strict)
+        } else {
+            let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
+            let joint = self.joint(number);
+            let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
+            else {
+                return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
+            };
+            (Role::Joint(joint), kind, true)
         };
         let write = || kind.spelled(base);
         match suffix {
@@ -214,6 +241,11 @@ impl Numbering {
             None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
         }
     }
+}
+
+/// A name with each of its units.
+fn spellings(base: &str, kind: &Kind) -> impl Iterator<Item = String> {
+    kind.units.iter().map(move |unit| format!("{base}_{}", unit.suffix))
 }
 
 /// What q of a joint is measured in, where it takes one.

@@ -1,6 +1,7 @@
 //! Measured poses, as columns in SI units.
 
 mod columns;
+mod limits;
 mod lines;
 mod read;
 mod split;

@@ -62,7 +62,7 @@ fn one(
         let error = |kind| Err(term.location.clone().error(kind));
         let Some((name, unit, value)) = known.iter().find(|(name, ..)| *name == term.name) else {
             let known = known.iter().map(|(name, ..)| name.clone()).collect();
-            return error(InputErrorKind::UnknownParameter { known });
+            return error(InputErrorKind::UnknownParameter { name: term.name.clone(), known });
         };
         if !matches!(unit, Unit::Angle | Unit::Length) && !unit.is_relative() {
             return error(InputErrorKind::NotConstrainable);

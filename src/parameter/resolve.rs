@@ -2,6 +2,7 @@
 
 use super::{BeamField, Driver, JointField, Parameter, Slot, Unit, unit};
 use crate::error::{InputError, InputErrorKind};
+use crate::problem::effects;
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
 
@@ -83,7 +84,9 @@ pub fn resolve(
                     known.push(plain);
                 }
             }
-            return Err(rule.location.clone().error(InputErrorKind::MatchesNothing { known }));
+            let kind = undeclared(problem, &rule.pattern, &known)
+                .unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
+            return Err(rule.location.clone().error(kind));
         }
         check_kinds(rule, &candidates)?;
     }
@@ -117,6 +120,19 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         named && fits(rule, parameter.unit())
     };
     problem.parameters.iter().rev().find(speaks)
+}
+
+/// The mistake of a pattern that is about effects which nothing declares, if it is one.
+fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<InputErrorKind> {
+    // Of `hoist-force.error`, `gear-ratio[3].error`.
+    let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
+    let wanted = head(pattern);
+    if known.iter().any(|name| matches(&wanted, &head(name))) {
+        return None;
+    }
+    let effects: Vec<&str> = effects::NAMES.into_iter().filter(|name| matches(&wanted, name)).collect();
+    let write = effects::example(effects.first()?, &problem.joints);
+    Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 
 /// Whether the rules of `problem` hold all of these parameters of an effect that it does not declare.

@@ -143,7 +143,7 @@ pub(super) fn of(found: &Effect, problem: &Problem, arm: &Arm, sight: &Sight) ->
         }
         None => elsewhere(found, problem, &rows, &values),
     };
-    Some(view.cause(effect::describe(found), &rows, sight))
+    Some(view.cause(effect::describe_in(found, sight.measurements.time_measured), &rows, sight))
 }
 
 /// The joint whose coordinate an effect changes, what it depends on, and the coordinate.

@@ -7,7 +7,7 @@ use toml::de::DeTable;
 use super::item::{Document, Item};
 use super::section::Section;
 use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Problem, Statics};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::TIME;
 
 /// The effects by name.
@@ -97,7 +97,44 @@ pub(super) fn check(
 /// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3 }`; `hoist-force` alone
 /// stands for `hoist-force = true`.
 pub(super) fn parse(text: &str, named: &Path, problem: &Problem) -> Result<EffectDeclaration, InputError> {
-    let text = if text.contains('=') { text.to_owned() } else { format!("{text} = true") };
+    if text.contains('=') {
+        return written(text.to_owned(), named, problem);
+    }
+    written(format!("{text} = true"), named, problem).map_err(|error| {
+        let kind = match *error.kind {
+            InputErrorKind::MissingKey { .. } => {
+                InputErrorKind::NeedsArguments { write: format!("'{}'", example(text.trim(), &problem.joints)) }
+            }
+            kind => kind,
+        };
+        // Nobody wrote the text that was read.
+        Location::file(named).with_key(text.trim()).error(kind)
+    })
+}
+
+/// How an effect may be declared on this arm: `gear-ratio = { joint = 1 }`.
+pub(crate) fn example(name: &str, joints: &[Joint]) -> String {
+    let mut moving = (1..=joints.len()).filter(|number| joints[number - 1].kind != JointKind::Fixed);
+    let joint = moving.next().unwrap_or(1);
+    let link = || joints.iter().find_map(|joint| joint.beam.as_ref()).map_or("A", |beam| beam.name.as_str());
+    let arguments = match name {
+        "joint-harmonic" => format!("{{ joint = {joint}, orders = [1] }}"),
+        "joint-coupling" => format!("{{ joint = {}, from = {joint} }}", moving.next().unwrap_or(joint + 1)),
+        "link-bending" => {
+            let long = (1..=joints.len()).find(|number| joints[number - 1].a != 0.0);
+            format!("{{ joint = {} }}", long.unwrap_or(joint))
+        }
+        "link-thermal-bending" | "link-thermal-expansion" | "unmodelled-mass" => format!("{{ link = {:?} }}", link()),
+        "station-shift" => "{ at_time_s = 600.0 }".to_owned(),
+        name if name.starts_with("joint-") || ["gear-ratio", "backlash"].contains(&name) => {
+            format!("{{ joint = {joint} }}")
+        }
+        _ => "true".to_owned(),
+    };
+    format!("{name} = {arguments}")
+}
+
+fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclaration, InputError> {
     let document = Document { file: named.to_owned(), text: text.into() };
     let table = document.table()?;
     let section = Section::new(&document, String::new(), 0..0, table.get_ref());
@@ -141,7 +178,7 @@ pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Resul
         "tracker-scale" => Effect::TrackerScale,
         "tracker-drift" => Effect::TrackerDrift,
         "station-shift" => Effect::StationShift { at_time: arguments.time("at_time")? },
-        _ => return Err(item.error(InputErrorKind::UnknownEffect { known: &NAMES })),
+        _ => return Err(item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: &NAMES })),
     };
     arguments.section.finish()?;
     Ok(effect)

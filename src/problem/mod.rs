@@ -6,6 +6,7 @@
 mod arm;
 mod constraints;
 mod data;
+pub(crate) mod digest;
 mod effect;
 pub(crate) mod effects;
 pub(crate) mod item;

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind, Location, nearest};
 use crate::units::{self, Kind, Unit};
 
 /// A table that is being read.
@@ -35,10 +35,15 @@ impl<'a, 'i> Section<'a, 'i> {
         self.location().error(kind)
     }
 
-    /// The error of a key that is not there.
+    /// The error of a key that is not there; one that nobody asked for may be meant by it.
     pub fn missing(&self, key: &str, write: impl Into<String>) -> InputError {
-        let kind = InputErrorKind::MissingKey { write: write.into() };
+        let others = self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.asked_for(key));
+        let kind = InputErrorKind::MissingKey { write: write.into(), near: nearest(key, others).map(str::to_owned) };
         self.location().with_key(join(&self.path, key)).error(kind)
+    }
+
+    fn asked_for(&self, key: &str) -> bool {
+        self.known.iter().any(|known| known == key)
     }
 
     /// Number of keys.
@@ -173,9 +178,11 @@ impl<'a, 'i> Section<'a, 'i> {
 
     /// Whether the section holds a key that nobody asked for: an error at the first of them.
     pub fn finish(&self) -> Result<(), InputError> {
-        let unknown = self.entries().into_iter().find(|(key, _)| !self.known.iter().any(|known| known == key));
+        let unknown = self.entries().into_iter().find(|(key, _)| !self.asked_for(key));
         match unknown {
-            Some((_, item)) => Err(item.error(InputErrorKind::UnknownKey { known: self.known.clone() })),
+            Some((key, item)) => {
+                Err(item.error(InputErrorKind::UnknownKey { key: key.to_owned(), known: self.known.clone() }))
+            }
             None => Ok(()),
         }
     }

@@ -3,6 +3,7 @@
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::quantity::{Display, decimals, number};
+use crate::diagnosis::Trace;
 use crate::effect::{self, Argument};
 use crate::problem::Effect;
 use crate::study::Estimate;
@@ -51,10 +52,10 @@ pub(super) fn declaration(effect: &Effect) -> String {
 }
 
 /// In words and, unless that is long, as a problem declares it.
-pub(super) fn both(effect: &Effect) -> String {
+pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
     match effect {
-        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => effect::describe(effect),
-        _ => format!("{}: `{}`", effect::describe(effect), declaration(effect)),
+        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => trace.describe(effect),
+        _ => format!("{}: `{}`", trace.describe(effect), declaration(effect)),
     }
 }
 

@@ -35,8 +35,11 @@ pub(super) struct Both {
 #[derive(Debug, Serialize)]
 struct Document<'a> {
     problem: &'a str,
+    /// Of everything declared that predictions depend on.
+    arm_digest: String,
     strategy: &'a str,
     solver: &'a str,
+    solver_reason: Option<&'a str>,
     termination: &'a str,
     trusted: bool,
     iterations: u64,
@@ -194,8 +197,10 @@ pub fn estimate_json(problem: &Problem, result: &Identification) -> String {
     let identifiability = &result.identifiability;
     let document = Document {
         problem: &problem.name,
+        arm_digest: problem.digest(),
         strategy: result.strategy.as_str(),
         solver: result.solver.as_str(),
+        solver_reason: result.solver_reason,
         termination: result.termination.as_str(),
         trusted: result.is_trusted(),
         iterations: result.iterations,

@@ -24,10 +24,17 @@ pub(super) const LEFT: [usize; 3] = [0, 5, 6];
 
 /// Nominal, estimate, change and standard error of every free parameter.
 pub(super) fn parameter_table(result: &Identification) -> String {
-    let text = table(&HEADER, parameter_rows(result), &LEFT);
-    format!(
-        "{text}  identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations\n"
-    )
+    let mut text = table(&HEADER, parameter_rows(result), &LEFT);
+    if result.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
+        text.push_str(
+            "  –: no standard error: the data say nothing of it or see it in a blind combination only, a bound holds it, or it \
+             was not fitted\n",
+        );
+    }
+    text.push_str(
+        "  identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations\n",
+    );
+    text
 }
 
 /// The rows of that table.

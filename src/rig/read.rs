@@ -70,7 +70,7 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
     let mut section = named(name, item)?;
     let Some(parameter) = known.iter().find(|parameter| parameter.name == name) else {
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
-        return Err(item.error(InputErrorKind::UnknownParameter { known }));
+        return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
     };
     let units = parameter.kind.units().units;
     let given: Vec<_> = units.iter().filter_map(|unit| section.get(unit.suffix).map(|item| (item, unit))).collect();
@@ -106,7 +106,7 @@ fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
     let matched: Vec<_> = known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
     if matched.is_empty() {
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
-        return Err(item.error(InputErrorKind::MatchesNothing { known }));
+        return Err(item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known }));
     }
     let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
     if matched.iter().all(|parameter| rule.sigma(parameter.kind).is_none()) {

@@ -9,14 +9,14 @@ fn joints_and_beams() {
     let below: [(&str, &[&str]); 11] = [
         ("mass_kg = -1", &[":6: joint[1].beam.mass_kg: -1 is below zero"]),
         ("EA_N = 0", &[":6: joint[1].beam.EA_N: 0 is not above zero"]),
-        ("EI_N_m2 = 1e4", &[":6: joint[1].beam.EI_N_m2: unknown key", "EIy_N_m2"]),
+        ("EI_N_m2 = 1e4", &[":6: joint[1].beam.EI_N_m2: unknown key (did you mean EIy_N_m2?); known here: "]),
         ("EA = 1", &[":6: joint[1].beam.EA: ", "EA_N"]),
         ("mass = 1", &[":6: joint[1].beam.mass: a mass needs a unit; write mass_kg"]),
         ("[[joint.beam.mass]]\nmass_kg = 1", &[":6: joint[1].beam.mass[1].at: missing", "at_m or at_mm"]),
         ("[[joint.beam.mass]]\nat_m = [0, 0, 0]", &[":6: joint[1].beam.mass[1].mass_kg: missing"]),
         ("[joint.beam.hoist]\nforce_N = 1", &[":6: joint[1].beam.hoist.at: missing"]),
         ("hoist = { at_m = [0, 0, 0], direction = [0, 0, 0] }", &[":6: joint[1].beam.hoist.direction: "]),
-        ("hoist = { at_m = [0, 0, 0], rope = 3 }", &[":6: joint[1].beam.hoist.rope: unknown key"]),
+        ("hoist = { at_m = [0, 0, 0], rope = 3 }", &[":6: joint[1].beam.hoist.rope: unknown key; known here: "]),
         ("[[joint]]\na_m = 1\nbeam.name = 'A'", &[":8: joint[2].beam.name: ", "another beam"]),
     ];
     for (text, words) in below {
@@ -52,7 +52,7 @@ fn other_sections() {
         ("[statics]\nbeam_elements = 0", &[":4: statics.beam_elements: 0 is not a whole number"]),
         ("[statics]\nbeam_elements = 1.5", &[":4: statics.beam_elements: 1.5 is not a whole number"]),
         ("[statics]\nbeam_elements = 1_000_000", &[":4: statics.beam_elements: 1000000 is too large"]),
-        ("[statics]\nelements = 1", &[":4: statics.elements: unknown key"]),
+        ("[statics]\nelements = 1", &[":4: statics.elements: unknown key (did you mean beam_elements?)"]),
         ("[tool]\ntarget_m = [1, 2]", &[":4: tool.target_m: a vector has 3 numbers, found 2"]),
         ("[tool]\ntarget_m = [\n1,\n2,\nnan]", &[":7: tool.target_m[3]: nan"]),
         ("[tool]\ntarget = [1, 2, 3]", &[":4: tool.target: a length needs a unit"]),
@@ -66,7 +66,7 @@ fn other_sections() {
         ("[data]\nreference_temperature = 1", &[":4: data.reference_temperature: a temperature needs a unit"]),
         ("[data]\nfiles = 'a.csv'", &[":4: data.files: expected a list"]),
         ("[data]\nfiles = [1]", &[":4: data.files[1]: expected text"]),
-        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key"]),
+        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key (did you mean files?)"]),
         ("[data]\nheld_out = {}", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { seed = 1 }", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { column = 'a', session = 'b' }", &[":4: data.held_out: give one of"]),
@@ -136,10 +136,11 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 26] = [
+    let effects: [(&str, &[&str]); 27] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
-        ("wobble = {}", &[":4: effect[1].wobble: unknown effect", "backlash"]),
+        ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
+        ("gear_ratios = {}", &[":4: effect[1].gear_ratios: unknown effect (did you mean gear-ratio?)"]),
         ("payload-mass = { joint = 1 }", &[":4: effect[1].payload-mass.joint: unknown key"]),
         ("payload-mass = false", &[":4: effect[1].payload-mass: expected a table"]),
         ("backlash = {}", &[":4: effect[1].backlash.joint: missing"]),
@@ -150,7 +151,10 @@ fn effects() {
         ("joint-harmonic = { joint = 1, orders = [] }", &[":4: effect[1].joint-harmonic.orders: no order"]),
         ("joint-harmonic = { joint = 1, orders = [0] }", &[":4: effect[1].joint-harmonic.orders[1]: 0 is not"]),
         ("joint-harmonic = { joint = 1, orders = [1, 1] }", &[":4: effect[1].joint-harmonic.orders[2]: order 1"]),
-        ("joint-harmonic = { joint = 1, order = 1 }", &[":4: effect[1].joint-harmonic.orders: missing"]),
+        (
+            "joint-harmonic = { joint = 1, order = 1 }",
+            &["orders: missing; write orders = [1], the harmonics (is it order?)"],
+        ),
         ("joint-coupling = { joint = 1, from = 1 }", &[":4: effect[1].joint-coupling: ", "gear-ratio"]),
         ("station-shift = { at_time = 3 }", &[":4: effect[1].station-shift.at_time: a time needs a unit"]),
         ("link-bending = { joint = 1 }", &[":4: effect[1].link-bending: joint 1 has no link", "its a is 0"]),

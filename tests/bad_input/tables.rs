@@ -4,12 +4,14 @@ use super::reading::{ARM, check, table};
 
 #[test]
 fn headers() {
-    let headers: [(&str, &[&str]); 15] = [
+    let headers: [(&str, &[&str]); 17] = [
         ("", &["rows.csv:1: the file is empty"]),
         ("\n\n", &["rows.csv:1: the file is empty"]),
         ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
         ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
+        ("q1_deg,X_mm,y_m,z_m\n", &["rows.csv:1: column x: missing; add x_m or x_mm (is it column X_mm?)"]),
+        ("q1deg,x_m,y_m,z_m\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad (is it column q1deg?)"]),
         ("q1,x_m,y_m,z_m\n", &["rows.csv:1: column q1: an angle needs a unit; write q1_deg or q1_rad"]),
         ("q1_mm,x_m,y_m,z_m\n", &["rows.csv:1: column q1_mm: an angle is not given in mm"]),
         ("\nq1_deg,x,y_m,z_m\n", &["rows.csv:2: column x: a length needs a unit"]),

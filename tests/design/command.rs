@@ -149,13 +149,31 @@ fn a_plan_tells_two_effects_apart() {
     }
     for (pair, expected) in [
         (["gear-rato = { joint = 3 }", "hoist-force"], "--separate:1: gear-rato: unknown effect"),
+        (["gear-ratio", "backlash"], "--separate: gear-ratio: needs arguments; write 'gear-ratio = { joint = 1 }'"),
         (["gear-ratio = { joint = 9 }", "hoist-force"], "no joint 9"),
         (["tracker-drift", "hoist-force"], "an effect of time"),
     ] {
         let more = ["--separate", pair[0], pair[1], "--candidates", &table];
         let (_, err) = bench.run(2, "plan problems/lunar-sampler --poses 20", &more);
         assert!(err.contains(expected), "{expected} missing in:\n{err}");
+        assert_eq!(err.contains(" | "), pair[0].contains('='), "only what somebody wrote is shown:\n{err}");
     }
+}
+
+#[test]
+fn examples_of_arguments_are_effects_of_the_arm() {
+    let (problem, _) = super::bench::lunar();
+    let read = |text: &str| problem.effect(text, Path::new("--separate"));
+    let mut written = 0;
+    for family in flexcal::effect::FAMILIES {
+        let Err(error) = read(family.name) else { continue };
+        let error = error.to_string();
+        let Some((_, example)) = error.split_once("write '") else { continue };
+        let read = read(example.trim_end_matches('\'')).unwrap();
+        assert_eq!(flexcal::effect::name(&read.effect), family.name);
+        written += 1;
+    }
+    assert_eq!(written, 13);
 }
 
 #[test]

@@ -119,7 +119,16 @@ fn rules_that_do_not_fit_are_mistakes() {
         ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width takes _deg or _rad"),
         ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width takes _mm or _m"),
         ("\"gear-ratio[2].error\" = { free = true }", "matches no parameter"),
-        ("\"hoist-force.*\" = { free = true }", "matches no parameter"),
+        (
+            "\"joint*.alfa\" = { free = true }",
+            "matches no parameter of this arm (did you mean joint1.alpha?); they are",
+        ),
+        (
+            "\"hoist-force.*\" = { free = true }",
+            "those of hoist-force are there once an [[effect]] declares it, as in hoist-force = true",
+        ),
+        ("\"link-th*\" = { free = true }", "those of link-thermal-bending, link-thermal-expansion are there"),
+        ("\"joint-com*[2].*\" = { free = true }", "declares it, as in joint-compliance = { joint = "),
     ] {
         let error = resolved(rule).unwrap_err();
         assert!(error.contains(words), "{rule}: {error}");

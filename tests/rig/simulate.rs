@@ -174,7 +174,10 @@ fn every_mistake_says_where_it_is() {
         ("time_step_s = -5", &["poses.time_step_s: -5 is below zero"]),
         ("temperature = 5", &["temperature_C"]),
         ("speed = 5", &["poses.speed: unknown key"]),
-        ("[parameters]\n\"joint9.a\" = { mm = 1 }", &["parameters.\"joint9.a\": no such parameter", "joint4.a"]),
+        (
+            "[parameters]\n\"joint9.a\" = { mm = 1 }",
+            &["parameters.\"joint9.a\": no such parameter (did you mean joint1.a?)", "joint4.a"],
+        ),
         ("[parameters]\ntool.x = { mm = 1 }", &["stands in quotes"]),
         ("[parameters]\n\"tool.x\" = { deg = 1 }", &["parameters.\"tool.x\".deg: unknown key", "mm"]),
         ("[parameters]\n\"tool.x\" = {}", &["missing", "m = … or mm = …"]),
@@ -187,7 +190,10 @@ fn every_mistake_says_where_it_is() {
         ("[noise]", &["noise.position_sigma_mm: missing"]),
         ("[rig]\nsegments = 0", &["rig.segments: 0 is not a whole number"]),
         ("[[effect]]\nerror_relative = 1", &["effect[1]: an effect is one key", "found 0"]),
-        ("[[effect]]\ngear-ration = { joint = 1 }", &["effect[1].gear-ration: unknown effect"]),
+        (
+            "[[effect]]\ngear-ration = { joint = 1 }",
+            &["effect[1].gear-ration: unknown effect (did you mean gear-ratio?)"],
+        ),
         ("[[effect]]\ngear-ratio = { joint = 1 }", &["no strength; write error_relative"]),
         ("[[effect]]\ngear-ratio = { joint = 1 }\nerror = 1", &["effect[1].error: a ratio needs a unit"]),
         ("[[effect]]\ngear-ratio = { joint = 1 }\nwidth_deg = 1", &["unknown key"]),

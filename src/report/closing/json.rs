@@ -111,11 +111,11 @@ impl<'a> From<&'a Estimate> for ParameterEntry<'a> {
     }
 }
 
-impl<'a> From<&'a Found> for FoundEntry<'a> {
-    fn from(found: &'a Found) -> Self {
+impl<'a> FoundEntry<'a> {
+    fn of(found: &'a Found, closure: &Closure) -> Self {
         Self {
             effect: effect::Entry(&found.effect),
-            description: crate::effect::describe(&found.effect),
+            description: closure.before.describe(&found.effect),
             p_value: found.p_value,
             parameters: found.estimates.iter().map(ParameterEntry::from).collect(),
             alternatives: found.alternatives.iter().map(effect::Entry).collect(),
@@ -173,7 +173,7 @@ pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
         before: (&closure.before.fit).into(),
         after: (&closure.after).into(),
         held_out_gain_mm: closure.gain.into(),
-        effects: closure.effects.iter().map(FoundEntry::from).collect(),
+        effects: closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
         unexplained: closure.unexplained.as_ref().map(UnexplainedEntry::from),
         wave_prior_rad: closure.wave_sigma,
         steps: closure.steps.iter().map(StepEntry::from).collect(),

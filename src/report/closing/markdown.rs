@@ -6,7 +6,6 @@ use super::super::quantity::number;
 use super::super::{findings, trace};
 use super::parts;
 use crate::diagnosis::{Closure, Step};
-use crate::effect::describe;
 use crate::problem::Problem;
 
 /// Candidates that a report shows.
@@ -29,7 +28,7 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
         Block::heading("What the declared problem leaves"),
         Block::list(findings::all(&closure.before.findings)),
     ];
-    blocks.extend(trace::ranking(problem, &closure.before, SHOWN));
+    blocks.extend(trace::ranking(problem, &closure.before, SHOWN, "`flexcal trace` writes them all"));
     blocks.extend(rounds(closure));
     blocks.extend(parts::found(closure));
     blocks.push(Block::heading("What remains"));
@@ -51,10 +50,11 @@ fn rounds(closure: &Closure) -> Vec<Block> {
     }
     let mm = |value: f64| number(value * 1e3, 4);
     let row = |(k, step): (usize, &Step)| {
-        let effects = match step.effects.iter().map(describe).collect::<Vec<_>>().join("; ") {
-            none if none.is_empty() => "none".to_owned(),
-            effects => effects,
-        };
+        let effects =
+            match step.effects.iter().map(|effect| closure.before.describe(effect)).collect::<Vec<_>>().join("; ") {
+                none if none.is_empty() => "none".to_owned(),
+                effects => effects,
+            };
         let errors = [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm].map(mm);
         [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
     };

@@ -4,7 +4,6 @@ use super::super::document::{Block, Point, Table};
 use super::super::effect;
 use super::super::quantity::number;
 use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, Unexplained, Verdict};
-use crate::effect::describe;
 use crate::problem::{JointKind, Problem};
 use crate::study::ErrorSummary;
 
@@ -15,7 +14,7 @@ const SHOWN: usize = 4;
 pub(super) fn verdict(closure: &Closure) -> String {
     let found = match closure.effects.as_slice() {
         [] => "No effect was found".to_owned(),
-        [one] => format!("One effect was found ({})", describe(&one.effect)),
+        [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
         several => format!("{} effects were found", several.len()),
     };
     match (closure.verdict, closure.findings.is_testable()) {
@@ -77,8 +76,10 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
     if closure.effects.is_empty() {
         return Vec::new();
     }
-    let mut blocks =
-        vec![Block::heading("What was found"), Block::Ranking(closure.effects.iter().map(point).collect())];
+    let mut blocks = vec![
+        Block::heading("What was found"),
+        Block::Ranking(closure.effects.iter().map(|found| point(closure, found)).collect()),
+    ];
     if let Some(sigma) = closure.wave_sigma {
         blocks.push(Block::Text(format!(
             "Waves of joints are many: every order up to the highest that stands out is in the model, with one prior of {} ° \
@@ -89,7 +90,7 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
     blocks
 }
 
-fn point(found: &Found) -> Point {
+fn point(closure: &Closure, found: &Found) -> Point {
     let mut details: Vec<String> =
         effect::values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}")).collect();
     let after = found.held_out_after;
@@ -101,14 +102,15 @@ fn point(found: &Found) -> Point {
         mm(after.rms.norm)
     ));
     if !found.alternatives.is_empty() {
-        let named: Vec<String> = found.alternatives.iter().take(SHOWN).map(describe).collect();
+        let named: Vec<String> =
+            found.alternatives.iter().take(SHOWN).map(|other| closure.before.describe(other)).collect();
         let more = match found.alternatives.len().saturating_sub(SHOWN) {
             0 => String::new(),
             more => format!("; and {more} more"),
         };
         details.push(format!("these data do not tell it from: {}{more}", named.join("; ")));
     }
-    Point { text: effect::both(&found.effect), details }
+    Point { text: effect::both(&found.effect, &closure.before), details }
 }
 
 /// What no effect explains.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
 use super::super::effect::{p, values};
-use crate::diagnosis::{Closure, Found, WAVES};
+use crate::diagnosis::{Closure, Found, Trace, WAVES};
 use crate::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
 
@@ -23,7 +23,7 @@ pub fn closed_problem(
     let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
     let closed = closure.closed.effects.iter().map(|declared| {
         let found = closure.effects.iter().find(|found| found.effect == declared.effect);
-        (declared.effect.clone(), found.map(comments).unwrap_or_default())
+        (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
     });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
     match closure.wave_sigma {
@@ -156,8 +156,8 @@ fn arguments(effect: &Effect) -> Value {
 }
 
 /// What is known of an effect that was found, line by line.
-fn comments(found: &Found) -> Vec<String> {
-    let first = format!("Found by flexcal loop: {}, {}.", effect::describe(&found.effect), p(found.p_value));
+fn comments(found: &Found, trace: &Trace) -> Vec<String> {
+    let first = format!("Found by flexcal loop: {}, {}.", trace.describe(&found.effect), p(found.p_value));
     let lines = values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}"));
     std::iter::once(first).chain(lines).collect()
 }

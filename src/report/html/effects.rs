@@ -32,17 +32,17 @@ pub(super) fn story(closure: &Closure) -> Markup {
     html! {
         @if closure.effects.is_empty() { p { "No effect of the catalogue stands out of the residual." } }
         div.columns {
-            @for found in &closure.effects { (one(found)) }
+            @for found in &closure.effects { (one(found, closure)) }
         }
         @if let Some(left) = &closure.unexplained { (unexplained(left)) }
     }
 }
 
-fn one(found: &Found) -> Markup {
+fn one(found: &Found, closure: &Closure) -> Markup {
     let others: Vec<String> = found.alternatives.iter().map(named).collect();
     html! {
         div.found {
-            h3 { (capital(&effect::describe(&found.effect))) }
+            h3 { (capital(&closure.before.describe(&found.effect))) }
             p { code { (named(&found.effect)) } ", " (chance(found.p_value)) "; once it was in the model, held-out poses were off by "
                 (number(found.held_out_after.mean.norm * 1e3, 3)) " mm on average" }
             table {

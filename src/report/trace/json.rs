@@ -71,12 +71,12 @@ struct UntestableEntry<'a> {
     reason: &'static str,
 }
 
-impl<'a> From<&'a Ranked> for RankedEntry<'a> {
-    fn from(ranked: &'a Ranked) -> Self {
+impl<'a> RankedEntry<'a> {
+    fn of(ranked: &'a Ranked, trace: &Trace) -> Self {
         let alike = ranked.alike.iter();
         Self {
             effect: effect::Entry(&ranked.effect),
-            description: crate::effect::describe(&ranked.effect),
+            description: trace.describe(&ranked.effect),
             p_value: ranked.p_value,
             f: ranked.f.0,
             freedom: ranked.f.1,
@@ -110,7 +110,7 @@ pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
         checks: findings::entries(&trace.findings),
         tried: trace.tried,
         level: trace.level,
-        ranking: trace.ranking.iter().map(RankedEntry::from).collect(),
+        ranking: trace.ranking.iter().map(|ranked| RankedEntry::of(ranked, trace)).collect(),
         untestable: untestable
             .iter()
             .map(|(effect, reason)| UntestableEntry { effect: effect::Entry(effect), reason })

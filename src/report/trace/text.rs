@@ -21,7 +21,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
         Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
         Block::list(findings::all(&trace.findings)),
     ];
-    blocks.extend(ranking(problem, trace, SHOWN));
+    blocks.extend(ranking(problem, trace, SHOWN, "trace.json holds them all"));
     blocks.extend(not_seen(trace));
     to_text(&blocks)
 }
@@ -40,8 +40,8 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
     )
 }
 
-/// The candidates that stand out, at most so many of them, and how to read them.
-pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize) -> Vec<Block> {
+/// The candidates that stand out, at most so many of them, how to read them, and `where_all` are.
+pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize, where_all: &str) -> Vec<Block> {
     let all: Vec<&Ranked> = trace.ranking.iter().filter(|ranked| ranked.p_value < trace.level).collect();
     let Some(first) = trace.ranking.first() else {
         return vec![Block::heading("What could explain it"), Block::Text("There is no candidate to try.".to_owned())];
@@ -53,13 +53,13 @@ pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize) 
                 "None of {} candidates stands out. The best, {}, does no better than chance would ({}, corrected for the \
                  number of candidates; below {} would stand out).",
                 trace.tried,
-                effect::both(&first.effect),
+                effect::both(&first.effect, trace),
                 effect::p(first.p_value),
                 trace.level,
             )),
         ];
     }
-    let shown = all.iter().take(most).map(|ranked| point(problem, ranked)).collect();
+    let shown = all.iter().take(most).map(|ranked| point(problem, trace, ranked)).collect();
     let mut notes = format!(
         "{} candidates were tried one by one; p is the probability that chance alone does as well, corrected for their \
          number, and below {} it stands out. One cause makes its neighbours stand out, too: the first is the best \
@@ -67,7 +67,7 @@ pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize) 
         trace.tried, trace.level
     );
     if all.len() > most {
-        let _ = write!(notes, " {} more that stand out are left out here.", all.len() - most);
+        let _ = write!(notes, " {} more that stand out are left out here; {where_all}.", all.len() - most);
     }
     if all.iter().take(most).any(|ranked| !ranked.alike.is_empty()) {
         notes.push_str(
@@ -79,7 +79,7 @@ pub(in crate::report) fn ranking(problem: &Problem, trace: &Trace, most: usize) 
     vec![Block::heading("What could explain it, best first"), Block::Ranking(shown), Block::Text(notes)]
 }
 
-fn point(problem: &Problem, ranked: &Ranked) -> Point {
+fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     let mm = |gain: f64| number(gain * 1e3, 4);
     let mut gain = format!(
         "{}; would take {} mm off the rms error of the identification poses",
@@ -92,8 +92,7 @@ fn point(problem: &Problem, ranked: &Ranked) -> Point {
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {
         let named = ranked.alike.iter().take(SHOWN_ALIKE);
-        let named =
-            named.map(|(other, angle)| format!("{} ({:.0}°)", crate::effect::describe(other), angle.to_degrees()));
+        let named = named.map(|(other, angle)| format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees()));
         let more = match ranked.alike.len().saturating_sub(SHOWN_ALIKE) {
             0 => String::new(),
             more => format!(" and {more} more"),
@@ -101,10 +100,10 @@ fn point(problem: &Problem, ranked: &Ranked) -> Point {
         details.push(format!("hard to tell from: {}{more}", named.collect::<Vec<_>>().join("; ")));
     }
     if let Some(apart) = &ranked.apart {
-        let other = crate::effect::describe(&apart.other);
+        let other = trace.describe(&apart.other);
         details.push(format!("“{other}” would differ by {} mm at {}", mm(apart.difference), pose(problem, apart)));
     }
-    Point { text: effect::both(&ranked.effect), details }
+    Point { text: effect::both(&ranked.effect, trace), details }
 }
 
 /// A pose in words: joints, payload, hoist, temperature.

@@ -19,7 +19,7 @@ const NAMES: i32 = 200;
 const LEAST_P: f64 = 1e-300;
 
 /// Name of an effect with its place, as in a problem file.
-fn named(found: &Effect) -> String {
+fn named(found: &Effect, trace: &Trace) -> String {
     let place = effect::place(found);
     let orders = match found {
         Effect::JointHarmonic { orders, .. } => {
@@ -29,7 +29,8 @@ fn named(found: &Effect) -> String {
     };
     let name = effect::name(found);
     match found {
-        Effect::StationShift { at_time } => format!("{name} {at_time:.0} s"),
+        Effect::StationShift { at_time } if trace.time_measured => format!("{name} {at_time:.0} s"),
+        Effect::StationShift { at_time } => format!("{name} row {}", at_time.ceil()),
         _ if place.is_empty() => name.to_owned(),
         _ => format!("{name} {place}{orders}"),
     }
@@ -56,7 +57,13 @@ pub fn ranking(trace: &Trace) -> Option<Figure> {
         for (k, ranked) in (0..).zip(&shown) {
             let y = top + ROW * k + ROW / 2;
             let stands_out = ranked.p_value < trace.level;
-            write(area, &named(&ranked.effect), (NAMES - 8, y), if stands_out { INK } else { MUTED }, HPos::Right)?;
+            write(
+                area,
+                &named(&ranked.effect, trace),
+                (NAMES - 8, y),
+                if stands_out { INK } else { MUTED },
+                HPos::Right,
+            )?;
             let end = place(evidence(ranked)).max(place(0.0) + px(1));
             let bar = [(place(0.0), px(y - 6)), (end, px(y + 6))];
             let style = match (k, alike(ranked), stands_out) {

@@ -1,0 +1,108 @@
+//! What a declared arm predicts, as a digest: whether an estimate still belongs to it.
+
+use std::fmt::Write as _;
+
+use nalgebra::Vector3;
+use sha2::{Digest as _, Sha256};
+
+use super::{BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Problem, Statics, Tool};
+
+impl Problem {
+    /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same on every machine, and
+    /// for the same value in another unit.
+    ///
+    /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not enter.
+    pub fn digest(&self) -> String {
+        let Self { gravity, statics, joints, tool, base, effects, data, .. } = self;
+        let Statics { equilibrium, beam_elements } = statics;
+        let Tool { target, payload_at, payload_mass } = tool;
+        let BasePose { translation, rotation } = base;
+        let mut text = match equilibrium {
+            Equilibrium::Undeflected => "undeflected".to_owned(),
+            Equilibrium::Deflected => "deflected".to_owned(),
+        };
+        let _ = write!(text, " {beam_elements}");
+        vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
+        number(&mut text, *payload_mass);
+        for own in joints {
+            joint(&mut text, own);
+        }
+        // The order in which effects are declared changes nothing.
+        let mut declared: Vec<String> = effects.iter().map(|own| format!("\n{:?}", own.effect)).collect();
+        declared.sort_unstable();
+        text.extend(declared);
+        if let (true, Some(reference)) =
+            (effects.iter().any(|own| Effect::is_thermal(&own.effect)), data.reference_temperature)
+        {
+            number(&mut text, reference);
+        }
+        hexadecimal(&text)
+    }
+}
+
+/// The SHA-256 digest of a text, 64 hexadecimal digits.
+pub(crate) fn hexadecimal(text: &str) -> String {
+    Sha256::digest(text).iter().fold(String::new(), |mut text, byte| {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+fn joint(text: &mut String, joint: &Joint) {
+    let Joint { name: _, kind, alpha, a, theta, d, beta, limits: _, stiffness, beam: elastic, bodies } = joint;
+    text.push_str(match kind {
+        JointKind::Revolute => "\nrevolute",
+        JointKind::Prismatic => "\nprismatic",
+        JointKind::Fixed => "\nfixed",
+    });
+    for value in [alpha, a, theta, d, beta] {
+        number(text, *value);
+    }
+    optional(text, *stiffness);
+    masses(text, bodies);
+    if let Some(elastic) = elastic {
+        beam(text, elastic);
+    }
+}
+
+fn beam(text: &mut String, beam: &Beam) {
+    let Beam { name: _, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
+    text.push_str(" beam");
+    number(text, *mass);
+    for rigidity in [ea, ei_y, ei_z, gj] {
+        optional(text, *rigidity);
+    }
+    masses(text, carried);
+    if let Some(Hoist { at, force, direction }) = hoist {
+        text.push_str(" hoist");
+        number(text, *force);
+        vectors(text, &[at, direction]);
+    }
+}
+
+fn masses(text: &mut String, bodies: &[Body]) {
+    for Body { name: _, mass, position } in bodies {
+        text.push_str(" mass");
+        number(text, *mass);
+        vectors(text, &[position]);
+    }
+}
+
+fn vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
+    for value in vectors.iter().flat_map(|vector| vector.iter()) {
+        number(text, *value);
+    }
+}
+
+fn optional(text: &mut String, value: Option<f64>) {
+    match value {
+        Some(value) => number(text, value),
+        None => text.push_str(" rigid"),
+    }
+}
+
+/// Twelve digits: what a change of unit leaves of a number. Zero has no sign.
+fn number(text: &mut String, value: f64) {
+    let _ = write!(text, " {:.11e}", value + 0.0);
+}
