@@ -114,6 +114,22 @@ fn a_mirrored_arm_is_not_trusted() {
 }
 
 #[test]
+fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
+    let declared = |rules: &str| {
+        let free = format!("'joint3.a' = {{ sigma_mm = 5 }}\n{rules}");
+        parallel(&format!("{free}\n[[effect]]\njoint-harmonic = {{ joint = 3, orders = [2] }}"))
+    };
+    let find = |rules: &str, truth: &str, size: f64| {
+        let problem = declared(rules);
+        let (rows, split) = measured(&problem, &[(truth, size)]);
+        identify(&problem, &rows, &split, &Options::default()).unwrap().distrust
+    };
+    assert_eq!(find("'joint-harmonic.*' = { sigma_deg = 0.01 }", "joint-harmonic[3].sin2", 0.02), None);
+    let angle = find("'joint3.alpha' = { sigma_deg = 0.01 }", "joint3.alpha", 0.02);
+    assert!(matches!(angle, Some(Distrust::BeyondPrior { .. })), "{angle:?}");
+}
+
+#[test]
 fn stage_by_stage_settles_on_two_hundred_poses() {
     let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);

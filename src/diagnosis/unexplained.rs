@@ -16,6 +16,8 @@ use crate::study::ErrorSummary;
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
 const BETTER: f64 = 6.0;
 
+/// A correction without a cause is worth stating where it takes poses that were left out to this part of their rms error.
+const WORTHWHILE: f64 = 0.95;
 /// Poses that are enough to find a place.
 const ENOUGH: usize = 1000;
 /// Splines whose places and quantities are looked at for single bumps and steps.
@@ -32,7 +34,7 @@ pub struct Unexplained {
     pub depends_on: Vec<String>,
     /// Probability that it is chance, corrected for the places and quantities tried.
     pub p_value: f64,
-    /// What an empirical correction gains; `None` where it does not predict poses that were left out.
+    /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out.
     pub correction: Option<Correction>,
 }
 
@@ -188,8 +190,9 @@ pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, le
     let rms = |squares: f64| (3.0 * squares / coordinates).sqrt() * fitted.sigma;
     let validated = linear.cross_validate(&data.block).zip(with.cross_validate(&data.block));
     let correction = validated
-        .filter(|(without, with)| with < without)
-        .map(|(without, with)| correct(fitted, data, &generic, (rms(without), rms(with))));
+        .map(|(without, with)| (rms(without), rms(with)))
+        .filter(|(without, with)| *with < WORTHWHILE * without)
+        .map(|validated| correct(fitted, data, &generic, validated));
     let depends_on = match generic.of {
         // Without a column for it, the order of the rows stands for time.
         Quantity::Elapsed if !data.measurements.time_measured => "row".to_owned(),

@@ -83,7 +83,7 @@ impl fmt::Display for Distrust {
 /// The parameter of the arm's geometry that lies furthest beyond its prior, if that is out of all proportion.
 pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> {
     let ratio = |(k, parameter): (usize, &Parameter)| match parameter.slot {
-        Slot::Joint { field, .. } if JointField::GEOMETRY.contains(&field) => {
+        Slot::Joint { field, .. } if JointField::GEOMETRY.contains(&field) && parameter.driver.is_constant() => {
             parameter.sigma.map(|sigma| (k, x[k].abs() / sigma))
         }
         _ => None,

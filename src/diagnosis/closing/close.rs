@@ -41,7 +41,8 @@ pub struct Found {
     pub estimates: Vec<Estimate>,
     /// Candidates that these data cannot tell from it, best first.
     pub alternatives: Vec<Effect>,
-    /// Error on held-out poses once it was in the model.
+    /// Error on held-out poses after the first round that had it in the model, and none of what was dropped later; at the
+    /// end, if there is no such round.
     pub held_out_after: ErrorSummary,
 }
 
@@ -186,9 +187,12 @@ fn found(rounds: &Rounds, fitted: &Fitted, structured: bool) -> Vec<Found> {
     let library = fitted.library(rounds.data, &candidates, &rounds.generics);
     let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
     let tested = rounds.tested(fitted);
+    let added = rounds.added(fitted);
     let first_with = |effect: &Effect| {
-        let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known) || covers(known, effect));
-        rounds.steps.iter().find(holds).map_or(fitted.found.fitted.held_out, |step| step.held_out)
+        let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
+        let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known));
+        let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
+        step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| Found {
         p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
@@ -197,5 +201,5 @@ fn found(rounds: &Rounds, fitted: &Fitted, structured: bool) -> Vec<Found> {
         held_out_after: first_with(&effect),
         effect,
     };
-    rounds.added(fitted).into_iter().map(one).collect()
+    added.iter().cloned().map(one).collect()
 }

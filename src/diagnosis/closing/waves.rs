@@ -12,6 +12,8 @@ use super::super::candidates::{covers, joined};
 use super::super::data::Data;
 use super::super::fitted::{Fitted, with_generics};
 use super::super::generic::Generic;
+use super::pick::LEAVING;
+use super::retest::Retested;
 use super::rounds::Rounds;
 use crate::effect;
 use crate::parameter::{Driver, EffectParameter, Unit, rule_of};
@@ -45,7 +47,19 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     let found = (squares / waves.len() as f64).sqrt();
     let first = rounds.fit_few(with_scale(dense.clone(), found), &fitted)?;
     let scale = best_scale(&first, rounds.data, &rounds.generics, found);
-    Ok((rounds.fit_whole(with_scale(dense, scale), &first)?, Some(scale)))
+    let mut filled = rounds.fit_whole(with_scale(dense, scale), &first)?;
+    // What more waves explain need not be explained by anything else.
+    loop {
+        let tested = rounds.tested(&filled);
+        let leaves = |tested: &&Retested| tested.p >= LEAVING && !matches!(tested.effect, Effect::JointHarmonic { .. });
+        let leaving: Vec<&Effect> = tested.iter().filter(leaves).map(|tested| &tested.effect).collect();
+        if leaving.is_empty() {
+            return Ok((filled, Some(scale)));
+        }
+        let kept = rounds.added(&filled).into_iter().filter(|own| !leaving.contains(&own));
+        let effects = kept.fold(rounds.declared.clone(), |all, own| joined(&all, &own));
+        filled = rounds.fit_whole(filled.with_effects(&effects), &filled)?;
+    }
 }
 
 fn is_wave(driver: Driver) -> bool {
