@@ -1,6 +1,6 @@
 //! Which effects measurements in given poses would show, and from what size on.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
@@ -123,7 +123,8 @@ pub(super) fn with_linear<T>(
     let columns = library.fitted();
     let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
     priors.extend(library.let_go());
-    let linear = Linear::new(&columns, &DVector::zeros(columns.nrows()), &vec![0.0; priors.len()], &priors);
+    let (residual, x) = (DVector::zeros(columns.nrows()), vec![0.0; priors.len()]);
+    let linear = Linear::new(&columns, &residual, &x, &priors, &DMatrix::zeros(0, priors.len()));
     Ok(with(&library, &linear))
 }
 
