@@ -10,6 +10,7 @@ use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
+use flexcal::report::{commands_csv, poses_csv};
 use flexcal::rig::{Truth, simulate};
 use flexcal::study::{Options, Placement, compensate, identify};
 use nalgebra::Vector3;
@@ -173,5 +174,21 @@ fn redundancy_stays_near_the_seed() {
         let seed = rows.configuration(command.row);
         let step: f64 = command.configuration.iter().zip(seed).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         assert!(command.is_reached() && step < 0.2, "row {}: {step} rad", command.row);
+    }
+}
+
+#[test]
+fn words_with_a_comma_stay_one_cell() {
+    let problem = Problem::read(&case("problem.toml")).unwrap();
+    let mut targets = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);
+    targets.session.names = vec!["bench \"A\", east".to_owned()];
+    let arm = model(&problem, &targets);
+    let x = nalgebra::DVector::zeros(arm.parameters.len());
+    let commands = compensate(&problem, &arm, &x, &targets).unwrap();
+    for text in [commands_csv(&problem, &targets, &commands), poses_csv(&problem, &targets)] {
+        let mut table = csv::Reader::from_reader(text.as_bytes());
+        let place = table.headers().unwrap().iter().position(|name| name == "session").unwrap();
+        let words: Vec<String> = table.records().map(|row| row.unwrap()[place].to_owned()).collect();
+        assert_eq!(words, ["bench \"A\", east"; 3], "{text}");
     }
 }
