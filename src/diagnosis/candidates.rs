@@ -9,7 +9,7 @@ use crate::problem::{Effect, Problem};
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 
 /// Why an effect is not looked for that the problem could not declare as its rules are.
-const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
+pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
 /// Candidates of the catalogue that are not declared, divided into those that the data can show and the others.
 pub(super) struct Candidates {
