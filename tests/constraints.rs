@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use flexcal::diagnosis::trace;
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
 use flexcal::report::{estimate_json, estimate_text};
@@ -197,4 +198,18 @@ fn cost_of_bounds() {
             );
         }
     }
+}
+
+#[test]
+fn checks_are_of_what_a_constraint_leaves() {
+    // 10 mm less than the links have: the fit misses, and so must the residual that is checked.
+    let problem = problem(&constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 3690"));
+    let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], &problem).unwrap();
+    let split = Split::new(&problem, &measurements).unwrap();
+    let trace = trace(&problem, &measurements, &split, &Options::default()).unwrap();
+    assert_eq!(trace.fit.active_constraints.len(), 1);
+    let check = trace.findings.checks.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
+    let (checked, fitted) = (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());
+    assert!(check.failed() && fitted > 100.0, "{fitted}");
+    assert!((checked / fitted - 1.0).abs() < 0.1, "{checked} of {fitted}");
 }

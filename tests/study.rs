@@ -121,6 +121,20 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
+fn names_with_a_comma_stay_one_cell() {
+    let bench = Bench::new();
+    bench.edit("problem.toml", "[parameters]", "[[effect]]\njoint-coupling = { joint = 3, from = 2 }\n[parameters]");
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
+    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
+    for (name, column) in [("study.csv", "largest_bias_of"), ("parameters.csv", "parameter")] {
+        let mut table = csv::Reader::from_path(bench.path("out").join(name)).unwrap();
+        let place = table.headers().unwrap().iter().position(|name| name == column).unwrap();
+        let names: Vec<String> = table.records().map(|row| row.unwrap()[place].to_owned()).collect();
+        assert!(name == "study.csv" || names.iter().any(|name| name == "joint-coupling[3,2].factor"), "{names:?}");
+    }
+}
+
+#[test]
 fn threads_shares_and_order_change_nothing() {
     let bench = Bench::new();
     let campaign = bench.campaign();

@@ -94,7 +94,7 @@ impl Fitted {
                 gradient[j] += self.found.x[k] / (sigma * sigma);
             }
         }
-        Normal::new(columns, priors, &gradient).step
+        Normal::new(columns, priors, &gradient, &self.closed_among(columns.ncols())).step
     }
 }
 

@@ -2,11 +2,14 @@
 
 use super::data::Data;
 use crate::effect::{self, Candidate, FAMILIES};
-use crate::parameter::holds_all;
+use crate::parameter::{holds_all, refuses};
 use crate::problem::{Effect, Problem};
 
 /// Why an effect that the rules of the problem hold at zero is not looked for.
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
+
+/// Why an effect is not looked for that the problem could not declare as its rules are.
+pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
 /// Candidates of the catalogue that are not declared, divided into those that the data can show and the others.
 pub(super) struct Candidates {
@@ -20,12 +23,12 @@ impl Candidates {
         let all = FAMILIES.iter().flat_map(|family| (family.candidates)(problem, &conditions));
         let mut found = Self { testable: Vec::new(), untestable: Vec::new() };
         for Candidate { effect, untestable } in all {
+            let parameters = || effect::parameters_of(&effect, problem);
             match untestable {
                 _ if problem.effects.iter().any(|declared| covers(&declared.effect, &effect)) => {}
                 Some(reason) => found.untestable.push((effect, reason)),
-                None if holds_all(problem, &effect::parameters_of(&effect, problem)) => {
-                    found.untestable.push((effect, HELD_FIXED));
-                }
+                None if holds_all(problem, &parameters()) => found.untestable.push((effect, HELD_FIXED)),
+                None if refuses(problem, &parameters()) => found.untestable.push((effect, REFUSED)),
                 None => found.testable.push(effect),
             }
         }

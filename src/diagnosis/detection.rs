@@ -1,6 +1,6 @@
 //! Which effects measurements in given poses would show, and from what size on.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
@@ -56,7 +56,8 @@ pub struct Size {
     pub unit: Unit,
     /// 1 σ of the catalogue's prior, SI: no realistic effect is larger by much.
     pub prior: f64,
-    /// In the direction (phase, axis) that is hardest to see, SI; `None` where the fitted parameters take it up wholly.
+    /// In the direction (phase, axis) that is hardest to see, SI; `None` where the fitted parameters take it up wholly,
+    /// or leave hardly any degree of freedom to judge it by.
     pub worst: Option<f64>,
     /// In the direction that is easiest to see, SI.
     pub best: Option<f64>,
@@ -123,7 +124,8 @@ pub(super) fn with_linear<T>(
     let columns = library.fitted();
     let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
     priors.extend(library.let_go());
-    let linear = Linear::new(&columns, &DVector::zeros(columns.nrows()), &vec![0.0; priors.len()], &priors);
+    let (residual, x) = (DVector::zeros(columns.nrows()), vec![0.0; priors.len()]);
+    let linear = Linear::new(&columns, &residual, &x, &priors, &DMatrix::zeros(0, priors.len()));
     Ok(with(&library, &linear))
 }
 
@@ -131,7 +133,7 @@ pub(super) fn with_linear<T>(
 pub(super) fn sizes(problem: &Problem, library: &Library, linear: &Linear, effect: &Effect, tries: f64) -> Vec<Size> {
     let score = linear.score(&library.columns(effect));
     let test = ScanTest::new(score.rank(), linear.expected_freedom(), tries);
-    let needed = test.map(|test| test.noncentrality(POWER));
+    let needed = test.and_then(|test| test.noncentrality(POWER));
     let parameters = effect::parameters_of(effect, problem);
     let mut groups: Vec<(Unit, Vec<usize>)> = Vec::new();
     for (k, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0) {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
 use super::generic::Generic;
-use super::trace::{Library, Linear};
+use super::trace::{Library, Linear, open};
 use crate::effect;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::parameter::Slot;
@@ -19,6 +19,8 @@ pub(super) struct Fitted {
     pub found: Identification,
     /// Parameters that were fitted to the identification rows and rest on no bound.
     pub unknowns: Vec<usize>,
+    /// Rows of the constraints that hold them, shape = (constraints, unknowns).
+    closed: DMatrix<f64>,
     /// 1 σ of a coordinate in rows without one of their own [m].
     pub sigma: f64,
 }
@@ -38,12 +40,17 @@ impl Fitted {
             let name = &model.parameters[k].name;
             found.unknowns.contains(name) && found.estimates[k].at_bound.is_none()
         };
-        let unknowns = (0..model.parameters.len()).filter(free).collect();
+        let unknowns: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
+        let coefficient = |i: usize, j: usize| -> f64 {
+            let terms = &model.constraints[found.active_constraints[i].constraint].terms;
+            terms.iter().filter(|(k, _)| *k == unknowns[j]).map(|(_, coefficient)| coefficient).sum()
+        };
+        let closed = DMatrix::from_fn(found.active_constraints.len(), unknowns.len(), coefficient);
         let sigma = match found.noise {
             Noise::Estimated(sigma) => sigma,
             Noise::Declared | Noise::Unknown => placement.sigma(data.measurements, data.rows(), &problem),
         };
-        Ok(Self { problem, model, found, unknowns, sigma })
+        Ok(Self { problem, model, found, unknowns, closed, sigma })
     }
 
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
@@ -118,8 +125,9 @@ impl Fitted {
             kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma).collect();
         x.resize(x.len() + library.let_go().len(), 0.0);
         priors.extend(library.let_go());
+        let closed = self.closed.select_columns(&kept).resize_horizontally(x.len(), 0.0);
         let places: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
-        let mut linear = Linear::new(&columns.select_columns(&places), &residual, &x, &priors);
+        let mut linear = Linear::new(&columns.select_columns(&places), &residual, &x, &priors, &closed);
         for generic in generics {
             linear.add(&generic.columns(library));
         }
@@ -184,7 +192,12 @@ impl Fitted {
                 pull[j] += self.found.x[k] / (sigma * sigma);
             }
         }
-        Normal::new(&columns, priors, &pull)
+        Normal::new(&columns, priors, &pull, &self.closed_among(columns.ncols()))
+    }
+
+    /// Rows of the constraints that hold the fit, for the unknowns and further columns up to `n`.
+    pub fn closed_among(&self, n: usize) -> DMatrix<f64> {
+        self.closed.clone().resize_horizontally(n, 0.0)
     }
 
     /// Columns of some of the model's parameters, shape = (3 N, k).
@@ -218,7 +231,7 @@ pub(super) struct Given {
     pub part: DVector<f64>,
 }
 
-/// The inverse of a normal matrix; 0 in directions that neither data nor priors see.
+/// The inverse of a normal matrix; 0 in directions that neither data nor priors see, or that constraints hold.
 pub(super) struct Normal {
     pub inverse: DMatrix<f64>,
     /// σ of the priors of the first columns.
@@ -231,8 +244,13 @@ pub(super) struct Normal {
 const UNSEEN: f64 = 1e-12;
 
 impl Normal {
-    /// Of columns, shape = (3 N, n), with priors on the first of them, and the gradient g.
-    pub fn new(columns: &DMatrix<f64>, priors: Vec<Option<f64>>, gradient: &DVector<f64>) -> Self {
+    /// Of columns, shape = (3 N, n), with priors on the first of them, the gradient g, and rows of constraints that hold.
+    pub fn new(
+        columns: &DMatrix<f64>,
+        priors: Vec<Option<f64>>,
+        gradient: &DVector<f64>,
+        closed: &DMatrix<f64>,
+    ) -> Self {
         let mut matrix = columns.transpose() * columns;
         for (j, sigma) in priors.iter().enumerate() {
             if let Some(sigma) = sigma {
@@ -244,11 +262,21 @@ impl Normal {
         if n == 0 {
             return Self { inverse: matrix, priors, step: DVector::zeros(0) };
         }
-        let eigen = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
-        let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
-        let scaled = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
+        let matrix = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / (scale[i] * scale[j]));
+        let scaled = match open(closed, &scale) {
+            Some(open) if open.is_empty() => DMatrix::zeros(n, n),
+            Some(open) => &open * seen_inverse(open.transpose() * matrix * &open) * open.transpose(),
+            None => seen_inverse(matrix),
+        };
         let inverse = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j]));
         let step = -(&inverse * gradient);
         Self { inverse, priors, step }
     }
+}
+
+/// The inverse of a normal matrix of unit diagonal, or of a part of one; 0 in directions that nothing sees.
+fn seen_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = matrix.symmetric_eigen();
+    let inverted = eigen.eigenvalues.map(|value| if value > UNSEEN { value.recip() } else { 0.0 });
+    &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose()
 }

@@ -21,7 +21,7 @@ mod tracing;
 mod unexplained;
 
 pub use apart::Apart;
-pub use candidates::HELD_FIXED;
+pub use candidates::{HELD_FIXED, REFUSED};
 pub use checks::{Check, Driver, Findings, Outcome, Remainder, Sequence, Test, Untestable, check};
 pub use closing::{Closure, Found, Interval, Step, Verdict, WAVES, close};
 pub use detection::{Detectable, Detection, Size, detectable};

@@ -8,6 +8,8 @@ use super::closing::LEVEL;
 const HALVINGS: usize = 24;
 /// Standard deviations of a Poisson distribution beyond which nothing of it counts.
 const FAR: f64 = 9.0;
+/// Largest noncentrality that is looked at: that of an effect some 30 times its error.
+const MOST: f64 = 1024.0;
 
 /// The test that a scan makes of one candidate: part = squares gained / all squares, Beta(k/2, (ν − k)/2) where there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,13 +59,17 @@ impl ScanTest {
         beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))
     }
 
-    /// The noncentrality at which the candidate is found with probability `power`.
-    pub fn noncentrality(&self, power: f64) -> f64 {
+    /// The noncentrality at which the candidate is found with probability `power`; `None` where hardly anything is left to
+    /// judge by, so that one beyond [`MOST`] would not do.
+    pub fn noncentrality(&self, power: f64) -> Option<f64> {
         let mut most = 32.0;
-        while self.power(most) < power && most < 1000.0 {
+        while self.power(most) < power {
+            if most >= MOST {
+                return None;
+            }
             most *= 2.0;
         }
-        halved(|lambda| self.power(lambda) < power, (0.0, most))
+        Some(halved(|lambda| self.power(lambda) < power, (0.0, most)))
     }
 }
 
@@ -92,9 +98,17 @@ mod tests {
             let test = ScanTest::new(k, freedom, tries);
             assert!(test.is_some_and(|test| (test.threshold - threshold).abs() < 1e-6), "{test:?}");
             assert!(test.is_some_and(|test| (test.power(lambda) - power).abs() < 1e-5), "{test:?} {power}");
-            let needed = test.map_or(0.0, |test| test.noncentrality(0.8));
+            let needed = test.and_then(|test| test.noncentrality(0.8)).unwrap_or(0.0);
             assert!(test.is_some_and(|test| (test.power(needed) - 0.8).abs() < 1e-4), "{needed}");
         }
         assert_eq!(ScanTest::new(0, 84.0, 1.0), None);
+    }
+
+    #[test]
+    fn two_degrees_of_freedom_find_nothing_among_many() {
+        let test = ScanTest::new(1, 3.0, 2000.0);
+        assert!(test.is_some_and(|test| test.power(MOST) < 0.1 && test.noncentrality(0.8).is_none()), "{test:?}");
+        let sure = ScanTest::new(1, 300.0, 2000.0).and_then(|test| test.noncentrality(0.8));
+        assert!(sure.is_some_and(|lambda| lambda < 50.0), "{sure:?}");
     }
 }

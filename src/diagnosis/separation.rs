@@ -32,8 +32,8 @@ impl Side {
     /// p to be expected of it beside the other, if it has this size [SI] in the direction that is hardest to tell; 1 where
     /// nothing tells it.
     pub fn expected_p(&self, size: f64) -> f64 {
-        let told = self.test.zip(self.told.worst);
-        told.map_or(1.0, |(test, least)| test.expected_p(test.noncentrality(POWER) * (size / least).powi(2)))
+        let told = self.test.and_then(|test| Some((test, test.noncentrality(POWER)?, self.told.worst?)));
+        told.map_or(1.0, |(test, needed, least)| test.expected_p(needed * (size / least).powi(2)))
     }
 }
 

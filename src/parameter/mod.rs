@@ -12,7 +12,7 @@ pub use constraint::{LinearConstraint, constrain};
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
 pub use resolve::{EffectParameter, resolve};
-pub(crate) use resolve::{holds_all, rule_of};
+pub(crate) use resolve::{holds_all, refuses, rule_of};
 
 /// A free parameter.
 #[derive(Debug, Clone, PartialEq)]

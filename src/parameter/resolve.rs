@@ -50,6 +50,10 @@ impl EffectParameter {
     pub fn unit(&self) -> Unit {
         unit(self.slot, self.driver)
     }
+
+    fn is_named(&self, rule: &ParameterRule) -> bool {
+        matches(&rule.pattern, &self.name) || matches(&rule.pattern, &self.plain)
+    }
 }
 
 /// Free parameters of `problem` with one base per name in `bases` and one target per name in `targets`.
@@ -115,11 +119,7 @@ pub fn resolve(
 
 /// The rule of `problem` that decides on a parameter of an effect, declared or not.
 pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<&'a ParameterRule> {
-    let speaks = |rule: &&ParameterRule| {
-        let named = matches(&rule.pattern, &parameter.name) || matches(&rule.pattern, &parameter.plain);
-        named && fits(rule, parameter.unit())
-    };
-    problem.parameters.iter().rev().find(speaks)
+    problem.parameters.iter().rev().find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
 }
 
 /// The mistake of a pattern that is about effects which nothing declares, if it is one.
@@ -139,6 +139,14 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
 pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let held = |parameter| rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed));
     !parameters.is_empty() && parameters.iter().all(held)
+}
+
+/// Whether a rule of `problem` for effects alone would be a mistake with these parameters, for it gives none of their kind.
+pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
+    let none = [String::new()];
+    let is_for_arm = |rule| candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule));
+    let misses = |rule: &ParameterRule| parameters.iter().any(|own| own.is_named(rule) && !fits(rule, own.unit()));
+    problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
 
 /// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, effects.

@@ -67,8 +67,9 @@ fn joint(text: &mut String, joint: &Joint) {
 }
 
 fn beam(text: &mut String, beam: &Beam) {
-    let Beam { name: _, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
-    text.push_str(" beam");
+    // Its parameters and effects go by its name.
+    let Beam { name, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
+    let _ = write!(text, " beam {name:?}");
     number(text, *mass);
     for rigidity in [ea, ei_y, ei_z, gj] {
         optional(text, *rigidity);

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::cells::quoted;
 use super::json::to_text;
 use super::quantity::number;
 use crate::measurement::{Labels, Measurements};
@@ -37,7 +38,7 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         .collect();
     let mut lines: Vec<String> = Vec::with_capacity(commands.len() + 1);
     let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| number(values[row], 4));
-    let word = |labels: &Labels, row: usize| labels.names[labels.of_row[row]].clone();
+    let word = |labels: &Labels, row: usize| quoted(&labels.names[labels.of_row[row]]);
     let has_sessions = targets.session.names.iter().any(|name| !name.is_empty());
     let mut header: Vec<String> = joints.iter().map(|(j, unit, _)| format!("q{}_{unit}", j + 1)).collect();
     let optional = [

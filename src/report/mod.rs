@@ -3,6 +3,7 @@
 //! - [`estimate_text`], [`compare_text`], [`commands_text`]: tables of one command each, with their JSON beside them.
 //! - [`trace`](trace_text), [`closing`](loop_text): the residual's story, as text, JSON, Markdown and a problem file.
 
+mod cells;
 mod check;
 mod closing;
 mod commands;

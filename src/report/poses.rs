@@ -1,5 +1,6 @@
 //! Poses to measure, as a table.
 
+use super::cells::quoted;
 use super::quantity::number;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{HeldOut, JointKind, Problem};
@@ -11,7 +12,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let moving: Vec<(usize, JointKind)> = problem.joints.iter().map(|joint| joint.kind).enumerate().collect();
     let moving: Vec<(usize, JointKind)> = moving.into_iter().filter(|(_, kind)| *kind != JointKind::Fixed).collect();
     let split = match &problem.data.held_out {
-        Some(HeldOut::Column(name)) => Some(name.clone()),
+        Some(HeldOut::Column(name)) => Some(quoted(name)),
         _ => None,
     };
     let sessions = poses.session.names.iter().any(|name| !name.is_empty());
@@ -35,7 +36,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let mut lines = vec![header.join(",")];
     for row in 0..poses.len() {
         let value = |column: &Option<Vec<f64>>, factor: f64| column.as_ref().map(|values| plain(values[row] * factor));
-        let word = |labels: &Labels| labels.names[labels.of_row[row]].clone();
+        let word = |labels: &Labels| quoted(&labels.names[labels.of_row[row]]);
         let q = poses.configuration(row);
         let mut cells = vec![(row + 1).to_string()];
         cells.extend(split.as_ref().map(|_| "identification".to_owned()));

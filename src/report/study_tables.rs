@@ -1,5 +1,6 @@
 //! `study.csv`, `parameters.csv`, `timing.csv`: tables for other programs, SI units except where a column says otherwise.
 
+use super::cells::quoted;
 use crate::campaign::{Campaign, CellResult, Results};
 
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
@@ -24,7 +25,7 @@ pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
             number(tally.reduced_chi2.mean()),
             number(cell.coverage()),
             number(bias.map(|(_, ratio)| ratio)),
-            bias.map(|(parameter, _)| parameter.name.clone()).unwrap_or_default(),
+            bias.map(|(parameter, _)| quoted(&parameter.name)).unwrap_or_default(),
             number(tally.iterations.mean()),
             number(tally.iterations.largest()),
         ];
@@ -40,7 +41,7 @@ pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
         cell.parameters(campaign).map(move |result| {
             let cells = [
                 leading(index, cell),
-                result.parameter.name.clone(),
+                quoted(&result.parameter.name),
                 result.unit().to_owned(),
                 result.fits.to_string(),
                 number(result.bias),

@@ -9,6 +9,8 @@ use crate::solver::AtBound;
 /// A constraint that holds parameters back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveConstraint {
+    /// Which of the model's constraints.
+    pub constraint: usize,
     /// The limit in words: `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
     /// Which limit.
@@ -25,7 +27,7 @@ impl ActiveConstraint {
             let [lower, upper] = &constraint.limits;
             let limit = if held.side == AtBound::Lower { lower } else { upper };
             let words = format!("{} {}", constraint.sum, limit.as_deref().unwrap_or_default());
-            Self { words, side: held.side, location: constraint.location.clone() }
+            Self { constraint: held.constraint, words, side: held.side, location: constraint.location.clone() }
         };
         held.iter().map(of).collect()
     }

@@ -1,9 +1,16 @@
 //! What the rules of `[parameters]` make of the parameters of effects.
 
+use flexcal::diagnosis::detectable;
+use flexcal::effect::name;
 use flexcal::parameter::Parameter;
 use flexcal::problem::Problem;
 
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::catalogue::declared;
 use crate::common::arms::{ODD, parse};
+use crate::common::made::{at_random, model_of};
 
 const EFFECTS: &str = "
 [[effect]]
@@ -132,5 +139,25 @@ fn rules_that_do_not_fit_are_mistakes() {
     ] {
         let error = resolved(rule).unwrap_err();
         assert!(error.contains(words), "{rule}: {error}");
+    }
+}
+
+#[test]
+fn what_a_rule_could_not_take_is_not_looked_for() {
+    let (arm, _) = ODD.split_once("[parameters]").unwrap();
+    // In millimetres, for play of the slide: the other joints turn.
+    let rule = "\"backlash.*\" = { sigma_mm = 1 }";
+    let text =
+        format!("{arm}[[effect]]\nbacklash = {{ joint = 4 }}\n[parameters]\n{rule}\n[data]\nposition_sigma_mm = 0.1\n");
+    let problem = parse(&text);
+    let poses = at_random(&problem, 60, 1.5, &mut ChaCha8Rng::seed_from_u64(1));
+    let detection = detectable(&problem, &poses).unwrap();
+    let refused: Vec<&str> =
+        detection.untestable.iter().filter(|(_, why)| why.contains("in another unit")).map(|(e, _)| name(e)).collect();
+    assert_eq!(refused, ["backlash"; 3], "{:?}", detection.untestable);
+    // Whatever is looked for can be declared.
+    for found in &detection.effects {
+        let both = [problem.effects[0].effect.clone(), found.effect.clone()];
+        assert!(!model_of(&declared(&problem, &both), &poses).parameters.is_empty(), "{:?}", found.effect);
     }
 }

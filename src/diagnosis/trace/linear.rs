@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::open::open;
 use super::score::{Score, Sums};
 
 /// A direction is taken to be spanned by others when less than this part of its length is new.
@@ -26,8 +27,15 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
-    /// From the Jacobian ∂r/∂x, shape = (3 N, n), the residual r, and for each unknown its place and prior σ.
-    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, x: &[f64], priors: &[Option<f64>]) -> Self {
+    /// From the Jacobian ∂r/∂x, shape = (3 N, n), the residual r, for each unknown its place and prior σ, and the rows of
+    /// the constraints that hold them, shape = (constraints, n).
+    pub fn new(
+        jacobian: &DMatrix<f64>,
+        residual: &DVector<f64>,
+        x: &[f64],
+        priors: &[Option<f64>],
+        closed: &DMatrix<f64>,
+    ) -> Self {
         let (rows, n) = jacobian.shape();
         let known: Vec<(usize, f64)> = priors.iter().enumerate().filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
         let mut all = DMatrix::zeros(rows + known.len(), n);
@@ -37,6 +45,11 @@ impl Linear {
         for (row, &(j, sigma)) in known.iter().enumerate() {
             all[(rows + row, j)] = sigma.recip();
             long[rows + row] = x[j] / sigma;
+        }
+        let scale: Vec<f64> = all.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+        if let Some(open) = open(closed, &scale) {
+            all.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
+            all *= open;
         }
         if let Some(basis) = orthonormal(&all) {
             let along = basis.tr_mul(&long);

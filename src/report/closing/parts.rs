@@ -1,9 +1,11 @@
 //! Parts of the loop's story.
 
+use std::fmt::Write as _;
+
 use super::super::document::{Block, Point, Table};
 use super::super::effect;
 use super::super::quantity::number;
-use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, Unexplained, Verdict};
+use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
 use crate::problem::{JointKind, Problem};
 use crate::study::ErrorSummary;
 
@@ -122,13 +124,15 @@ pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
         "" => format!("Structure is left: {place} ({}).", effect::p(*p_value)),
         on => format!("Structure is left: {place}, depending on {on} ({}).", effect::p(*p_value)),
     }];
-    let held = closure.before.untestable.iter().filter(|(_, reason)| *reason == HELD_FIXED).count();
-    sentences.push(match held {
-        0 => "No effect of the catalogue explains it.".to_owned(),
-        _ => format!(
-            "No effect of the catalogue explains it; {held} were not tried because [parameters] holds them fixed."
-        ),
-    });
+    let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();
+    let mut catalogue = "No effect of the catalogue explains it".to_owned();
+    for (why, words) in [(HELD_FIXED, "holds them fixed"), (REFUSED, "speaks of them in another unit")] {
+        match untried(why) {
+            0 => {}
+            count => _ = write!(catalogue, "; {count} were not tried because [parameters] {words}"),
+        }
+    }
+    sentences.push(catalogue + ".");
     match correction {
         None => {
             sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
