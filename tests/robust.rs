@@ -4,18 +4,19 @@
 
 use std::path::{Path, PathBuf};
 
+use flexcal::diagnosis::{Verdict, close};
 use flexcal::measurement::{Measurements, Split};
-use flexcal::problem::{Problem, Robust, RobustLoss};
+use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
 use flexcal::study::{Identification, Options, identify};
 use nalgebra::Vector3;
 
 /// Length of a gross error [m].
 const GROSS: f64 = 5e-3;
 
-fn lunar() -> (Problem, Measurements, Split) {
+fn lunar(case: &str) -> (Problem, Measurements, Split) {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&cases).unwrap();
-    let files: [PathBuf; 1] = [cases.join("h-none-large.csv")];
+    let files: [PathBuf; 1] = [cases.join(case)];
     let (measurements, _) = Measurements::read(&files, &problem).unwrap();
     let split = Split::new(&problem, &measurements).unwrap();
     (problem, measurements, split)
@@ -37,7 +38,7 @@ fn rows(result: &Identification) -> Vec<usize> {
 
 #[test]
 fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
-    let (mut problem, mut measurements, split) = lunar();
+    let (mut problem, mut measurements, split) = lunar("h-none-large.csv");
     assert_eq!(split.identification.len(), 200);
     let clean = identify(&problem, &measurements, &split, &Options::default()).unwrap();
     assert!(clean.outliers.is_empty(), "{:?}", clean.outliers);
@@ -83,7 +84,7 @@ fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
 
 #[test]
 fn a_robust_loss_costs_little_on_clean_data() {
-    let (mut problem, measurements, split) = lunar();
+    let (mut problem, measurements, split) = lunar("h-none-large.csv");
     let squares = identify(&problem, &measurements, &split, &Options::default()).unwrap();
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: Some(1e3) });
     let wide = identify(&problem, &measurements, &split, &Options::default()).unwrap();
@@ -92,4 +93,20 @@ fn a_robust_loss_costs_little_on_clean_data() {
     let huber = identify(&problem, &measurements, &split, &Options::default()).unwrap();
     let ratio = huber.fitted.held_out.rms.norm / squares.fitted.held_out.rms.norm;
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+#[test]
+fn gross_errors_hide_no_effect_from_the_loop_where_the_loss_is_robust() {
+    let (mut problem, mut measurements, split) = lunar("b-joint-harmonic.csv");
+    for (row, along) in [(split.identification[5], Vector3::x()), (split.identification[19], Vector3::z())] {
+        measurements.positions[row] += 10.0 * GROSS * along;
+    }
+    let found = |problem: &Problem| close(problem, &measurements, &split, &Options::default()).unwrap();
+    let is_wave = |effect: &Effect| matches!(effect, Effect::JointHarmonic { joint: 2, .. });
+    let squares = found(&problem);
+    assert!(!squares.effects.iter().any(|own| is_wave(&own.effect)), "{:?}", squares.effects);
+    problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
+    let robust = found(&problem);
+    assert_eq!(robust.verdict, Verdict::Explained);
+    assert!(robust.effects.len() == 1 && is_wave(&robust.effects[0].effect), "{:?}", robust.effects);
 }

@@ -11,6 +11,9 @@ use crate::parameter::Slot;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 use crate::study::{Identification, IdentifyError, Noise, Options, Placement, identify};
 
+/// By what σ grows where a position says nothing: gross errors, if the loss is robust, decide on no effect.
+const NOTHING_SAID: f64 = 1e6;
+
 /// A fitted problem.
 #[derive(Clone)]
 pub(super) struct Fitted {
@@ -105,7 +108,12 @@ impl Fitted {
                 places.push(generic.slot);
             }
         }
-        let poses = self.poses(data, rows);
+        let mut poses = self.poses(data, rows);
+        if self.problem.robust.is_some() {
+            let is_outlier = |row: &usize| self.found.outliers.iter().any(|outlier| outlier.row == *row);
+            let gross = poses.iter_mut().zip(rows).filter(|(_, row)| is_outlier(row));
+            gross.for_each(|(pose, _)| pose.sigma *= NOTHING_SAID);
+        }
         Library::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, &places))
     }
 
