@@ -93,6 +93,9 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
             (series, poses.len(), workspace, elsewhere)
         }
     };
+    if count == 0 {
+        return Err(DesignError::NoPoses);
+    }
     let site = Site::new(problem, &[&series])?;
     let parameters = &site.model.parameters;
     let (series, told) = match judged {

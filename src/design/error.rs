@@ -39,6 +39,9 @@ pub enum DesignError {
         /// The problem file.
         file: PathBuf,
     },
+    /// No pose was asked for, or a table has none.
+    #[error("no pose to plan or to judge")]
+    NoPoses,
     /// Fewer candidates than poses.
     #[error("--poses {poses}: there are only {candidates} candidates")]
     TooFewCandidates {

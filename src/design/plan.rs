@@ -94,6 +94,9 @@ pub fn plan(
     options: &PlanOptions,
 ) -> Result<Plan, DesignError> {
     let PlanOptions { poses, criterion, seed, .. } = *options;
+    if poses == 0 {
+        return Err(DesignError::NoPoses);
+    }
     let draw = |ranges: &Ranges, count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
     let (usual, ends) = match candidates {
         Candidates::Within(ranges) => {

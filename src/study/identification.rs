@@ -44,6 +44,9 @@ pub struct Options {
 /// Why an identification could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
+    /// There is no row to identify from.
+    #[error("no pose to identify from")]
+    NoPoses,
     /// Problem and data do not fit each other.
     #[error(transparent)]
     Input(#[from] InputError),
@@ -109,6 +112,9 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let clock = Instant::now();
     check_columns(problem, measurements)?;
+    if split.identification.is_empty() {
+        return Err(IdentifyError::NoPoses);
+    }
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
     if solver != SolverChoice::Bounded && model.is_bounded() {

@@ -91,6 +91,8 @@ fn a_plan_is_the_same_for_any_number_of_threads() {
         (plan.poses.configurations, plan.value.to_bits())
     };
     assert_eq!(run(1), run(3));
+    let nothing = plan(&problem, &rows, None, &PlanOptions { poses: 0, ..options });
+    assert!(matches!(nothing, Err(DesignError::NoPoses)));
     let options = PlanOptions { poses: 81, ..options };
     let refused = plan(&problem, &rows, None, &options);
     assert!(matches!(refused, Err(DesignError::TooFewCandidates { poses: 81, candidates: 80 })));
