@@ -1,9 +1,8 @@
 //! `gear-ratio`: the transmission ratio is off, Δθ = ε θ with θ = q as commanded.
 
 use super::conditions::STANDS_STILL;
-use super::place::{commanded, coordinate};
+use super::place::{command, commanded, coordinate};
 use super::{Candidate, Family, Term};
-use crate::parameter::Driver;
 use crate::problem::Effect;
 
 /// The family.
@@ -11,7 +10,7 @@ pub(super) const FAMILY: Family = Family {
     name: "gear-ratio",
     terms: |effect, problem| match effect {
         Effect::GearRatio { joint } => {
-            vec![Term::driven("error", coordinate(problem, *joint), Driver::Command(joint - 1), 0.01)]
+            vec![Term::driven("error", coordinate(problem, *joint), command(problem, *joint), 0.01)]
         }
         _ => Vec::new(),
     },

@@ -1,9 +1,8 @@
-//! `joint-coupling`: one joint turns another, Δθ_joint = k q_from.
+//! `joint-coupling`: one joint moves another, Δθ_joint = k q_from.
 
 use super::conditions::STANDS_STILL;
-use super::place::{commanded, coordinate};
+use super::place::{command, commanded, coordinate};
 use super::{Candidate, Family, Term};
-use crate::parameter::Driver;
 use crate::problem::Effect;
 
 /// The family.
@@ -11,7 +10,7 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-coupling",
     terms: |effect, problem| match effect {
         Effect::JointCoupling { joint, from } => {
-            vec![Term::driven("factor", coordinate(problem, *joint), Driver::Command(from - 1), 0.01)]
+            vec![Term::driven("factor", coordinate(problem, *joint), command(problem, *from), 0.01)]
         }
         _ => Vec::new(),
     },
@@ -25,7 +24,7 @@ pub(super) const FAMILY: Family = Family {
             .collect()
     },
     describe: |effect| match effect {
-        Effect::JointCoupling { joint, from } => format!("joint {from} turns joint {joint} along"),
+        Effect::JointCoupling { joint, from } => format!("joint {from} moves joint {joint} along"),
         _ => String::new(),
     },
 };

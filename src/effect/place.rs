@@ -1,6 +1,6 @@
 //! Names, places and arguments of effects.
 
-use crate::parameter::{JointField, Slot};
+use crate::parameter::{Driver, JointField, Slot};
 use crate::problem::effects::NAMES;
 use crate::problem::{Body, Effect, Joint, JointKind, Problem};
 
@@ -91,6 +91,11 @@ pub fn place(effect: &Effect) -> String {
 pub(super) fn coordinate(problem: &Problem, joint: usize) -> Slot {
     let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
     Slot::Joint { joint: joint - 1, field }
+}
+
+/// What a joint, counted from 1, is told.
+pub(super) fn command(problem: &Problem, joint: usize) -> Driver {
+    if slides(problem, joint) { Driver::Travel(joint - 1) } else { Driver::Command(joint - 1) }
 }
 
 /// Whether a joint, counted from 1, slides.

@@ -59,6 +59,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
     let joints = problem.joints.len();
     let driven = match parameter.driver {
         Driver::Command(joint)
+        | Driver::Travel(joint)
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
         | Driver::Spline { of: Quantity::Command(joint), .. } => joint < joints,

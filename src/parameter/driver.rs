@@ -11,8 +11,10 @@ pub enum Driver {
     Constant,
     /// 1, for what is added to a parameter that acts at the same place.
     Unit,
-    /// q of a joint [rad] or [m].
+    /// q of a joint that turns [rad].
     Command(usize),
+    /// q of a joint that slides [m].
+    Travel(usize),
     /// sin kq.
     Sine(usize, u32),
     /// cos kq.
@@ -88,7 +90,7 @@ impl Driver {
     pub fn value(self, setup: &Setup) -> f64 {
         match self {
             Self::Constant | Self::Unit => 1.0,
-            Self::Command(joint) => setup.configuration[joint],
+            Self::Command(joint) | Self::Travel(joint) => setup.configuration[joint],
             Self::Sine(joint, order) => (f64::from(order) * setup.configuration[joint]).sin(),
             Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
@@ -111,7 +113,7 @@ impl Driver {
     /// Whether it depends on what the joints are told.
     pub fn follows_commands(self) -> bool {
         match self {
-            Self::Command(_) | Self::Sine(..) | Self::Cosine(..) => true,
+            Self::Command(_) | Self::Travel(_) | Self::Sine(..) | Self::Cosine(..) => true,
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
                 matches!(of, Quantity::Command(_))
             }

@@ -66,7 +66,11 @@ pub enum Unit {
     PerLength,
     /// [m/s]
     Speed,
-    /// A small part: rad/rad, m/m, rad/m, m/rad
+    /// [m/rad]
+    LengthPerAngle,
+    /// [rad/m]
+    AnglePerLength,
+    /// A small part: rad/rad, m/m
     Ratio,
     /// A number of order 1
     Number,
@@ -91,6 +95,8 @@ impl Unit {
             Self::Mass => "kg",
             Self::PerLength => "1/m",
             Self::Speed => "m/s",
+            Self::LengthPerAngle => "m/rad",
+            Self::AnglePerLength => "rad/m",
             Self::Ratio | Self::Number => "1",
         }
     }
@@ -134,7 +140,9 @@ pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
         (Driver::Warming { .. }, Unit::Angle) => Unit::AnglePerDegree,
         (Driver::Warming { .. }, _) => Unit::LengthPerDegree,
         (Driver::Elapsed, _) => Unit::Speed,
-        (Driver::Command(_), _) => Unit::Ratio,
+        (Driver::Command(_), Unit::Length) => Unit::LengthPerAngle,
+        (Driver::Travel(_), Unit::Angle) => Unit::AnglePerLength,
+        (Driver::Command(_) | Driver::Travel(_), _) => Unit::Ratio,
         (_, unit) => unit,
     }
 }

@@ -23,6 +23,8 @@ impl Display {
             Unit::Flexibility => Self { factor: 1e6, symbol: "1/(MN·m²)".to_owned() },
             Unit::CurvaturePerDegree => Self { factor: 1e6, symbol: "µrad/(m·K)".to_owned() },
             Unit::PerDegree => Self { factor: 1e6, symbol: "10⁻⁶/K".to_owned() },
+            Unit::LengthPerAngle => Self { factor: 1e3, symbol: "mm/rad".to_owned() },
+            Unit::AnglePerLength => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°/m".to_owned() },
             Unit::Ratio => Self { factor: 1e3, symbol: "‰".to_owned() },
             Unit::Mass | Unit::PerLength | Unit::Number => Self { factor: 1.0, symbol: unit.symbol().to_owned() },
             Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
