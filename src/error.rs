@@ -11,6 +11,9 @@ use std::sync::Arc;
 pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::nearest;
 
+/// How UTF-16 text begins, in either order of its bytes.
+pub(crate) const BYTE_ORDER_MARKS: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
+
 /// A place in an input file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Location {

@@ -248,14 +248,19 @@ fn commands_beyond_the_limits_are_named_joint_by_joint() {
     bench.edit("arm/problem.toml", |text| text.replace("name = \"shoulder\"\n", limits));
     let data = fs::read_to_string(bench.path("arm/data.csv")).unwrap();
     let outside = |line: &str| !(-10.0..=60.0).contains(&line.split(',').nth(3).unwrap().parse::<f64>().unwrap());
+    let angle = |line: &str| line.split(',').nth(3).unwrap().parse::<f64>().unwrap();
+    let beyond = |line: &str| (-10.0 - angle(line)).max(angle(line) - 60.0);
+    let furthest = data.lines().skip(1).map(beyond).fold(0.0, f64::max);
+    let (first, worst) = (1..).zip(data.lines()).skip(1).find(|(_, line)| beyond(line) >= furthest).unwrap();
     let lines: Vec<usize> = data.lines().enumerate().skip(1).filter(|(_, l)| outside(l)).map(|(k, _)| k + 1).collect();
     assert!(lines.len() > 3);
     for command in ["identify", "trace"] {
         let warned = text(&bench.run(&[command, "arm"]).success().get_output().stderr);
         let expected = format!(
-            "data.csv:{}: joint 2: commanded beyond its limits (min_deg = -10, max_deg = 60) in {} rows",
-            lines[0],
-            lines.len()
+            "data.csv:{first}: joint 2: commanded beyond its limits (min_deg = -10, max_deg = 60) in {} rows, furthest here: \
+             q2_deg = {}",
+            lines.len(),
+            angle(worst)
         );
         assert!(warned.contains(&expected) && warned.matches("beyond").count() == 1, "{warned}");
     }

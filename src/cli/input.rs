@@ -42,7 +42,6 @@ impl Common {
         let (measurements, warnings) = Measurements::read(self.files(&problem), &problem)?;
         if !self.quiet {
             diagnostic::print_warnings(&warnings);
-            diagnostic::print_warnings(&measurements.beyond_limits(&problem));
         }
         let split = Split::new(&problem, &measurements)?;
         Ok(Input { problem, measurements, split })

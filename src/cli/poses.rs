@@ -17,7 +17,7 @@ pub struct Source {
     /// Tables of poses to take, with the columns of measurements; positions are not needed
     #[arg(long, value_name = "FILE.csv", num_args = 1..)]
     pub candidates: Vec<PathBuf>,
-    /// Where poses may lie: [poses] of this file, instead of the limits of the joints (min_deg, max_deg)
+    /// Where poses may lie: [poses] of this file or of the one in this folder, instead of the limits of the joints (min_deg, max_deg)
     #[arg(long, value_name = "TRUTH.toml")]
     pub truth: Option<PathBuf>,
     /// Seed of every random number

@@ -4,10 +4,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
-use flexcal::problem::Problem;
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::rig::{Simulation, Truth, simulate};
 
-use super::{Outcome, output};
+use super::{Outcome, diagnostic, output};
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]
@@ -17,7 +17,7 @@ use super::{Outcome, output};
 pub struct Arguments {
     /// A problem.toml, or the folder that holds one
     problem: PathBuf,
-    /// How the true arm differs from the problem, and from where poses are drawn
+    /// How the true arm differs from the problem, and from where poses are drawn; or the folder that holds it
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
     /// Number of poses
@@ -46,27 +46,42 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = simulation.truth_json();
     let table = output::write(&folder, "measurements.csv", &simulation.csv())?;
     output::write(&folder, "truth.json", &json)?;
+    // A fraction is divided by whoever reads the rows.
+    let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. })) || simulation.held_out() > 0;
     if arguments.json {
         output::print(&json)?;
     } else if !arguments.quiet {
-        output::print(&summary(&simulation, &arguments.problem, &table))?;
+        output::print(&summary(&simulation, &table))?;
+        if divided {
+            output::print(&next(&arguments.problem, &table))?;
+        }
+    }
+    if !divided && !arguments.quiet {
+        diagnostic::warn(
+            "no row is held out, and identify needs some to judge by: simulate more poses, or change held_out or \
+             identification in [poses]",
+        );
     }
     Ok(Outcome::Done)
 }
 
-fn summary(simulation: &Simulation, problem: &Path, table: &Path) -> String {
+fn summary(simulation: &Simulation, table: &Path) -> String {
     let (poses, held_out) = (simulation.rows.len(), simulation.held_out());
     let (identify, sigma) = (poses - held_out, simulation.truth.noise_sigma * 1e3);
-    let folder = table.parent().unwrap_or(table).join("identified");
-    let (problem, table, folder) = (problem.display(), table.display(), folder.display());
+    let table = table.display();
     format!(
         "{poses} poses: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
          Effects: {effects}\n\n\
-         Written to {table}, what is true to truth.json beside it\n\
-         Next: flexcal identify {problem} --data {table} --out {folder}\n",
+         Written to {table}, what is true to truth.json beside it\n",
         effects = match simulation.effect_names().join(", ") {
             none if none.is_empty() => "none".to_owned(),
             names => names,
         },
     )
+}
+
+fn next(problem: &Path, table: &Path) -> String {
+    let folder = table.parent().unwrap_or(table).join("identified");
+    let (problem, table, folder) = (problem.display(), table.display(), folder.display());
+    format!("Next: flexcal identify {problem} --data {table} --out {folder}\n")
 }

@@ -49,12 +49,12 @@ impl Ranges {
     /// # Errors
     /// A moving joint has no limits.
     pub fn of(problem: &Problem) -> Result<Self, DesignError> {
-        for (index, joint) in problem.joints.iter().enumerate() {
-            let (min, max) = joint.limits;
-            if joint.kind != JointKind::Fixed && !(min.is_finite() && max.is_finite()) {
-                let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };
-                let file = problem.data.location.file.clone();
-                return Err(DesignError::NoRange { file, joint: index + 1, unit });
+        for joint in problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed) {
+            let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };
+            for (end, limit) in [("min", joint.limits.0), ("max", joint.limits.1)] {
+                if !limit.is_finite() {
+                    return Err(DesignError::NoRange { location: Box::new(joint.location.clone()), end, unit });
+                }
             }
         }
         let joints = problem.joints.iter().map(|joint| joint.limits).collect();

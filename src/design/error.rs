@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::error::InputError;
+use crate::error::{InputError, Location};
 
 /// Why there is no plan and no forecast.
 #[derive(Debug, thiserror::Error)]
@@ -12,15 +12,14 @@ pub enum DesignError {
     Input(#[from] InputError),
     /// A joint may go anywhere.
     #[error(
-        "{}: joint[{joint}].min_{unit}: missing; write min_{unit} and max_{unit} of every moving joint, or name a TRUTH.toml \
-         with --truth whose [poses] say where to draw, or a table of poses with --candidates",
-        file.display()
+        "{location}.{end}_{unit}: missing; write min_{unit} and max_{unit} of every moving joint, or name a TRUTH.toml \
+         with --truth whose [poses] say where to draw, or a table of poses with --candidates"
     )]
     NoRange {
-        /// The problem file.
-        file: PathBuf,
-        /// Number of the joint, from 1.
-        joint: usize,
+        /// The joint in the problem file.
+        location: Box<Location>,
+        /// Which end has no limit: `min` or `max`.
+        end: &'static str,
         /// Suffix of its unit.
         unit: &'static str,
     },

@@ -18,7 +18,7 @@ pub enum InputErrorKind {
     // Files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
-    #[error("no such file; give the TRUTH.toml that describes the simulation")]
+    #[error("no such file; give the TRUTH.toml that describes the simulation, or the folder that holds one")]
     TruthMissing,
     #[error("no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one")]
     StudyMissing,
@@ -32,6 +32,10 @@ pub enum InputErrorKind {
     Unreadable { source: io::Error },
     #[error("not UTF-8 text; save the file as UTF-8")]
     NotUtf8,
+    #[error("the header is not UTF-8 text; save the file as UTF-8")]
+    HeaderNotUtf8,
+    #[error("UTF-16 text, by its byte-order mark; save the file as UTF-8")]
+    Utf16,
     #[error("not valid TOML: {message}{}", near(near_text))]
     Syntax { message: String, near_text: String },
 
@@ -126,8 +130,8 @@ pub enum InputErrorKind {
     EmptyRule,
     #[error("a fixed parameter takes nothing else; leave out {other}")]
     FixedAndMore { other: String },
-    #[error("min {min} is above max {max} (in SI units)")]
-    MinAboveMax { min: f64, max: f64 },
+    #[error("{lower} is above {upper}")]
+    LimitsCross { lower: String, upper: String },
 
     #[error(
         "the pattern matches no parameter of this arm{}; {}",
@@ -154,8 +158,6 @@ pub enum InputErrorKind {
     NoCoefficient,
     #[error("no limit; write at_least or at_most (with a unit for lengths and angles)")]
     NoLimit,
-    #[error("at_least {least} is above at_most {most} (in SI units)")]
-    LimitsCross { least: f64, most: f64 },
     #[error("no such parameter{}; {}", meant(name, known), list("there are", known, "the arm has none"))]
     UnknownParameter { name: String, known: Vec<String> },
     #[error(
@@ -171,6 +173,8 @@ pub enum InputErrorKind {
     NoEquilibrium,
 
     // The truth of a simulation.
+    #[error("a range is two numbers, the lower one first; for a fixed value write [{value}, {value}]")]
+    OneNumber { value: f64 },
     #[error("a range is two numbers, the lower one first; found {found}")]
     NotARange { found: usize },
     #[error("no strength; write {write}")]
@@ -211,8 +215,8 @@ pub enum InputErrorKind {
     // Tables of measurements.
     #[error("no measurements; name them in `files` or with --data")]
     NoDataFiles,
-    #[error("named twice; its rows would count twice")]
-    RepeatedFile,
+    #[error("{} is named twice; its rows would count twice", path.display())]
+    RepeatedFile { path: PathBuf },
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
     EmptyTable,
     #[error("no rows below the header")]
@@ -262,8 +266,10 @@ pub enum WarningKind {
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]
     UnitIgnored { write: String },
-    #[error("commanded beyond its limits ({limits}) in {rows} row{}, first here; used all the same", plural(*rows))]
-    BeyondLimits { rows: usize, limits: String },
+    #[error(
+        "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
+    )]
+    BeyondLimits { rows: usize, worst: String, limits: String },
 }
 
 fn plural(count: usize) -> &'static str {

@@ -2,38 +2,58 @@
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::{Joint, JointKind, Problem};
+use crate::problem::Problem;
 
 /// How far beyond its limit a command may be for rounding alone [rad] or [m].
 const ROUNDING: f64 = 1e-6;
 
-impl Measurements {
-    /// A warning for each joint that was commanded beyond its declared range, at the first such row.
-    pub fn beyond_limits(&self, problem: &Problem) -> Vec<Warning> {
-        let warning = |(index, joint): (usize, &Joint)| {
-            let (min, max) = joint.limits;
-            let beyond = |row: &usize| {
-                let q = self.configuration(*row)[index];
-                q < min - ROUNDING || q > max + ROUNDING
-            };
-            let rows: Vec<usize> = (0..self.len()).filter(beyond).collect();
-            let location = self.location(*rows.first()?).with_key(format!("joint {}", index + 1));
-            Some(Warning { location, kind: WarningKind::BeyondLimits { rows: rows.len(), limits: limits(joint) } })
+/// The column of a joint's commands.
+pub(super) struct Commands<'a> {
+    /// Joint, counted from 0.
+    pub joint: usize,
+    /// Name of the column: `q2_deg`.
+    pub name: &'a str,
+    /// Conversion to the SI unit.
+    pub to_si: fn(f64) -> f64,
+}
+
+impl Commands<'_> {
+    fn unit(&self) -> &str {
+        self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
+    }
+
+    /// An SI value in the unit of the column; conversions round, and nobody writes more decimals.
+    fn shown(&self, value: f64) -> f64 {
+        (value / (self.to_si)(1.0) * 1e6).round() / 1e6
+    }
+
+    /// The limits of the joint as its section would write them in the unit of the column.
+    fn limits(&self, (min, max): (f64, f64)) -> String {
+        let limit = |(key, limit): (&str, f64)| {
+            limit.is_finite().then(|| format!("{key}_{} = {}", self.unit(), self.shown(limit)))
         };
-        problem.joints.iter().enumerate().filter_map(warning).collect()
+        [("min", min), ("max", max)].into_iter().filter_map(limit).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// The limits of a joint as its section writes them.
-fn limits(joint: &Joint) -> String {
-    let (unit, factor) = match joint.kind {
-        JointKind::Prismatic => ("mm", 1e3),
-        JointKind::Revolute | JointKind::Fixed => ("deg", 1_f64.to_degrees()),
-    };
-    let shown = |(key, limit): (&str, f64)| {
-        // Conversions round; nobody writes more decimals.
-        limit.is_finite().then(|| format!("{key}_{unit} = {}", (limit * factor * 1e6).round() / 1e6))
-    };
-    let both = [("min", joint.limits.0), ("max", joint.limits.1)];
-    both.into_iter().filter_map(shown).collect::<Vec<_>>().join(", ")
+impl Measurements {
+    /// A warning for each joint that was commanded beyond its declared range, at the row that is furthest beyond.
+    pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
+        let warning = |column: &Commands| {
+            let (min, max) = problem.joints[column.joint].limits;
+            let value = |row: usize| self.configuration(row)[column.joint];
+            let beyond = |row: usize| (min - value(row)).max(value(row) - max);
+            let rows: Vec<usize> = (0..self.len()).filter(|&row| beyond(row) > ROUNDING).collect();
+            // The first of equals.
+            let worst = *rows.iter().rev().max_by(|&&a, &&b| beyond(a).total_cmp(&beyond(b)))?;
+            let location = self.location(worst).with_key(format!("joint {}", column.joint + 1));
+            let kind = WarningKind::BeyondLimits {
+                rows: rows.len(),
+                worst: format!("{} = {}", column.name, column.shown(value(worst))),
+                limits: column.limits((min, max)),
+            };
+            Some(Warning { location, kind })
+        };
+        columns.iter().filter_map(warning).collect()
+    }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use super::columns::{Column, Columns, Role};
+use super::limits::Commands;
 use super::table::{Table, shortened};
 use super::{Labels, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, Warning};
@@ -33,7 +34,7 @@ impl Measurements {
         let mut builder: Option<Builder> = None;
         for (index, file) in files.iter().enumerate() {
             if files[..index].contains(file) {
-                return Err(Location::file(file).error(InputErrorKind::RepeatedFile));
+                return Err(named_by(file, problem).error(InputErrorKind::RepeatedFile { path: file.clone() }));
             }
             let mut table = Table::open(file, || missing(file, problem))?;
             let columns = Columns::find(&table, problem, measured, &mut warnings)?;
@@ -49,9 +50,33 @@ impl Measurements {
             }
         }
         match builder {
-            Some(builder) => Ok((builder.finish(), warnings)),
+            Some(builder) => {
+                let (measurements, columns) = builder.finish();
+                if measured {
+                    warnings.extend(measurements.beyond_limits(problem, &commands(&columns)));
+                }
+                Ok((measurements, warnings))
+            }
             None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
         }
+    }
+}
+
+/// The columns of commands among all of them.
+fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
+    let joints = columns.iter().filter_map(|(column, name)| match column.role {
+        Role::Joint(joint) => Some(Commands { joint, name, to_si: column.to_si }),
+        _ => None,
+    });
+    joints.collect()
+}
+
+/// The place that names a file: in the problem, or else the command line.
+fn named_by(file: &Path, problem: &Problem) -> Location {
+    if problem.data.files.iter().any(|known| known == file) {
+        problem.data.files_location.clone()
+    } else {
+        Location::file(file)
     }
 }
 
@@ -89,8 +114,8 @@ struct Builder {
     measurements: Measurements,
     session: LabelsBuilder,
     target: LabelsBuilder,
-    /// Roles of the first file and the names of their columns.
-    roles: Vec<(Role, String)>,
+    /// Columns of the first file and their names.
+    columns: Vec<(Column, String)>,
 }
 
 impl Builder {
@@ -114,8 +139,8 @@ impl Builder {
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
         };
-        let roles = columns.read.iter().map(|column| (column.role, table.header[column.place].clone())).collect();
-        Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), roles }
+        let columns = columns.read.iter().map(|column| (*column, table.header[column.place].clone())).collect();
+        Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), columns }
     }
 
     /// Whether a file has the columns of the first one; `pose` alone may come and go.
@@ -124,13 +149,13 @@ impl Builder {
             let other = self.measurements.files[0].clone();
             Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
         };
-        for (role, name) in self.roles.iter().filter(|(role, _)| *role != Role::Pose) {
-            if !columns.has(*role) {
+        for (column, name) in self.columns.iter().filter(|(column, _)| column.role != Role::Pose) {
+            if !columns.has(column.role) {
                 return differ(name, true);
             }
         }
         for column in columns.read.iter().filter(|column| column.role != Role::Pose) {
-            if !self.roles.iter().any(|(role, _)| *role == column.role) {
+            if !self.columns.iter().any(|(own, _)| own.role == column.role) {
                 return differ(&table.header[column.place], false);
             }
         }
@@ -183,15 +208,16 @@ impl Builder {
         Ok(())
     }
 
-    fn finish(self) -> Measurements {
-        let Self { mut measurements, session, target, .. } = self;
+    /// All that was read, and the columns of the first file.
+    fn finish(self) -> (Measurements, Vec<(Column, String)>) {
+        let Self { mut measurements, session, target, columns } = self;
         measurements.session = session.labels;
         if measurements.session.names.is_empty() {
             let of_row = vec![0; measurements.len()];
             measurements.session = Labels { names: vec![String::new()], of_row };
         }
         measurements.target = measurements.target.map(|_| target.labels);
-        measurements
+        (measurements, columns)
     }
 }
 

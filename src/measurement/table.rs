@@ -8,7 +8,7 @@ use std::sync::Arc;
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::lines::Lines;
-use crate::error::{Excerpt, InputError, InputErrorKind, Location, lines};
+use crate::error::{BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, lines};
 
 /// An open CSV file.
 pub(super) struct Table {
@@ -44,9 +44,16 @@ impl Table {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
         }
         table.header_line = table.line;
-        for place in 0..table.record.len() {
-            let name = table.text(place)?.to_owned();
-            table.header.push(name);
+        let mistake = |kind| Location::file(file).at_line(table.line).error(kind);
+        if BYTE_ORDER_MARKS.iter().any(|mark| table.record.as_slice().starts_with(mark)) {
+            return Err(mistake(InputErrorKind::Utf16));
+        }
+        for cell in &table.record {
+            match std::str::from_utf8(cell.trim_ascii()) {
+                Ok(name) if !name.contains('\0') => table.header.push(name.to_owned()),
+                // A line of what is not text says nothing.
+                _ => return Err(mistake(InputErrorKind::HeaderNotUtf8)),
+            }
         }
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))

@@ -39,7 +39,8 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
     };
     let bodies = bodies(&mut section, "body", "com", false)?;
     section.finish()?;
-    Ok(Joint { name, kind, alpha, a, theta, d, beta, limits, stiffness, beam, bodies })
+    let location = section.location();
+    Ok(Joint { name, kind, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
 }
 
 /// Range of q, infinite where none is given.
@@ -49,12 +50,14 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
         JointKind::Prismatic => &LENGTH,
         JointKind::Fixed => return Ok((f64::NEG_INFINITY, f64::INFINITY)),
     };
-    let min = section.number("min", unit)?.unwrap_or(f64::NEG_INFINITY);
-    let max = section.number("max", unit)?.unwrap_or(f64::INFINITY);
-    if min > max {
-        return Err(section.location().error(InputErrorKind::MinAboveMax { min, max }));
+    let mut limit = |base| -> Result<_, InputError> {
+        let Some((item, unit)) = section.quantity(base, unit)? else { return Ok(None) };
+        Ok(Some(((unit.to_si)(item.number()?), item)))
+    };
+    match (limit("min")?, limit("max")?) {
+        (Some((min, lower)), Some((max, upper))) if min > max => Err(lower.above(&upper)),
+        (min, max) => Ok((min.map_or(f64::NEG_INFINITY, |(min, _)| min), max.map_or(f64::INFINITY, |(max, _)| max))),
     }
-    Ok((min, max))
 }
 
 fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, InputError> {

@@ -1,5 +1,6 @@
 //! `[[constraint]]`: linear inequalities between parameters.
 
+use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::units::{ANGLE, LENGTH};
@@ -78,17 +79,17 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     section.finish()?;
     match (&at_least, &at_most) {
         (None, None) => return Err(section.error(InputErrorKind::NoLimit)),
-        (Some(least), Some(most)) if least.kind == most.kind && least.value > most.value => {
-            let kind = InputErrorKind::LimitsCross { least: least.value, most: most.value };
-            return Err(least.location.clone().error(kind));
+        (Some((least, lower)), Some((most, upper))) if least.kind == most.kind && least.value > most.value => {
+            return Err(lower.above(upper));
         }
         _ => {}
     }
+    let [at_least, at_most] = [at_least, at_most].map(|limit| limit.map(|(limit, _)| limit));
     Ok(Constraint { terms, at_least, at_most, location: section.location() })
 }
 
 /// A limit in one of its units, or bare for logarithms.
-fn limit(section: &mut Section<'_, '_>, base: &str) -> Result<Option<Limit>, InputError> {
+fn limit<'a, 'i>(section: &mut Section<'a, 'i>, base: &str) -> Result<Option<(Limit, Item<'a, 'i>)>, InputError> {
     let mut found = Vec::new();
     if let Some(item) = section.get(base) {
         found.push((item.number()?, LimitKind::Logarithm, item));
@@ -101,5 +102,5 @@ fn limit(section: &mut Section<'_, '_>, base: &str) -> Result<Option<Limit>, Inp
     if let [_, (.., second), ..] = &found[..] {
         return Err(second.error(InputErrorKind::GivenTwice { first: format!("{base} in another unit") }));
     }
-    Ok(found.pop().map(|(value, kind, item)| Limit { value, kind, location: item.location() }))
+    Ok(found.pop().map(|(value, kind, item)| (Limit { value, kind, location: item.location() }, item)))
 }

@@ -50,7 +50,8 @@ pub(crate) fn hexadecimal(text: &str) -> String {
 }
 
 fn joint(text: &mut String, joint: &Joint) {
-    let Joint { name: _, kind, alpha, a, theta, d, beta, limits: _, stiffness, beam: elastic, bodies } = joint;
+    let Joint { name: _, kind, alpha, a, theta, d, beta, limits: _, stiffness, beam: elastic, bodies, location: _ } =
+        joint;
     text.push_str(match kind {
         JointKind::Revolute => "\nrevolute",
         JointKind::Prismatic => "\nprismatic",

@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
 use super::section::Section;
-use crate::error::{InputError, InputErrorKind, Location, lines};
+use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, lines};
 
 /// The text that is read, and its name.
 pub(crate) struct Document {
@@ -27,6 +27,9 @@ impl Document {
                 _ => InputErrorKind::Unreadable { source },
             })
         })?;
+        if BYTE_ORDER_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
+            return Err(Location::file(file).at_line(1).error(InputErrorKind::Utf16));
+        }
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             Location::file(file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
@@ -82,6 +85,14 @@ impl<'a, 'i> Item<'a, 'i> {
     /// A mistake in this value.
     pub fn error(&self, kind: InputErrorKind) -> InputError {
         self.location().error(kind)
+    }
+
+    /// The error of a lower limit at this place that is above the upper one at another, both as they are written.
+    pub fn above(&self, upper: &Self) -> InputError {
+        let written = |own: &Self| {
+            own.document.text.get(own.span.clone()).unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        self.error(InputErrorKind::LimitsCross { lower: written(self), upper: written(upper) })
     }
 
     /// The error of a value of another type.

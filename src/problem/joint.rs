@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::error::Location;
+
 /// What a joint's configuration coordinate does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
@@ -38,6 +40,8 @@ pub struct Joint {
     pub beam: Option<Beam>,
     /// Rigid masses carried by frame `i`, after the whole `T_i`.
     pub bodies: Vec<Body>,
+    /// For errors.
+    pub location: Location,
 }
 
 /// `[joint.beam]`: an elastic link, clamped after Rx(α), its x axis along the link.

@@ -132,10 +132,10 @@ fn check(
     if let Some((value, item)) = sigma.filter(|(value, _)| *value <= 0.0) {
         return Err(item.error(InputErrorKind::NotPositive { value: *value }));
     }
-    if let (Some((min, item)), Some((max, _))) = (min, max)
+    if let (Some((min, item)), Some((max, upper))) = (min, max)
         && min > max
     {
-        return Err(item.error(InputErrorKind::MinAboveMax { min: *min, max: *max }));
+        return Err(item.above(upper));
     }
     // A ratio to the nominal value is positive; its logarithm is what has bounds.
     if let Some((value, item)) = min.into_iter().chain(max).find(|(value, _)| nominal > 0.0 && *value <= 0.0) {

@@ -47,10 +47,15 @@ fn range(section: &mut Section<'_, '_>, base: &str, kind: &Kind) -> Result<Optio
 }
 
 fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
+    if let Ok(value) = item.number() {
+        return Err(item.error(InputErrorKind::OneNumber { value }));
+    }
     let numbers = item.list("a list of 2 numbers, from and to")?;
     let numbers = numbers.iter().map(Item::number).collect::<Result<Vec<_>, _>>()?;
     match *numbers.as_slice() {
-        [min, max] if min > max => Err(item.error(InputErrorKind::MinAboveMax { min, max })),
+        [from, to] if from > to => {
+            Err(item.error(InputErrorKind::LimitsCross { lower: from.to_string(), upper: to.to_string() }))
+        }
         [from, to] => Ok((from, to)),
         _ => Err(item.error(InputErrorKind::NotARange { found: numbers.len() })),
     }

@@ -15,7 +15,8 @@ use crate::problem::{HeldOut, Problem};
 use crate::units::{ANGLE, Kind, LENGTH, RELATIVE};
 
 pub(super) fn file(path: &Path, problem: &Problem) -> Result<Truth, InputError> {
-    truth(&Document::read(path, InputErrorKind::TruthMissing)?, problem)
+    let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
+    truth(&Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?, problem)
 }
 
 pub(super) fn text(text: &str, file: &Path, problem: &Problem) -> Result<Truth, InputError> {

@@ -77,7 +77,7 @@ pub enum HeldOutRows {
 }
 
 impl Truth {
-    /// Reads a `TRUTH.toml` about a problem.
+    /// Reads a `TRUTH.toml` about a problem, or the one in a folder.
     ///
     /// # Errors
     /// The first mistake found, a file that cannot be read among them.

@@ -26,7 +26,16 @@ fn headers() {
     for (text, words) in headers {
         check(&table(ARM, text.as_bytes()).expect_err(text), text, words);
     }
-    check(&table(ARM, b"q1_deg,\xff\xfe\n").unwrap_err(), "binary header", &["rows.csv:1: ", "not UTF-8"]);
+    for (header, words) in [
+        (&b"q1_deg,\xff\xfe\n"[..], "rows.csv:1: the header is not UTF-8 text"),
+        (b"\xff\xfeq\x001\x00\n\x00", "rows.csv:1: UTF-16 text"),
+        (b"\xfe\xff\x00q\x001\x00\n", "rows.csv:1: UTF-16 text"),
+        (b"q\x001\x00\n\x00", "rows.csv:1: the header is not UTF-8 text"),
+    ] {
+        let error = table(ARM, header).unwrap_err();
+        check(&error, "binary header", &[words]);
+        assert!(error.location.excerpt.is_none(), "what is not text is not shown");
+    }
 }
 
 #[test]

@@ -197,9 +197,12 @@ fn bad_input_names_file_and_key_or_the_option() {
     let sigma = bench.write("no-sigma.toml", &lunar.replace("position_sigma_mm = 0.05\n", ""));
     let fixed = lunar.split("[parameters]").next().unwrap().to_owned() + "[data]\nposition_sigma_mm = 0.05\n";
     let fixed = bench.write("fixed.toml", &fixed);
+    let half = "name = 'x'\ntitle = 'x'\n[parameters]\n'joint1.a' = { sigma_mm = 1 }\n[[joint]]\na_m = 1\nmin_deg = -9\n[tool]\n\
+                target_m = [1, 0, 0]\n[data]\nposition_sigma_mm = 1\n";
+    let half = bench.write("half.toml", half);
     let cases: [(&str, &[&str], &[&str]); 10] = [
-        ("plan problems/lunar-sampler --poses 28", &[], &["problem.toml: joint[1].min_deg", "--truth", "--candidates"]),
-        ("check problems/lunar-sampler --poses 28", &[], &["problem.toml: joint[1].min_deg"]),
+        ("plan problems/lunar-sampler --poses 28", &[], &["joint[1].min_deg: missing", "--truth", "--candidates"]),
+        ("check --poses 28", &[&half], &["half.toml:5: joint[1].max_deg: missing"]),
         ("plan problems/lunar-sampler --poses 28 --candidates", &[&bad], &["bad.csv:3: column q3_deg", "\"x\""]),
         ("plan problems/lunar-sampler --poses 28 --candidates", &[&short], &["short.csv:1: column q4", "missing"]),
         ("plan problems/lunar-sampler --poses 28 --candidates", &[&three], &["--poses 28", "only 3 candidates"]),

@@ -146,8 +146,32 @@ fn mistakes_leave_nothing_behind_and_name_their_place() {
     let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
     let failed = flexcal(folder.path(), &arguments).code(2);
     let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
-    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: min 1 is above max 0"), "{message}");
+    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: 1 is above 0"), "{message}");
+    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = 12.5\n").unwrap();
+    let failed = flexcal(folder.path(), &arguments).code(2);
+    let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
+    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: ") && message.contains("write [12.5, 12.5]"), "{message}");
     assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn measurements_that_nothing_can_be_identified_from_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = "[poses]\nq1_deg = [0, 9]\nq2_deg = [0, 9]\nq3_deg = [0, 9]\nq4_deg = [0, 9]\n";
+    let cases = format!("{ROOT}/tests/cases");
+    let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
+    for (rule, expected, useful) in [
+        ("identification = 5", "no row is held out", false),
+        ("held_out = 0", "no row is held out", false),
+        ("identification = 4", "", true),
+    ] {
+        fs::write(folder.path().join("TRUTH.toml"), format!("{poses}{rule}\n")).unwrap();
+        let run = flexcal(folder.path(), &arguments).code(0);
+        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+        let (out, err) = (text(&run.get_output().stdout), text(&run.get_output().stderr));
+        assert!(out.contains("Next: flexcal identify") == useful && err.is_empty() == useful, "{out}{err}");
+        assert!(err.contains(expected), "{err}");
+    }
 }
 
 #[test]
@@ -164,7 +188,8 @@ fn every_mistake_says_where_it_is() {
     fails("[poses]\nq1_deg = [0, 1]", &["poses.q2: missing", "q2_deg or q2_rad"]);
     fails("[poses]\nq1_deg = [0, 1, 2]", &[":2: poses.q1_deg: a range is two numbers", "found 3"]);
     fails("[poses]\nq1_m = [0, 1]", &["poses.q1_m: an angle is not given in m"]);
-    fails("[poses]\nq1_deg = 3", &["poses.q1_deg: expected a list"]);
+    fails("[poses]\nq1_deg = 3", &["poses.q1_deg: a range is two numbers", "write [3, 3]"]);
+    fails("[poses]\nq1_deg = '3'", &["poses.q1_deg: expected a list"]);
     for (line, words) in [
         ("held_out = 1.5", &["poses.held_out: 1.5 is not between 0 and 1"][..]),
         ("held_out = 0.5\nidentification = 3", &["poses.identification: given already as held_out"]),
