@@ -31,9 +31,11 @@ fn score(data: &Data, found: &Identification) -> Score {
     match &found.distrust {
         Some(Distrust::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
         Some(Distrust::NotConverged(_) | Distrust::HeldOutNotConverged(_)) => return Score::Failed("not-converged"),
+        Some(Distrust::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
         Some(Distrust::Misses { .. }) => return Score::Failed("misses-the-data"),
         Some(Distrust::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
-        None => {}
+        // How many poses there are is what the study compares.
+        Some(Distrust::TooFewPoses { .. }) | None => {}
     }
     let held_out = &found.fitted.held_out;
     if !held_out.rms.norm.is_finite() {

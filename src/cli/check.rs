@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Ok(Outcome::Done);
     }
     if !common.quiet {
-        diagnostic::warn("these poses leave parameters without a prior undecided: more poses are needed");
+        diagnostic::warn(&report::why_not_sufficient(&check));
     }
     Ok(Outcome::NotTrusted)
 }

@@ -7,7 +7,7 @@ use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
 use crate::diagnosis::{Detection, detectable};
 use crate::error::InputErrorKind;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Labels, Measurements, Split, different};
 use crate::problem::Problem;
 use crate::study::Placement;
 
@@ -68,8 +68,8 @@ pub struct Check {
     pub detection: Detection,
     /// Measured coordinates.
     pub coordinates: usize,
-    /// Free parameters without a prior.
-    pub without_prior: usize,
+    /// How many of the poses differ from each other.
+    pub different: usize,
 }
 
 /// Judges poses.
@@ -111,6 +111,13 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
     if told.len() < count {
         return Err(DesignError::NoEquilibrium);
     }
+    let attainable = match judged {
+        Judged::Table { poses, within: Some(ranges), .. } => {
+            let drawn = measured_as(poses, draw(ranges, SERIES, POSES));
+            Some(site.at_rest(&drawn).1)
+        }
+        _ => None,
+    };
     let poses = series.select(&(0..count).collect::<Vec<_>>());
     let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
     let noise = noise(problem, &series);
@@ -122,16 +129,25 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         elsewhere,
         noise,
         detection: detectable(problem, &poses)?,
-        growth: Growth::new(parameters, &told, &workspace, noise, count),
+        growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise, count)),
         coordinates: 3 * count,
-        without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
+        different: different(&poses.pose_numbers(problem), 0..count),
     })
 }
 
+/// Poses that are drawn, with sessions and targets as often as a table has them.
+fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
+    let spread = |words: &Labels| Labels {
+        names: words.names.clone(),
+        of_row: (0..drawn.len()).map(|row| words.of_row[row % table.len()]).collect(),
+    };
+    Measurements { session: spread(&table.session), target: table.target.as_ref().map(spread), ..drawn }
+}
+
 impl Check {
-    /// Whether the poses decide every parameter as far as poses of their kind can.
+    /// Whether the poses decide every parameter as far as poses of their kind can, and a fit to them is to be trusted.
     pub fn suffices(&self) -> bool {
-        self.coordinates >= self.without_prior && self.forecast.open == self.growth.open
+        self.forecast.open <= self.growth.open && 3 * self.different >= self.forecast.expected.len()
     }
 }
 

@@ -13,11 +13,11 @@ const LADDER: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256,
 pub struct Growth {
     /// In ascending order of poses.
     pub steps: Vec<GrowthStep>,
-    /// Combinations that the whole series sees, priors left out.
+    /// Combinations that are to be seen, priors left out.
     pub attainable_rank: usize,
-    /// Combinations that stay open with the whole series.
+    /// Combinations that stay open when all that can be seen is.
     pub open: usize,
-    /// The least number of poses that see what the whole series sees and predict positions as exactly as one is measured
+    /// The least number of poses that see all of that and predict positions as exactly as one is measured
     /// (rms); `None` where the series is too short.
     pub enough: Option<usize>,
 }
@@ -39,13 +39,14 @@ pub struct GrowthStep {
 
 impl Growth {
     /// Of the poses of `series` in their order, with predictions judged in the poses `workspace` (in metres); `noise` is the
-    /// root mean square length of the error of one measured position [m], and `also` a number to look at besides.
+    /// root mean square length of the error of one measured position [m], and `also` a number to look at besides. What can be
+    /// seen is what the series and the poses `elsewhere` see together.
     pub fn new(
         parameters: &[Parameter],
         series: &Sensitivity,
+        elsewhere: Option<&Sensitivity>,
         workspace: &Sensitivity,
-        noise: f64,
-        also: usize,
+        (noise, also): (f64, usize),
     ) -> Self {
         let step = |poses: usize| {
             let forecast = Forecast::new(parameters, &series.select(&(0..poses).collect::<Vec<_>>()));
@@ -62,7 +63,13 @@ impl Growth {
         ladder.sort_unstable();
         ladder.dedup();
         let steps: Vec<GrowthStep> = ladder.into_par_iter().map(step).collect();
-        let (attainable_rank, open) = steps.last().map_or((0, 0), |last| (last.rank, last.open));
+        let (attainable_rank, open) = match elsewhere {
+            Some(elsewhere) => {
+                let all = Forecast::new(parameters, &series.and(elsewhere));
+                (all.identifiability.rank, all.open)
+            }
+            None => steps.last().map_or((0, 0), |last| (last.rank, last.open)),
+        };
         let suffices =
             |step: &GrowthStep| step.rank == attainable_rank && step.open == open && step.prediction.rms <= noise;
         // More poses never tell less, so that the least number can be bracketed.

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Ranges, Sensitivity, Site};
-use crate::measurement::Measurements;
+use crate::measurement::{Measurements, different};
 use crate::problem::Problem;
 
 /// Candidates drawn from ranges, evenly and with a liking for the ends.
@@ -76,7 +76,7 @@ pub struct Plan {
     pub planned: Forecast,
     /// Of the poses given and as many others, drawn at random again and again.
     pub random: Vec<Forecast>,
-    /// Whether the plan decides every parameter as far as all candidates together can.
+    /// Whether the plan decides every parameter as far as all candidates together can, and a fit to it is to be trusted.
     pub suffices: bool,
 }
 
@@ -109,6 +109,7 @@ pub fn plan(
     tables.extend(given);
     let site = Site::new(problem, &tables)?;
     let parameters = &site.model.parameters;
+    let measured = given.map_or(0, |given| different(&given.pose_numbers(problem), 0..given.len()));
     let given = given.map(|given| site.at_rest(given).1);
     let (mut table, usual) = site.at_rest(&usual);
     let mut all = usual.clone();
@@ -155,8 +156,8 @@ pub fn plan(
         .map(|draw| forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64))))
         .collect();
     let planned = forecast(&told);
-    let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let suffices = planned.open <= attainable && 3 * planned.poses >= without_prior;
+    let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
+    let suffices = planned.open <= attainable && 3 * apart >= parameters.len();
     Ok(Plan { poses: chosen, candidates: tried, starts, value, planned, random, suffices })
 }
 

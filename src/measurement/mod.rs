@@ -4,6 +4,7 @@ mod columns;
 mod limits;
 mod lines;
 mod read;
+mod repeats;
 mod split;
 mod table;
 
@@ -13,6 +14,7 @@ use nalgebra::Vector3;
 
 use crate::error::Location;
 
+pub(crate) use repeats::different;
 pub use split::Split;
 
 /// Measured poses, a column for each quantity, in the order of the files.

@@ -135,6 +135,25 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     .concat()
 }
 
+/// Why poses do not suffice, in one line.
+pub fn why_not_sufficient(check: &Check) -> String {
+    let (forecast, different) = (&check.forecast, check.different);
+    let (of, parameters) = (forecast.poses, forecast.expected.len());
+    let open = forecast.open.saturating_sub(check.growth.open);
+    if open > 0 {
+        let noun = if open == 1 { "combination" } else { "combinations" };
+        return format!(
+            "these poses leave {open} {noun} of parameters without a prior undecided that others would decide: more poses are \
+             needed"
+        );
+    }
+    format!(
+        "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters that are free: \
+         priors would decide most of them; more poses are needed",
+        3 * different
+    )
+}
+
 fn prediction(check: &Check) -> String {
     let place = match check.elsewhere {
         Elsewhere::Ranges => "anywhere within the ranges",

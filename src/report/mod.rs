@@ -28,7 +28,7 @@ mod study_text;
 mod text;
 mod trace;
 
-pub use check::{check_json, check_text};
+pub use check::{check_json, check_text, why_not_sufficient};
 pub use closing::{closed_problem, loop_json, loop_markdown, loop_text};
 pub use commands::{commands_csv, commands_json, commands_text};
 pub use compare_json::compare_json;

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::quantity::{number, table};
 use crate::fit::Identifiability;
 use crate::problem::Problem;
-use crate::study::{ErrorSummary, Identification, Noise};
+use crate::study::{Distrust, ErrorSummary, Identification, Noise};
 
 /// Outliers that fit on a screen.
 const SHOWN_OUTLIERS: usize = 20;
@@ -85,6 +85,9 @@ pub(super) fn noise(problem: &Problem, result: &Identification) -> String {
         (Noise::Unknown, _) => {
             "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors.\n"
                 .to_owned()
+        }
+        (Noise::Declared, Some(_)) if result.distrust.as_ref().is_some_and(Distrust::is_of_too_few) => {
+            "There are not enough different poses to judge the declared σ, or the model.\n".to_owned()
         }
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.\n".to_owned(),
         (Noise::Declared, Some(chi2)) if result.noise_factor > 1.0 => {

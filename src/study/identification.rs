@@ -11,10 +11,10 @@ use super::placement::UNKNOWN_SIGMA;
 use super::stage::StageError;
 use super::statistics::Statistics;
 use super::trust::{Distrust, beyond_prior, misses, underdetermined};
-use super::{Placement, ProgressSink, SolverChoice, Strategy};
+use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{Identifiability, Loss};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Measurements, Split, different};
 use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::problem::{Effect, EffectDeclaration, JointKind, Problem, Robust, RobustLoss};
@@ -160,18 +160,22 @@ pub fn identify_model(
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     enter(&mut estimates, &fitting.whole(), &end, &statistics);
     let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let coordinates = 3 * split.identification.len();
-    let of = "the fit".to_owned();
-    let mut distrust = (coordinates < without_prior)
+    let numbers = measurements.pose_numbers(problem);
+    let poses = different(&numbers, split.identification.iter().copied());
+    let (of, coordinates) = ("the fit".to_owned(), 3 * poses);
+    let mut equations = (coordinates < without_prior)
         .then_some(Distrust::TooFewEquations { of, coordinates, unknowns: without_prior })
-        .or_else(|| underdetermined(model, &placement, &split.identification, |k| !fitting.late.parameters[k]))
-        .or_else(|| (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination)));
+        .or_else(|| {
+            underdetermined(model, &placement, &numbers, &split.identification, |k| !fitting.late.parameters[k])
+        });
+    let mut distrust = (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination));
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
         end.iterations += late.iterations;
         end.evaluations += late.evaluations;
+        let is_late = |k: usize| fitting.late.parameters[k];
+        equations = equations.or_else(|| underdetermined(model, &placement, &numbers, &fitting.late.rows, is_late));
         distrust = distrust
-            .or_else(|| underdetermined(model, &placement, &fitting.late.rows, |k| fitting.late.parameters[k]))
             .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
         enter(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
         end.x = late.x;
@@ -184,9 +188,15 @@ pub fn identify_model(
     let fitted = fitting.errors(&end.x);
     let squares = fitting.whole().poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>();
     let declared_sigma = noise_is_declared.then(|| (squares / split.identification.len().max(1) as f64).sqrt());
-    let distrust = distrust
-        .or_else(|| misses(measurements, &placement, &split.identification, &fitted.identification, declared_sigma))
-        .or_else(|| beyond_prior(model, &end.x));
+    let far = |of: &Errors| misses(measurements, &placement, &split.identification, &of.identification, declared_sigma);
+    // An arm that was near before the fit was driven away by a solver that did not converge.
+    let misses = far(&fitted).filter(|_| end.termination.converged() || far(&registered).is_some());
+    let parameters = unknowns.len();
+    let distrust = equations
+        .or(misses)
+        .or(distrust)
+        .or_else(|| beyond_prior(model, &end.x))
+        .or_else(|| (coordinates < parameters).then_some(Distrust::TooFewPoses { poses, parameters }));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,
@@ -201,7 +211,7 @@ pub fn identify_model(
         fitted,
         reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
         noise_factor: statistics.noise_factor,
-        coordinates,
+        coordinates: 3 * split.identification.len(),
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
         correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),

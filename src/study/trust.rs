@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::{DVector, Vector3};
 
 use super::{ErrorSummary, Placement};
-use crate::measurement::Measurements;
+use crate::measurement::{Measurements, different};
 use crate::model::Model;
 use crate::parameter::{JointField, Parameter, Slot};
 use crate::solver::Termination;
@@ -28,10 +28,17 @@ pub enum Distrust {
     TooFewEquations {
         /// What the unknowns belong to: the whole fit, or a base or tool.
         of: String,
-        /// Measured coordinates.
+        /// Coordinates measured in different poses: a pose measured again adds none.
         coordinates: usize,
         /// Unknowns without a prior.
         unknowns: usize,
+    },
+    /// Fewer coordinates measured in different poses than parameters: priors decide what measurements do not.
+    TooFewPoses {
+        /// Different poses.
+        poses: usize,
+        /// Parameters that are fitted.
+        parameters: usize,
     },
     /// The fit did not converge.
     NotConverged(Termination),
@@ -57,7 +64,20 @@ impl fmt::Display for Distrust {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFewEquations { of, coordinates, unknowns } => {
-                write!(f, "{of}: {coordinates} measured coordinates for {unknowns} parameters without a prior")
+                write!(
+                    f,
+                    "{of}: {coordinates} measured coordinates for {unknowns} parameters without a prior (a pose measured \
+                     again adds none)"
+                )
+            }
+            Self::TooFewPoses { poses, parameters } => {
+                let noun = if *poses == 1 { "pose measures" } else { "different poses measure" };
+                write!(
+                    f,
+                    "{poses} {noun} {} coordinates, fewer than the {parameters} parameters that are fitted: priors decide most \
+                     of it",
+                    3 * poses
+                )
             }
             Self::NotConverged(termination @ Termination::DomainEdge) => {
                 write!(f, "{termination}; units, signs of joints, or sessions are wrong, or the table's columns")
@@ -80,6 +100,13 @@ impl fmt::Display for Distrust {
     }
 }
 
+impl Distrust {
+    /// Whether the poses are too few to say anything of the fit, good or bad.
+    pub fn is_of_too_few(&self) -> bool {
+        matches!(self, Self::TooFewEquations { .. } | Self::TooFewPoses { .. })
+    }
+}
+
 /// The parameter of the arm's geometry that lies furthest beyond its prior, if that is out of all proportion.
 pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> {
     let ratio = |(k, parameter): (usize, &Parameter)| match parameter.slot {
@@ -93,16 +120,18 @@ pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> 
     (sigmas > OUT_OF_PROPORTION).then(|| Distrust::BeyondPrior { name: model.parameters[k].name.clone(), sigmas })
 }
 
-/// A base, with the targets that no other base of `rows` uses, or a target with fewer measured coordinates in `rows` than
-/// parameters of its own without a prior; of the parameters that are `varied` there.
+/// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates measured in different
+/// poses of `rows` than parameters of its own without a prior; of the parameters that are `varied` there. `numbers` are those
+/// of the poses of all rows.
 pub(super) fn underdetermined(
     model: &Model,
     placement: &Placement,
+    numbers: &[usize],
     rows: &[usize],
     varied: impl Fn(usize) -> bool,
 ) -> Option<Distrust> {
     let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
-        let coordinates = 3 * rows.iter().filter(|&&row| used(row)).count();
+        let coordinates = 3 * different(numbers, rows.iter().copied().filter(|&row| used(row)));
         let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         (0 < coordinates && coordinates < unknowns).then_some(Distrust::TooFewEquations { of, coordinates, unknowns })

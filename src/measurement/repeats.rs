@@ -1,0 +1,106 @@
+//! Rows that repeat a pose.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::Measurements;
+use crate::problem::{Effect, JointKind, Problem};
+
+/// Configurations agree where each angle does to this [rad].
+const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
+/// Configurations agree where each length does to this [m].
+const LENGTH_STEP: f64 = 1e-4;
+/// Payloads and hoist forces agree where they do to this part of the largest.
+const LOAD_STEP: f64 = 0.01;
+/// Temperatures agree where they do to this [K].
+const TEMPERATURE_STEP: f64 = 1.0;
+/// Numbers of words and directions agree where they are the same.
+const SAME: f64 = 0.5;
+
+impl Measurements {
+    /// The configuration of each row, numbered in order of appearance, and how many there are.
+    pub(super) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
+        numbered(&self.joint_columns(problem), self.len())
+    }
+
+    /// The pose of each row, numbered in order of appearance: rows of one pose tell the same about the arm.
+    ///
+    /// They agree in configuration, session and target, in payload and hoist where something of the arm gives way or an
+    /// effect is declared, and in temperature and approach where a declared effect depends on them.
+    pub fn pose_numbers(&self, problem: &Problem) -> Vec<usize> {
+        let mut columns = self.joint_columns(problem);
+        let words = |of_row: &[usize]| Column { values: of_row.iter().map(|&word| word as f64).collect(), step: SAME };
+        columns.push(words(&self.session.of_row));
+        columns.extend(self.target.iter().map(|target| words(&target.of_row)));
+        let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
+        let gives_way = problem.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.is_some());
+        if gives_way || !problem.effects.is_empty() {
+            for load in [&self.payload, &self.hoist].into_iter().flatten() {
+                let largest = load.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+                let step = if largest > 0.0 { LOAD_STEP * largest } else { 1.0 };
+                columns.push(Column { values: load.clone(), step });
+            }
+        }
+        if let Some(temperature) = self.temperature.as_ref().filter(|_| declared(Effect::is_thermal)) {
+            columns.push(Column { values: temperature.clone(), step: TEMPERATURE_STEP });
+        }
+        if let Some(approach) =
+            self.approach.as_ref().filter(|_| declared(|effect| matches!(effect, Effect::Backlash { .. })))
+        {
+            let side = |joint: usize| (0..self.len()).map(|row| approach[row * self.joints + joint]).collect();
+            columns.extend((0..self.joints).map(|joint| Column { values: side(joint), step: SAME }));
+        }
+        numbered(&columns, self.len()).0
+    }
+
+    fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
+        let column = |(index, kind): (usize, JointKind)| Column {
+            values: (0..self.len()).map(|row| self.configuration(row)[index]).collect(),
+            step: if kind == JointKind::Prismatic { LENGTH_STEP } else { ANGLE_STEP },
+        };
+        problem.joints.iter().map(|joint| joint.kind).enumerate().map(column).collect()
+    }
+}
+
+/// How many different numbers some rows have.
+pub(crate) fn different(numbers: &[usize], rows: impl IntoIterator<Item = usize>) -> usize {
+    rows.into_iter().map(|row| numbers[row]).collect::<BTreeSet<_>>().len()
+}
+
+/// A value of every row, and within what values agree.
+struct Column {
+    values: Vec<f64>,
+    step: f64,
+}
+
+/// The kind of each row, numbered in order of appearance, and how many there are.
+///
+/// A row is of an earlier one's kind when every column agrees with it within its step. The rows to compare with are
+/// found along one weighted sum of all columns, which differs by no more than one bin then.
+fn numbered(columns: &[Column], rows: usize) -> (Vec<usize>, usize) {
+    // Weights without a common measure, so that unlike rows seldom share a bin.
+    let weights: Vec<f64> = (1..=columns.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();
+    let width: f64 = weights.iter().sum();
+    let mut first_rows: HashMap<i64, Vec<(usize, usize)>> = HashMap::new();
+    let mut of_row = Vec::with_capacity(rows);
+    let mut count = 0;
+    for row in 0..rows {
+        let sum: f64 = columns.iter().zip(&weights).map(|(own, weight)| weight * own.values[row] / own.step).sum();
+        let bin = floor(sum / width);
+        let agrees = |&&(first, _): &&(usize, usize)| {
+            columns.iter().all(|own| (own.values[row] - own.values[first]).abs() <= own.step)
+        };
+        let near = (-1..=1).filter_map(|side| first_rows.get(&bin.saturating_add(side))).flatten();
+        let number = near.clone().find(agrees).map_or(count, |&(_, number)| number);
+        if number == count {
+            first_rows.entry(bin).or_default().push((row, number));
+            count += 1;
+        }
+        of_row.push(number);
+    }
+    (of_row, count)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the cast keeps to the range of i64")]
+fn floor(value: f64) -> i64 {
+    value.floor() as i64
+}
