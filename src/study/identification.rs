@@ -159,22 +159,13 @@ pub fn identify_model(
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     enter(&mut estimates, &fitting.whole(), &end, &statistics);
-    let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
     let numbers = measurements.pose_numbers(problem);
     let poses = different(&numbers, split.identification.iter().copied());
-    let (of, coordinates) = ("the fit".to_owned(), 3 * poses);
-    let mut equations = (coordinates < without_prior)
-        .then_some(Distrust::TooFewEquations { of, coordinates, unknowns: without_prior })
-        .or_else(|| {
-            underdetermined(model, &placement, &numbers, &split.identification, |k| !fitting.late.parameters[k])
-        });
     let mut distrust = (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination));
     if let Some(stage) = fitting.late_stage() {
         let late: FitEnd = stage.run(&end.x)?.into();
         end.iterations += late.iterations;
         end.evaluations += late.evaluations;
-        let is_late = |k: usize| fitting.late.parameters[k];
-        equations = equations.or_else(|| underdetermined(model, &placement, &numbers, &fitting.late.rows, is_late));
         distrust = distrust
             .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
         enter(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
@@ -192,11 +183,11 @@ pub fn identify_model(
     // An arm that was near before the fit was driven away by a solver that did not converge.
     let misses = far(&fitted).filter(|_| end.termination.converged() || far(&registered).is_some());
     let parameters = unknowns.len();
-    let distrust = equations
+    let distrust = too_few_equations(&fitting, &numbers, &unknowns)
         .or(misses)
         .or(distrust)
         .or_else(|| beyond_prior(model, &end.x))
-        .or_else(|| (coordinates < parameters).then_some(Distrust::TooFewPoses { poses, parameters }));
+        .or_else(|| (3 * poses < parameters).then_some(Distrust::TooFewPoses { poses, parameters }));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,
@@ -221,6 +212,17 @@ pub fn identify_model(
         x: end.x,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// The whole fit, a base or a target with fewer coordinates than parameters without a prior; `numbers` are those of the poses.
+fn too_few_equations(fitting: &Fitting, numbers: &[usize], unknowns: &[&Parameter]) -> Option<Distrust> {
+    let Fitting { model, placement, late, split, .. } = fitting;
+    let coordinates = 3 * different(numbers, split.identification.iter().copied());
+    let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+    (coordinates < without_prior)
+        .then(|| Distrust::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
+        .or_else(|| underdetermined(model, placement, numbers, &split.identification, |k| !late.parameters[k]))
+        .or_else(|| underdetermined(model, placement, numbers, &late.rows, |k| late.parameters[k]))
 }
 
 /// Runs the strategy; where no σ is declared, again and again until the scatter about the fit is the σ assumed.
