@@ -374,3 +374,14 @@ fn bad_studies_are_named_and_leave_nothing_behind() {
     }
     bench.flexcal(&["study", "nowhere.toml"]).code(2);
 }
+
+#[test]
+fn poses_that_are_too_few_for_the_parameters_are_no_failure_of_the_solver() {
+    let bench = Bench::new();
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
+    bench.edit("STUDY.toml", "identification_poses = [8]", "identification_poses = [1]");
+    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
+    let mut table = csv::Reader::from_path(bench.path("out/study.csv")).unwrap();
+    let place = table.headers().unwrap().iter().position(|name| name == "failed").unwrap();
+    assert!(table.records().all(|row| &row.unwrap()[place] == "0"));
+}
