@@ -1,6 +1,6 @@
 //! The whole story: before, what was found, after, what remains.
 
-use super::super::candidates::{Candidates, covers};
+use super::super::candidates::{Candidates, covers, parts};
 use super::super::checks::Findings;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
@@ -186,8 +186,11 @@ fn found(rounds: &Rounds, fitted: &Fitted, structured: bool) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
     let library = fitted.library(rounds.data, &candidates, &rounds.generics);
     let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
-    let tested = rounds.tested(fitted);
     let added = rounds.added(fitted);
+    // Of many orders under one prior none may stand out by itself.
+    let several = |effect: &&Effect| parts(effect).len() > 1;
+    let mut tested = rounds.tested(fitted);
+    tested.extend(rounds.test(fitted, added.iter().filter(several).cloned().collect()));
     let first_with = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
         let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known));

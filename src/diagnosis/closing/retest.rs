@@ -2,21 +2,20 @@
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::super::candidates::parts;
 use super::super::fitted::Fitted;
 use super::super::generic::Generic;
 use super::super::trace::{Library, Linear};
 use crate::problem::Effect;
 
-/// An effect, or one order of a harmonic, and the probability that it is none.
+/// An effect of a fit, and the probability that it is none.
 #[derive(Debug, Clone)]
 pub(super) struct Retested {
     pub effect: Effect,
     pub p: f64,
 }
 
-/// Every added effect with its p, harmonics order by order: what the fit would lose without it.
-pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], added: &[Effect]) -> Vec<Retested> {
+/// Effects of a fit with their p: what it would lose without each.
+pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], own: Vec<Effect>) -> Vec<Retested> {
     let (linear, normal) = (fitted.linear(library, &[], generics), fitted.normal(library, generics));
     let test = |effect: Effect| {
         let parameters = fitted.parameters_of(&effect);
@@ -24,7 +23,7 @@ pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], a
         let p = loss.map_or(1.0, |loss| chance(&linear, loss, parameters.len()));
         Retested { effect, p }
     };
-    added.iter().flat_map(parts).map(test).collect()
+    own.into_iter().map(test).collect()
 }
 
 /// Probability that k directions without an effect take off so much of the sum of squares.

@@ -176,16 +176,21 @@ impl Rounds<'_> {
 
     /// Every added effect with its p, corrected for the tries, harmonics order by order.
     pub fn tested(&self, fitted: &Fitted) -> Vec<Retested> {
+        self.test(fitted, self.added(fitted).iter().flat_map(parts).collect())
+    }
+
+    /// Effects of a fit with their p, corrected for the tries: those of all orders of a harmonic together.
+    pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
         let library = fitted.library(self.data, &[], &self.generics);
-        let added = self.added(fitted);
-        let mut tested = retest(fitted, &library, &self.generics, &added);
-        let candidates = Candidates::of(&fitted.problem, self.data).testable;
-        let own = tested.iter().map(|tested| tested.effect.clone());
-        let everything: Vec<Effect> = candidates.into_iter().chain(own).collect();
+        let mut everything = Candidates::of(&fitted.problem, self.data).testable;
+        let first = everything.len();
+        everything.extend(own.iter().flat_map(parts));
         let (tries, families) = tries(&everything);
-        let first = everything.len() - tested.len();
-        for (tested, tries) in tested.iter_mut().zip(&tries[first..]) {
-            tested.p = (tested.p * tries * families as f64).min(1.0);
+        let mut tries = tries[first..].iter();
+        let mut tested = retest(fitted, &library, &self.generics, own);
+        for tested in &mut tested {
+            let own: f64 = tries.by_ref().take(parts(&tested.effect).len()).sum();
+            tested.p = (tested.p * own * families as f64).min(1.0);
         }
         tested
     }
