@@ -121,7 +121,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::plan_text(&problem, criterion, &plan, separated.as_ref()))?;
-        output::print(&format!("\nWritten to {}, what it promises to plan.json beside it\n", folder.join("plan.csv").display()))?;
+        output::print(&format!(
+            "\nWritten to {}, what it promises to plan.json beside it\n",
+            folder.join("plan.csv").display()
+        ))?;
     }
     if plan.suffices {
         return Ok(Outcome::Done);

@@ -119,7 +119,10 @@ fn finish(common: &Common, campaign: &Campaign, folder: &Path, stores: &[Store])
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::study_text(campaign, &results))?;
-        output::print(&format!("\nWritten to {}, each parameter to parameters.csv beside it\n", folder.join("study.csv").display()))?;
+        output::print(&format!(
+            "\nWritten to {}, each parameter to parameters.csv beside it\n",
+            folder.join("study.csv").display()
+        ))?;
     }
     let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(if results.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })

@@ -3,7 +3,7 @@
 use crate::study::{ErrorSummary, Errors};
 
 /// For each arm by name the poses that have no equilibrium with it, so that no mean over their errors exists; `None` where
-/// all have one.
+/// all errors are known.
 pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     let mut parts = Vec::new();
     for (arm, errors) in arms {
@@ -14,7 +14,12 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
         }
     }
     let poses = parts.join("; ");
-    (!parts.is_empty()).then(|| format!("{poses}. Over such poses there is no mean, rms or largest error."))
+    let all = arms.iter().flat_map(|(_, errors)| [&errors.held_out, &errors.identification]);
+    match poses.as_str() {
+        "" if all.into_iter().all(|of| of.rms.norm.is_finite()) => None,
+        "" => Some("Some errors are too large for their squares to be numbers.".to_owned()),
+        _ => Some(format!("{poses}. Over such poses there is no mean, rms or largest error.")),
+    }
 }
 
 /// "3 of 50 held-out poses have no equilibrium".

@@ -49,8 +49,8 @@ pub(super) fn failed(findings: &Findings) -> Vec<String> {
 pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<&'static str> {
     let size = findings.checks.iter().find(|check| check.test == Test::ReducedChiSquared)?.outcome.as_ref().ok()?;
     (number(size.statistic, 2) != number(chi2?, 2)).then_some(
-        "The checks leave outliers out and let stiffnesses that the problem holds equal differ, so their χ²/ν is a little \
-         different.",
+        "The checks have a χ²/ν of their own: they leave outliers out and let stiffnesses that the problem holds equal \
+         differ.",
     )
 }
 

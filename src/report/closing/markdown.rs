@@ -20,10 +20,7 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
         fit.fitted.identification.n,
         fit.fitted.held_out.n
     );
-    let mut blocks = vec![
-        Block::Text(parts::verdict(closure)),
-        Block::Text(counts),
-    ];
+    let mut blocks = vec![Block::Text(parts::verdict(closure)), Block::Text(counts)];
     blocks.extend(parts::distrust(closure));
     blocks.extend([
         Block::Table(parts::errors(closure)),

@@ -71,11 +71,10 @@ pub(super) fn gain(closure: &Closure) -> String {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
-    let unknown = unpredicted(&[
-        ("the nominal arm", &before.fit.registered),
-        ("the arm as declared, fitted", &before.fit.fitted),
-        ("what was found", &after.fitted),
-    ]);
+    let mut arms =
+        vec![("the nominal arm", &before.fit.registered), ("the arm as declared, fitted", &before.fit.fitted)];
+    arms.extend((!closure.effects.is_empty()).then_some(("what was found", &after.fitted)));
+    let unknown = unpredicted(&arms);
     let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
     let notes = [Some(chi2), another, unknown.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(" ");
     let gain = closure.gain;

@@ -10,6 +10,9 @@ use crate::problem::Effect;
 use crate::report::effect::Values;
 use crate::report::quantity::number;
 
+/// Alternatives that are named.
+const SHOWN: usize = 8;
+
 /// An effect as a problem file names it, with its place.
 fn named(found: &Effect) -> String {
     let place = effect::place(found);
@@ -40,7 +43,12 @@ pub(super) fn story(closure: &Closure) -> Markup {
 
 fn one(found: &Found, closure: &Closure) -> Markup {
     let values = Values::of(&found.estimates);
-    let others: Vec<String> = found.alternatives.iter().map(named).collect();
+    let mut others: Vec<String> = found.alternatives.iter().map(named).collect();
+    let more = others.len().saturating_sub(SHOWN);
+    others.truncate(SHOWN);
+    if more > 0 {
+        others.push(format!("and {more} more, in loop.json"));
+    }
     html! {
         div.found {
             h3 { (capital(&closure.before.describe(&found.effect))) }

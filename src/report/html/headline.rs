@@ -141,7 +141,7 @@ pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
             (meaning)
         }
         (distrust(after))
-        (missing(&[("the nominal arm", &fit.registered), ("the declared model", &fit.fitted), ("what was found", &after.fitted)]))
+        (missing(&[("the nominal arm", &fit.registered), ("the declared model", &fit.fitted), ("the model after the loop", &after.fitted)]))
         dl.facts {
             (fact("Verdict", verdict))
             (fact("Effects found", &closure.effects.len().to_string()))
