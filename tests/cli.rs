@@ -270,6 +270,27 @@ fn a_result_that_cannot_be_written_is_an_error() {
     fs::write(bench.path("taken"), "a file where a folder is wanted").unwrap();
     let assert = bench.identify(&["--out", "taken"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("cannot write"));
+    // What is in the way of one file keeps all away.
+    fs::create_dir_all(bench.path("page/report.html")).unwrap();
+    bench.identify(&["--out", "page"]).code(2);
+    assert_eq!(fs::read_dir(bench.path("page")).unwrap().count(), 1);
+    fs::create_dir(bench.path("drawn")).unwrap();
+    fs::write(bench.path("drawn/figures"), "").unwrap();
+    bench.identify(&["--out", "drawn"]).code(2);
+    assert_eq!(fs::read_dir(bench.path("drawn")).unwrap().count(), 1);
+}
+
+#[test]
+fn figures_of_an_older_page_go_and_other_files_stay() {
+    let bench = Bench::new();
+    fs::create_dir_all(bench.path("out/figures")).unwrap();
+    for name in ["effect-1.svg", "ranking.svg", "effect-mine.svg", "mine.svg", "ranking.txt"] {
+        fs::write(bench.path(&format!("out/figures/{name}")), "").unwrap();
+    }
+    bench.identify(&["--out", "out"]).success();
+    let there = |name: &str| bench.path(&format!("out/figures/{name}")).exists();
+    assert!(!there("effect-1.svg") && !there("ranking.svg"));
+    assert!(["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there));
 }
 
 #[test]

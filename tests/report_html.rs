@@ -58,6 +58,7 @@ fn check(page: &Page) {
     }
     assert!(page.figures.len() >= 5);
     for (name, figure) in &page.figures {
+        assert!(report::is_figure(name), "{name}");
         assert_eq!(badly_nested(figure), None, "{name}");
         assert!(figure.starts_with("<svg ") && figure.contains("aria-label=\""), "{name}");
         // Labels carry their units; places on a map of residuals and states are words.
@@ -131,6 +132,35 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
+}
+
+#[test]
+fn poses_without_an_equilibrium_are_counted_and_left_out() {
+    let (problem, measurements, split) = case("tests/cases/a-none.csv");
+    let mut found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
+    let mut shown = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let last = shown.states.len() - 1;
+    let errors = &mut shown.states[last].errors;
+    for error in errors.iter_mut().take(3) {
+        *error = Vector3::repeat(f64::NAN);
+    }
+    found.fitted.held_out = ErrorSummary::of(errors);
+    let count = errors.len();
+    let words = format!("3 of {count} held-out poses have no equilibrium");
+    let page = report::identification_page(&problem, &found, &shown);
+    check(&page);
+    assert!(page.html.contains(&words) && page.html.contains("3 poses without an equilibrium are left out"));
+    let dots = |page: &Page| {
+        page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
+    };
+    let whole = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    // One dot fewer in each of the four panels for each of the three poses.
+    assert_eq!(dots(&page) + 12, dots(&report::identification_page(&problem, &found, &whole)));
+    for text in
+        [report::identification_markdown(&problem, &found, &shown.findings), report::estimate_text(&problem, &found)]
+    {
+        assert!(text.contains(&words) && !text.contains("NaN"), "{text}");
+    }
 }
 
 #[test]

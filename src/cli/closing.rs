@@ -48,8 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     ];
     let shown = picture::of_closure(&problem, &measurements, &split, &closure)?;
     let page = report::closure_page(&problem, &closure, &shown);
-    output::write_all(&folder, &results)?;
-    output::write_page(&folder, &page)?;
+    output::write_report(&folder, &results, &page)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

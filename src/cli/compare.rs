@@ -34,8 +34,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let folder = common.folder(&problem);
     let shown = picture::of_comparison(&problem, &measurements, &split, &comparison)?;
     let told = report::comparison_markdown(&problem, &comparison, &shown.findings);
-    output::write_all(&folder, &[("compare.json", &json), ("report.md", &told)])?;
-    output::write_page(&folder, &report::comparison_page(&problem, &comparison, &shown))?;
+    let page = report::comparison_page(&problem, &comparison, &shown);
+    output::write_report(&folder, &[("compare.json", &json), ("report.md", &told)], &page)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

@@ -99,8 +99,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let folder = common.folder(&problem);
     let shown = picture::of_identification(&problem, &measurements, &split, &identification)?;
     let told = report::identification_markdown(&problem, &identification, &shown.findings);
-    output::write_all(&folder, &[("estimate.json", &json), ("report.md", &told)])?;
-    output::write_page(&folder, &report::identification_page(&problem, &identification, &shown))?;
+    let page = report::identification_page(&problem, &identification, &shown);
+    output::write_report(&folder, &[("estimate.json", &json), ("report.md", &told)], &page)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use flexcal::report::Page;
+use flexcal::report::{Page, is_figure};
 
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -27,28 +27,64 @@ pub fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, WriteErro
 }
 
 /// Writes texts by name, each whole or not at all, and none before all of them are on the disk.
-pub fn write_all(path: &Path, texts: &[(&str, &str)]) -> Result<(), WriteError> {
-    folder(path)?;
-    let mut files = Vec::new();
-    for (name, text) in texts {
-        let path_of = path.join(name);
-        let failed = |source| WriteError { path: path_of.clone(), source };
-        let mut file = tempfile::NamedTempFile::new_in(path).map_err(failed)?;
-        file.write_all(text.as_bytes()).and_then(|()| file.flush()).map_err(failed)?;
-        files.push((file, path_of));
+pub fn write_all(folder: &Path, texts: &[(&str, &str)]) -> Result<(), WriteError> {
+    keep(texts.iter().map(|(name, text)| (folder.join(name), *text)).collect())
+}
+
+/// The same with a page: `report.html` and its figures in `figures`, from where those of an older page go.
+pub fn write_report(folder: &Path, texts: &[(&str, &str)], page: &Page) -> Result<(), WriteError> {
+    let drawn = folder.join("figures");
+    let texts = texts.iter().copied().chain([("report.html", page.html.as_str())]);
+    let mut files: Vec<(PathBuf, &str)> = texts.map(|(name, text)| (folder.join(name), text)).collect();
+    files.extend(page.figures.iter().map(|(name, figure)| (drawn.join(name), figure.as_str())));
+    keep(files)?;
+    forget(&drawn, page).map_err(|source| WriteError { path: drawn, source })
+}
+
+/// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its place.
+fn keep(files: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
+    for (path, _) in &files {
+        let above = path.ancestors().skip(1).find(|above| above.exists());
+        let source = match above {
+            _ if path.is_dir() => "a folder of that name is in the way",
+            Some(above) if !above.is_dir() => "a file is in the way of its folder",
+            _ => continue,
+        };
+        return Err(WriteError { path: path.clone(), source: io::Error::other(source) });
     }
-    for (file, path) in files {
+    let mut ready = Vec::with_capacity(files.len());
+    for (path, text) in files {
+        match prepared(&path, text) {
+            Ok(file) => ready.push((file, path)),
+            Err(source) => return Err(WriteError { path, source }),
+        }
+    }
+    for (file, path) in ready {
         file.persist(&path).map_err(|error| WriteError { path, source: error.error })?;
     }
     Ok(())
 }
 
-/// Writes a page as `report.html` in `folder`, and its figures in `figures` beside it.
-pub fn write_page(folder: &Path, page: &Page) -> Result<(), WriteError> {
-    for (name, figure) in &page.figures {
-        write(&folder.join("figures"), name, figure)?;
+/// A temporary file with the text in the folder of `path`, which is made if it is not there.
+fn prepared(path: &Path, text: &str) -> io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    file.write_all(text.as_bytes())?;
+    file.flush()?;
+    Ok(file)
+}
+
+/// Removes figures from a folder that are not on the page; files that are no figures of flexcal stay.
+fn forget(drawn: &Path, page: &Page) -> io::Result<()> {
+    for entry in fs::read_dir(drawn)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let is_old = |name: &str| is_figure(name) && page.figures.iter().all(|(own, _)| own != name);
+        if name.to_str().is_some_and(is_old) && entry.file_type()?.is_file() {
+            fs::remove_file(entry.path())?;
+        }
     }
-    write(folder, "report.html", &page.html)?;
     Ok(())
 }
 

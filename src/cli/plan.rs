@@ -115,13 +115,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
     let folder = common.folder(&problem);
     let json = report::plan_json(&problem, criterion, source.seed, &plan, separated.as_ref());
-    let path = output::write(&folder, "plan.csv", &report::poses_csv(&problem, &plan.poses))?;
-    output::write(&folder, "plan.json", &json)?;
+    let table = report::poses_csv(&problem, &plan.poses);
+    output::write_all(&folder, &[("plan.csv", &table), ("plan.json", &json)])?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::plan_text(&problem, criterion, &plan, separated.as_ref()))?;
-        output::print(&format!("\nWritten to {}, what it promises to plan.json beside it\n", path.display()))?;
+        output::print(&format!(
+            "\nWritten to {}, what it promises to plan.json beside it\n",
+            folder.join("plan.csv").display()
+        ))?;
     }
     if plan.suffices {
         return Ok(Outcome::Done);

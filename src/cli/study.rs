@@ -108,15 +108,21 @@ fn fit(common: &Common, campaign: &Campaign, store: &Store, shard: Shard) -> Res
 fn finish(common: &Common, campaign: &Campaign, folder: &Path, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
     let results = campaign::collect(campaign, stores)?;
     let json = report::study_json(campaign, &results);
-    output::write(folder, "study.json", &json)?;
-    output::write(folder, "parameters.csv", &report::study_parameters_csv(campaign, &results))?;
-    output::write(folder, "timing.csv", &report::study_timing_csv(&results))?;
-    let table = output::write(folder, "study.csv", &report::study_csv(campaign, &results))?;
+    let texts = [
+        ("study.json", json.as_str()),
+        ("parameters.csv", &report::study_parameters_csv(campaign, &results)),
+        ("timing.csv", &report::study_timing_csv(&results)),
+        ("study.csv", &report::study_csv(campaign, &results)),
+    ];
+    output::write_all(folder, &texts)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::study_text(campaign, &results))?;
-        output::print(&format!("\nWritten to {}, each parameter to parameters.csv beside it\n", table.display()))?;
+        output::print(&format!(
+            "\nWritten to {}, each parameter to parameters.csv beside it\n",
+            folder.join("study.csv").display()
+        ))?;
     }
     let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(if results.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })

@@ -16,7 +16,7 @@ const ENOUGH: usize = 1000;
 /// Eigenvalues of a normal matrix of unit diagonal below this are what nothing sees.
 const UNSEEN: f64 = 1e-12;
 
-/// The picture of a correction: every pose's own measurement of it, where its place and quantity are known.
+/// The picture of a correction, less its mean: every pose's own measurement of it, where its place and quantity are known.
 pub(super) fn of(left: &Unexplained, closure: &Closure, arm: &Arm, sight: &Sight, sigma: f64) -> Option<Cause> {
     let correction = left.correction.as_ref()?;
     let abscissa = abscissa(left.depends_on.first()?, closure)?;
@@ -34,9 +34,10 @@ pub(super) fn of(left: &Unexplained, closure: &Closure, arm: &Arm, sight: &Sight
     });
     let (_, slot, levers, rest) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let telling = telling(&levers);
+    let mean = mean(&correction.curve);
     let points = (0..rows.len())
         .filter(|&k| telling[k])
-        .map(|k| Point { x: x[k], y: law[k] + along(&levers[k], &rest[k]), held_out: false })
+        .map(|k| Point { x: x[k], y: law[k] - mean + along(&levers[k], &rest[k]), held_out: false })
         .collect();
     let unit = match slot {
         Slot::Joint { field: JointField::A | JointField::D, .. } => Unit::Length,
@@ -47,7 +48,7 @@ pub(super) fn of(left: &Unexplained, closure: &Closure, arm: &Arm, sight: &Sight
         abscissa,
         ordinate: Ordinate::Place { place: left.place.clone(), unit },
         points,
-        curve: correction.curve.clone(),
+        curve: correction.curve.iter().map(|&(x, y)| (x, y - mean)).collect(),
     })
 }
 
@@ -89,6 +90,13 @@ fn slots(place: &str) -> Vec<Slot> {
         (None, Some(number)) => at(number, &[JointField::Theta, JointField::D, JointField::Beta]),
         (None, None) => Vec::new(),
     }
+}
+
+/// Mean height of a curve over its range.
+fn mean(curve: &[(f64, f64)]) -> f64 {
+    let trapezoids: f64 = curve.windows(2).map(|pair| (pair[1].0 - pair[0].0) * 0.5 * (pair[0].1 + pair[1].1)).sum();
+    let width = curve.last().zip(curve.first()).map_or(0.0, |(last, first)| last.0 - first.0);
+    if width > 0.0 { trapezoids / width } else { 0.0 }
 }
 
 /// A curve between its points; nought beyond them.

@@ -124,7 +124,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
             .to_owned(),
         conditioning(&forecast.identifiability, names.len(), check.coordinates),
         "\n".to_owned(),
-        blind_text(&forecast.identifiability, &names),
+        blind_text(&forecast.identifiability, &names, "check.json"),
         "\n".to_owned(),
         prediction(check),
         "\n".to_owned(),

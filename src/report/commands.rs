@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::cells::quoted;
 use super::json::to_text;
-use super::quantity::number;
+use super::quantity::{fixed, number};
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, Problem};
 use crate::study::Command;
@@ -37,7 +37,7 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         })
         .collect();
     let mut lines: Vec<String> = Vec::with_capacity(commands.len() + 1);
-    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| number(values[row], 4));
+    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| fixed(values[row], 4));
     let word = |labels: &Labels, row: usize| quoted(&labels.names[labels.of_row[row]]);
     let has_sessions = targets.session.names.iter().any(|name| !name.is_empty());
     let mut header: Vec<String> = joints.iter().map(|(j, unit, _)| format!("q{}_{unit}", j + 1)).collect();
@@ -56,14 +56,14 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         // A controller must not be given a command that does not lead there.
         let show = |value: String| if command.is_reached() { value } else { String::new() };
         let mut cells: Vec<String> =
-            joints.iter().map(|&(j, _, factor)| show(number(command.configuration[j] * factor, 7))).collect();
-        cells.extend(targets.positions[row].iter().map(|x| number(x * 1e3, 4)));
+            joints.iter().map(|&(j, _, factor)| show(fixed(command.configuration[j] * factor, 7))).collect();
+        cells.extend(targets.positions[row].iter().map(|x| fixed(x * 1e3, 4)));
         cells.extend(has_sessions.then(|| word(&targets.session, row)));
         cells.extend(targets.target.as_ref().map(|labels| word(labels, row)));
         cells.extend(value(&targets.payload, row));
         cells.extend(value(&targets.hoist, row));
-        cells.push(number(command.miss.norm() * 1e3, 4));
-        cells.push(number(command.seed_miss * 1e3, 4));
+        cells.push(fixed(command.miss.norm() * 1e3, 4));
+        cells.push(fixed(command.seed_miss * 1e3, 4));
         cells.push(command.is_reached().to_string());
         lines.push(cells.join(","));
     }

@@ -1,6 +1,7 @@
 //! What `compare` prints: the paper's tables 2 and 3 for the problem at hand, then every strategy and every ablation.
 
 use super::quantity::{number, table};
+use super::text::no_errors;
 use crate::problem::Problem;
 use crate::solver::Termination;
 use crate::study::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
@@ -29,6 +30,7 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         ),
         geometry(problem, joint),
         errors(joint, rigid, paper.iter().any(|_| ablations.len() > 1)),
+        no_errors(joint).map_or_else(String::new, |words| format!("  –: {words}\n")),
         rows("strategy", strategy_rows(comparison)),
         paper_ignores_effects(problem, paper),
         rows("elasticity", ablation_rows(comparison)),

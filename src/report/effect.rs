@@ -11,7 +11,9 @@ use crate::study::Estimate;
 /// Decimals of a value at most.
 const MOST: usize = 6;
 /// Parameters of one effect that are listed one by one.
-const MOST_LISTED: usize = 8;
+pub(super) const MOST_LISTED: usize = 8;
+/// Waves of a joint that are shown of more.
+pub(super) const SHOWN_WAVES: usize = 4;
 /// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
 const LEAST_P: f64 = 1e-16;
 
@@ -59,16 +61,32 @@ pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
     }
 }
 
-/// The parameters of an effect with their values; of many waves the largest, by their height.
-pub(super) fn values(estimates: &[Estimate]) -> Vec<(String, String)> {
-    if estimates.len() <= MOST_LISTED {
-        return estimates.iter().map(|estimate| (estimate.name.clone(), value(estimate))).collect();
+/// The parameters of an effect with their values; of many waves the highest, by their height.
+#[derive(Debug)]
+pub(super) struct Values {
+    /// Names and values.
+    pub shown: Vec<(String, String)>,
+    /// What is left out, in words.
+    pub rest: Option<String>,
+}
+
+impl Values {
+    pub fn of(estimates: &[Estimate]) -> Self {
+        if estimates.len() <= MOST_LISTED {
+            let shown = estimates.iter().map(|estimate| (estimate.name.clone(), value(estimate))).collect();
+            return Self { shown, rest: None };
+        }
+        let mut waves: Vec<(String, Estimate)> = estimates.chunks_exact(2).filter_map(wave).collect();
+        waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
+        let shown = waves.iter().take(SHOWN_WAVES).map(|(name, height)| (name.clone(), value(height))).collect();
+        let lower = waves.len().saturating_sub(SHOWN_WAVES);
+        Self { shown, rest: (lower > 0).then(|| format!("and {lower} lower waves, in loop.json")) }
     }
-    let mut waves: Vec<(String, Estimate)> = estimates.chunks_exact(2).filter_map(wave).collect();
-    waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-    let shown = waves.iter().take(MOST_LISTED / 2).map(|(name, height)| (name.clone(), value(height)));
-    let more = waves.len().saturating_sub(MOST_LISTED / 2);
-    shown.chain([(format!("{more} lower ones"), "in loop.json".to_owned())]).collect()
+
+    /// One line for each.
+    pub fn lines(self) -> Vec<String> {
+        self.shown.into_iter().map(|(name, value)| format!("{name} = {value}")).chain(self.rest).collect()
+    }
 }
 
 /// Height of a sine and a cosine of one order, with its standard error; the two taken as uncorrelated.

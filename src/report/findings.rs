@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::quantity::number;
 use crate::diagnosis::{Check, Findings, Test};
 
 /// One check.
@@ -42,6 +43,15 @@ pub(super) fn entries(findings: &Findings) -> Vec<Entry<'_>> {
 /// The checks that failed, in words.
 pub(super) fn failed(findings: &Findings) -> Vec<String> {
     findings.checks.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
+}
+
+/// Why the checks name another χ²/ν than the fit's own `chi2`; nothing where both read the same.
+pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<&'static str> {
+    let size = findings.checks.iter().find(|check| check.test == Test::ReducedChiSquared)?.outcome.as_ref().ok()?;
+    (number(size.statistic, 2) != number(chi2?, 2)).then_some(
+        "The checks have a χ²/ν of their own: they leave outliers out and let stiffnesses that the problem holds equal \
+         differ.",
+    )
 }
 
 /// Every check in words with its verdict: those that failed, those that passed, those that could not be made.

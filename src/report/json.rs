@@ -163,7 +163,7 @@ impl From<&AxisValues> for Axes {
 
 impl From<&ErrorSummary> for Summary {
     fn from(summary: &ErrorSummary) -> Self {
-        let ErrorSummary { n, mean, max, rms } = summary;
+        let ErrorSummary { n, mean, max, rms, .. } = summary;
         Self { n: *n, mean_mm: mean.into(), max_mm: max.into(), rms_mm: rms.into() }
     }
 }

@@ -3,9 +3,9 @@
 use super::compare_text::{ROWS, TIME, ablation_rows, strategy_rows};
 use super::document::{Block, Table, to_markdown};
 use super::findings;
-use super::parameters::{HEADER, LEFT, blind_text, correlation_text, parameter_rows};
+use super::parameters::{blind_text, correlation_text, parameter_blocks};
 use super::quantity::number;
-use super::text::{conditioning, noise, outliers, why_not_trusted};
+use super::text::{conditioning, no_errors, noise, outliers, why_not_trusted};
 use crate::diagnosis::Findings;
 use crate::problem::Problem;
 use crate::study::{Comparison, ErrorSummary, Identification};
@@ -13,7 +13,8 @@ use crate::study::{Comparison, ErrorSummary, Identification};
 /// An identification as Markdown, ending in a line break.
 pub fn identification_markdown(problem: &Problem, found: &Identification, findings: &Findings) -> String {
     let mut blocks = vec![Block::Text(counts(found)), Block::Table(errors(found))];
-    blocks.extend(identified(problem, found, findings));
+    blocks.extend(no_errors(found).map(Block::Text));
+    blocks.extend(identified(problem, found, findings, "estimate.json"));
     to_markdown(&problem.title, &blocks)
 }
 
@@ -41,7 +42,8 @@ pub fn comparison_markdown(problem: &Problem, comparison: &Comparison, findings:
         Block::heading("Everything fitted at once"),
         Block::Table(errors(joint)),
     ];
-    blocks.extend(identified(problem, joint, findings));
+    blocks.extend(no_errors(joint).map(Block::Text));
+    blocks.extend(identified(problem, joint, findings, "the estimate.json of `flexcal identify`"));
     to_markdown(&problem.title, &blocks)
 }
 
@@ -76,18 +78,18 @@ fn errors(found: &Identification) -> Table {
 }
 
 /// The residual, the parameters, and what the poses can tell.
-fn identified(problem: &Problem, found: &Identification, findings: &Findings) -> Vec<Block> {
+fn identified(problem: &Problem, found: &Identification, findings: &Findings, file: &str) -> Vec<Block> {
     let mut left = vec![noise(problem, found), outliers(problem, found)];
     left.retain(|text| !text.is_empty());
     let mut blocks = vec![Block::heading("What is left")];
     blocks.extend(left.iter().flat_map(|text| with_points(text)));
     blocks.push(Block::list(findings::all(findings)));
+    blocks.extend(findings::another_size(findings, found.reduced_chi2).map(|words| Block::Text(words.to_owned())));
     blocks.push(Block::heading("Parameters"));
-    let (header, left) = (HEADER.to_vec(), LEFT.to_vec());
-    blocks.push(Block::Table(Table { header, rows: parameter_rows(found), left }));
+    blocks.extend(parameter_blocks(found, file));
     blocks.push(Block::heading("What the poses can tell"));
     blocks.push(paragraph(&conditioning(&found.identifiability, found.unknowns.len(), found.coordinates)));
-    for text in [blind_text(&found.identifiability, &found.unknowns), correlation_text(found)] {
+    for text in [blind_text(&found.identifiability, &found.unknowns, file), correlation_text(found, file)] {
         blocks.extend(with_points(&text));
     }
     blocks

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::document::{Block, Table};
 use super::quantity::{Display, decimals, number, table};
+use super::waves::{Line, shown};
 use crate::fit::{BlindCombination, Identifiability};
 use crate::parameter::Unit;
 use crate::solver::AtBound;
@@ -14,17 +16,24 @@ const PLAIN: usize = 4;
 const MOST: usize = 6;
 /// Weights in a blind combination that are worth naming.
 const NAMED: f64 = 0.02;
+/// Terms of a blind combination that are named, the largest.
+const MOST_NAMED: usize = 8;
+/// Blind combinations that fit on a screen.
+const SHOWN_BLIND: usize = 12;
 /// Correlations that fit on a screen.
 const SHOWN_CORRELATIONS: usize = 12;
 
 /// Columns of the table of parameters.
-pub(super) const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
+const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
 /// Those of them that hold words.
-pub(super) const LEFT: [usize; 3] = [0, 5, 6];
+const LEFT: [usize; 3] = [0, 5, 6];
 
 /// Nominal, estimate, change and standard error of every free parameter.
 pub(super) fn parameter_table(result: &Identification) -> String {
     let mut text = table(&HEADER, parameter_rows(result), &LEFT);
+    if !shown(&result.estimates).lower.is_empty() {
+        text.push_str("  lower waves: in estimate.json\n");
+    }
     if result.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         text.push_str(
             "  –: no standard error: the data say nothing of it or see it in a blind combination only, a bound holds it, or it \
@@ -37,8 +46,18 @@ pub(super) fn parameter_table(result: &Identification) -> String {
     text
 }
 
+/// The same without words on its columns, and the file that holds what is left out.
+pub(super) fn parameter_blocks(result: &Identification, file: &str) -> Vec<Block> {
+    let (header, left) = (HEADER.to_vec(), LEFT.to_vec());
+    let mut blocks = vec![Block::Table(Table { header, rows: parameter_rows(result), left })];
+    if !shown(&result.estimates).lower.is_empty() {
+        blocks.push(Block::Text(format!("Lower waves: in {file}.")));
+    }
+    blocks
+}
+
 /// The rows of that table.
-pub(super) fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
+fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
     let row = |estimate: &Estimate| {
         let unit = Display::of(estimate.unit, estimate.nominal);
         let error = estimate.std_error.map(|error| error * unit.factor);
@@ -54,7 +73,15 @@ pub(super) fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
             verdict(estimate),
         ]
     };
-    result.estimates.iter().map(row).collect()
+    let line = |line: &Line| match line {
+        Line::Parameter(estimate) => row(estimate),
+        Line::Lower(waves, joint) => {
+            let mut cells = vec![String::new(); HEADER.len()];
+            cells[0] = format!("and {waves} lower waves of joint {joint}");
+            cells
+        }
+    };
+    shown(&result.estimates).lines.iter().map(line).collect()
 }
 
 /// How well a parameter is identified, in a word and a share.
@@ -85,8 +112,8 @@ fn is_vague(estimate: &Estimate) -> bool {
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
-/// The combinations that no measurement sees, in words.
-pub(super) fn blind_text(found: &Identifiability, unknowns: &[String]) -> String {
+/// The combinations that no measurement sees, in words; `file` holds them all.
+pub(super) fn blind_text(found: &Identifiability, unknowns: &[String], file: &str) -> String {
     let blind = &found.blind;
     if blind.is_empty() {
         return "The data see every combination of the parameters there.\n".to_owned();
@@ -97,8 +124,11 @@ pub(super) fn blind_text(found: &Identifiability, unknowns: &[String]) -> String
         blind.len(),
         unknowns.len()
     );
-    for combination in blind {
+    for combination in blind.iter().take(SHOWN_BLIND) {
         let _ = writeln!(text, "  {}", blind_words(combination, unknowns));
+    }
+    if blind.len() > SHOWN_BLIND {
+        let _ = writeln!(text, "  and {} more in {file}", blind.len() - SHOWN_BLIND);
     }
     text
 }
@@ -112,15 +142,19 @@ pub(super) fn blind_words(combination: &BlindCombination, unknowns: &[String]) -
     // Equal weights differ by rounding from machine to machine: sort by what is shown.
     let shown = |weight: f64| (weight.abs() * 100.0).round();
     named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
-    let terms: Vec<String> = named
+    let mut terms: Vec<String> = named
         .iter()
+        .take(MOST_NAMED)
         .map(|(k, weight)| format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k)))
         .collect();
+    if named.len() > MOST_NAMED {
+        terms.push(format!("… and {} smaller", named.len() - MOST_NAMED));
+    }
     terms.join(" ")
 }
 
-/// Pairs of parameters that go together.
-pub(super) fn correlation_text(result: &Identification) -> String {
+/// Pairs of parameters that go together; `file` holds them all.
+pub(super) fn correlation_text(result: &Identification, file: &str) -> String {
     // What one blind combination ties together is told above.
     let tied = |a: &str, b: &str| {
         let holds =
@@ -137,7 +171,7 @@ pub(super) fn correlation_text(result: &Identification) -> String {
         let _ = writeln!(text, "  {a} and {b}: {sign}{:.3}", correlation.abs());
     }
     if pairs.len() > SHOWN_CORRELATIONS {
-        let _ = writeln!(text, "  and {} more in estimate.json", pairs.len() - SHOWN_CORRELATIONS);
+        let _ = writeln!(text, "  and {} more in {file}", pairs.len() - SHOWN_CORRELATIONS);
     }
     text
 }

@@ -121,7 +121,7 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
         "\n".to_owned(),
         conditioning(&planned.identifiability, names.len(), 3 * planned.poses),
         "\n".to_owned(),
-        blind_text(&planned.identifiability, &names),
+        blind_text(&planned.identifiability, &names, "plan.json"),
         separated.map_or_else(String::new, |separated| format!("\n{}", separation::text(separated))),
     ]
     .concat()

@@ -1,7 +1,7 @@
 //! Poses to measure, as a table.
 
 use super::cells::quoted;
-use super::quantity::number;
+use super::quantity::fixed;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{HeldOut, JointKind, Problem};
 
@@ -61,6 +61,6 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
 
 /// Six decimals, without zeros at the end.
 fn plain(value: f64) -> String {
-    let text = number(value, 6);
+    let text = fixed(value, 6);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

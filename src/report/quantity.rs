@@ -2,6 +2,9 @@
 
 use crate::parameter::Unit;
 
+/// From here on numbers are written with a power of ten.
+const HUGE: f64 = 1e12;
+
 /// A unit for display and the factor from SI to it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Display {
@@ -51,8 +54,17 @@ pub(super) fn decimals(error: f64, most: usize) -> usize {
     wanted
 }
 
-/// `value` with `decimals`, never as "-0".
+/// `value` with `decimals`, never as "-0"; as `1.234e300` where it is huge, "–" where there is none.
 pub(super) fn number(value: f64, decimals: usize) -> String {
+    match value.abs() {
+        size if size < HUGE => fixed(value, decimals),
+        size if size.is_finite() => format!("{value:.3e}"),
+        _ => "–".to_owned(),
+    }
+}
+
+/// `value` with `decimals`, never as "-0", for tables that programs read.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
@@ -88,5 +100,7 @@ mod tests {
         assert_eq!(decimals(1e-12, 6), 6);
         assert_eq!(number(-0.0001, 3), "0.000");
         assert_eq!(number(-0.5, 1), "-0.5");
+        assert_eq!(number(-1.5e300, 4), "-1.500e300");
+        assert_eq!((number(f64::NAN, 2), number(f64::INFINITY, 2)), ("–".to_owned(), "–".to_owned()));
     }
 }

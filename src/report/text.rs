@@ -1,5 +1,6 @@
 //! What `identify` prints.
 
+use super::errors::unpredicted;
 use super::parameters::{blind_text, correlation_text, parameter_table};
 use std::fmt::Write as _;
 
@@ -21,8 +22,8 @@ pub fn estimate_text(problem: &Problem, result: &Identification) -> String {
         parameter_table(result),
         active_constraints(result),
         conditioning(&result.identifiability, result.unknowns.len(), result.coordinates),
-        blind_text(&result.identifiability, &result.unknowns),
-        correlation_text(result),
+        blind_text(&result.identifiability, &result.unknowns, "estimate.json"),
+        correlation_text(result, "estimate.json"),
     ]
     .into_iter()
     .filter(|part| !part.is_empty())
@@ -72,15 +73,23 @@ fn errors(result: &Identification) -> String {
     let header = ["error, mm", "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
     let mut text = table(&header, rows, &[0, 1]);
     text.push_str("  before: nominal arm, with base and tool fitted where they are free\n");
+    if let Some(words) = no_errors(result) {
+        let _ = writeln!(text, "  –: {words}");
+    }
     text
+}
+
+/// Poses whose errors an identification does not know.
+pub(super) fn no_errors(result: &Identification) -> Option<String> {
+    unpredicted(&[("the nominal arm", &result.registered), ("the arm as identified", &result.fitted)])
 }
 
 /// How large the residual is against the declared noise.
 pub(super) fn noise(problem: &Problem, result: &Identification) -> String {
     match (result.noise, result.reduced_chi2) {
         (Noise::Estimated(sigma), _) => format!(
-            "No σ is declared; the scatter about the fit gives {:.4} mm per coordinate, model errors included.\n",
-            sigma * 1e3
+            "No σ is declared; the scatter about the fit gives {} mm per coordinate, model errors included.\n",
+            number(sigma * 1e3, 4)
         ),
         (Noise::Unknown, _) => {
             "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors.\n"
@@ -93,13 +102,14 @@ pub(super) fn noise(problem: &Problem, result: &Identification) -> String {
         (Noise::Declared, Some(chi2)) if result.noise_factor > 1.0 => {
             let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({:.4} mm)", s * 1e3));
             format!(
-                "Reduced χ² is {chi2:.2}: the residual is {:.1} times the declared σ{declared}, so the model lacks something.\n\
+                "Reduced χ² is {}: the residual is {} times the declared σ{declared}, so the model lacks something.\n\
                  Standard errors are raised by that factor.\n",
-                chi2.sqrt()
+                number(chi2, 2),
+                number(chi2.sqrt(), 1)
             )
         }
         (Noise::Declared, Some(chi2)) => {
-            format!("Reduced χ² is {chi2:.2}: the model explains the data to the declared σ.\n")
+            format!("Reduced χ² is {}: the model explains the data to the declared σ.\n", number(chi2, 2))
         }
     }
 }
@@ -132,8 +142,8 @@ pub(super) fn outliers(problem: &Problem, result: &Identification) -> String {
     let (n, poses) = (outliers.len(), result.fitted.identification.n);
     let mut text = format!("{n} of {poses} poses are too far off to be noise ({treatment}):\n");
     for outlier in outliers.iter().take(SHOWN_OUTLIERS) {
-        let error = outlier.error.norm() * 1e3;
-        let _ = writeln!(text, "  {}: {error:.3} mm, {:.1} σ of the scatter", outlier.location, outlier.distance);
+        let (error, distance) = (number(outlier.error.norm() * 1e3, 3), number(outlier.distance, 1));
+        let _ = writeln!(text, "  {}: {error} mm, {distance} σ of the scatter", outlier.location);
     }
     if n > SHOWN_OUTLIERS {
         let _ = writeln!(text, "  and {} more in estimate.json", n - SHOWN_OUTLIERS);

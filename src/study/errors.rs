@@ -20,6 +20,8 @@ pub struct AxisValues {
 pub struct ErrorSummary {
     /// Number of poses.
     pub n: usize,
+    /// How many of them have no equilibrium: their errors, and with them mean, max and rms, are NaN.
+    pub unpredicted: usize,
     /// Mean absolute value per axis, mean norm.
     pub mean: AxisValues,
     /// Largest absolute value per axis, largest norm.
@@ -39,6 +41,7 @@ impl ErrorSummary {
         };
         Self {
             n: errors.len(),
+            unpredicted: errors.iter().filter(|error| error.iter().any(|x| x.is_nan())).count(),
             mean: over(&|sum, v| sum + v, &|sum| sum / n),
             max: over(&|max, v| if v > max || v.is_nan() { v } else { max }, &|max| max),
             rms: over(&|sum, v| v.mul_add(v, sum), &|sum| (sum / n).sqrt()),

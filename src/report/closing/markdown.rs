@@ -1,7 +1,7 @@
 //! `report.md`.
 
 use super::super::document::{Block, Table, to_markdown};
-use super::super::parameters::{HEADER, LEFT, parameter_rows};
+use super::super::parameters::parameter_blocks;
 use super::super::quantity::number;
 use super::super::{findings, trace};
 use super::parts;
@@ -20,14 +20,14 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
         fit.fitted.identification.n,
         fit.fitted.held_out.n
     );
-    let mut blocks = vec![
-        Block::Text(parts::verdict(closure)),
-        Block::Text(counts),
+    let mut blocks = vec![Block::Text(parts::verdict(closure)), Block::Text(counts)];
+    blocks.extend(parts::distrust(closure));
+    blocks.extend([
         Block::Table(parts::errors(closure)),
         Block::Text(parts::gain(closure)),
         Block::heading("What the declared problem leaves"),
         Block::list(findings::all(&closure.before.findings)),
-    ];
+    ]);
     blocks.extend(trace::ranking(problem, &closure.before, SHOWN, "`flexcal trace` writes them all"));
     blocks.extend(rounds(closure));
     blocks.extend(parts::found(closure));
@@ -35,11 +35,7 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
     let unexplained = parts::unexplained(problem, closure).into_iter();
     blocks.push(Block::list(unexplained.chain(findings::all(&closure.findings))));
     blocks.push(Block::heading("Parameters of the final fit"));
-    blocks.push(Block::Table(Table {
-        header: HEADER.to_vec(),
-        rows: parameter_rows(&closure.after),
-        left: LEFT.to_vec(),
-    }));
+    blocks.extend(parameter_blocks(&closure.after, parts::ALL));
     to_markdown(&problem.title, &blocks)
 }
 

@@ -3,12 +3,17 @@
 use std::fmt::Write as _;
 
 use super::super::document::{Block, Point, Table};
-use super::super::effect;
+use super::super::effect::{self, Values};
+use super::super::errors::unpredicted;
+use super::super::findings;
 use super::super::quantity::number;
+use super::super::text::why_not_trusted;
 use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
 use crate::problem::{JointKind, Problem};
 use crate::study::ErrorSummary;
 
+/// Where all parameters of the final fit are.
+pub(super) const ALL: &str = "the estimate.json of `flexcal identify problem.closed.toml`";
 /// Alternatives that are named.
 const SHOWN: usize = 4;
 
@@ -32,12 +37,18 @@ fn lower(words: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
+/// Why the final fit is not to be trusted.
+pub(super) fn distrust(closure: &Closure) -> Option<Block> {
+    let after = &closure.after;
+    (!after.is_trusted()).then(|| Block::Text(format!("Beware: {}.", why_not_trusted(after))))
+}
+
 /// Errors of the nominal arm, the declared problem and the closed one.
 pub(super) fn errors(closure: &Closure) -> Table {
     let row = |poses: &str, model: &str, of: &ErrorSummary, chi2: Option<f64>| {
         let mut row = vec![poses.to_owned(), model.to_owned()];
         row.extend([of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value * 1e3, 4)));
-        row.push(chi2.map_or_else(String::new, |chi2| format!("{chi2:.2}")));
+        row.push(chi2.map_or_else(String::new, |chi2| number(chi2, 2)));
         row
     };
     let (before, after) = (&closure.before.fit, &closure.after);
@@ -57,15 +68,23 @@ pub(super) fn errors(closure: &Closure) -> Table {
 
 /// How the figures are to be read, with the gain and how sure it is.
 pub(super) fn gain(closure: &Closure) -> String {
+    let (before, after) = (&closure.before, &closure.after);
+    let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
+        .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
+    let mut arms =
+        vec![("the nominal arm", &before.fit.registered), ("the arm as declared, fitted", &before.fit.fitted)];
+    arms.extend((!closure.effects.is_empty()).then_some(("what was found", &after.fitted)));
+    let unknown = unpredicted(&arms);
     let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
-    if closure.effects.is_empty() {
-        return chi2.to_owned();
-    }
+    let notes = [Some(chi2), another, unknown.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(" ");
     let gain = closure.gain;
+    if closure.effects.is_empty() || !gain.value.is_finite() {
+        return notes;
+    }
     let mm = |value: f64| number(value * 1e3, 4);
     format!(
         "What was found takes {} mm off the mean error of the {} held-out poses (95 % interval {} to {} mm). They took no \
-         part in any choice. {chi2}",
+         part in any choice. {notes}",
         mm(gain.value),
         closure.after.fitted.held_out.n,
         mm(gain.low),
@@ -93,8 +112,7 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
 }
 
 fn point(closure: &Closure, found: &Found) -> Point {
-    let mut details: Vec<String> =
-        effect::values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    let mut details = Values::of(&found.estimates).lines();
     let after = found.held_out_after;
     let mm = |value: f64| number(value * 1e3, 4);
     details.push(format!(

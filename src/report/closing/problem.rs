@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
-use super::super::effect::{p, values};
+use super::super::effect::{Values, p};
 use crate::diagnosis::{Closure, Found, Trace, WAVES};
 use crate::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
@@ -158,8 +158,7 @@ fn arguments(effect: &Effect) -> Value {
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found, trace: &Trace) -> Vec<String> {
     let first = format!("Found by flexcal loop: {}, {}.", trace.describe(&found.effect), p(found.p_value));
-    let lines = values(&found.estimates).into_iter().map(|(name, value)| format!("{name} = {value}"));
-    std::iter::once(first).chain(lines).collect()
+    std::iter::once(first).chain(Values::of(&found.estimates).lines()).collect()
 }
 
 #[cfg(test)]

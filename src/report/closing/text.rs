@@ -13,9 +13,9 @@ pub fn loop_text(problem: &Problem, closure: &Closure) -> String {
     let mut blocks = vec![
         Block::Text(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
         Block::Text(parts::verdict(closure)),
-        Block::Table(parts::errors(closure)),
-        Block::Text(parts::gain(closure)),
     ];
+    blocks.extend(parts::distrust(closure));
+    blocks.extend([Block::Table(parts::errors(closure)), Block::Text(parts::gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
         blocks.push(Block::heading("What the declared problem leaves (checks that failed)"));

@@ -2,23 +2,29 @@
 
 use maud::{Markup, html};
 
-use crate::diagnosis::{Check, Findings};
+use crate::diagnosis::{Check, Closure, Findings};
+use crate::report::findings::another_size;
 
 /// Checks of both fits side by side.
-pub(super) fn list(before: &Findings, after: &Findings) -> Markup {
+pub(super) fn list(closure: &Closure) -> Markup {
+    let (before, after) = (&closure.before, &closure.after);
+    let another = another_size(&before.findings, before.fit.reduced_chi2)
+        .or_else(|| another_size(&closure.findings, after.reduced_chi2));
     html! {
         div.columns {
-            div { h3 { "Checks before" } (one(before)) }
-            div { h3 { "Checks after" } (one(after)) }
+            div { h3 { "Checks before" } (one(&before.findings)) }
+            div { h3 { "Checks after" } (one(&closure.findings)) }
         }
+        @if let Some(words) = another { p { (words) } }
     }
 }
 
-/// Checks of one fit.
-pub(super) fn of(findings: &Findings) -> Markup {
+/// Checks of one fit with its own χ²/ν.
+pub(super) fn of(findings: &Findings, chi2: Option<f64>) -> Markup {
     html! {
         h3 { "Checks" }
         (one(findings))
+        @if let Some(words) = another_size(findings, chi2) { p { (words) } }
     }
 }
 

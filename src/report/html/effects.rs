@@ -7,8 +7,11 @@ use crate::diagnosis::{Closure, Found, Trace, Unexplained};
 use crate::effect;
 use crate::picture::Picture;
 use crate::problem::Effect;
-use crate::report::effect::values;
+use crate::report::effect::Values;
 use crate::report::quantity::number;
+
+/// Alternatives that are named.
+const SHOWN: usize = 8;
 
 /// An effect as a problem file names it, with its place.
 fn named(found: &Effect) -> String {
@@ -39,17 +42,24 @@ pub(super) fn story(closure: &Closure) -> Markup {
 }
 
 fn one(found: &Found, closure: &Closure) -> Markup {
-    let others: Vec<String> = found.alternatives.iter().map(named).collect();
+    let values = Values::of(&found.estimates);
+    let mut others: Vec<String> = found.alternatives.iter().map(named).collect();
+    let more = others.len().saturating_sub(SHOWN);
+    others.truncate(SHOWN);
+    if more > 0 {
+        others.push(format!("and {more} more, in loop.json"));
+    }
     html! {
         div.found {
             h3 { (capital(&closure.before.describe(&found.effect))) }
             p { code { (named(&found.effect)) } ", " (chance(found.p_value)) "; once it was in the model, held-out poses were off by "
                 (number(found.held_out_after.mean.norm * 1e3, 3)) " mm on average" }
             table {
-                @for (name, value) in values(&found.estimates) {
+                @for (name, value) in &values.shown {
                     tr { td.l { code { (name) } } td { (value.replace('-', "−")) } }
                 }
             }
+            @if let Some(rest) = &values.rest { p { (rest) "." } }
             @if !others.is_empty() { p { "These data cannot tell it from: " (others.join("; ")) "." } }
         }
     }
@@ -89,7 +99,8 @@ pub(super) fn figures(closure: &Closure, picture: &Picture) -> Vec<Figure> {
         figures::cause(
             trend,
             "unexplained".to_owned(),
-            "No effect explains this; the line is the empirical correction.",
+            "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line and dots: a \
+             constant is what base and geometry take up.",
         )
     }));
     all

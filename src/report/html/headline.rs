@@ -4,8 +4,9 @@ use maud::{Markup, html};
 
 use crate::diagnosis::{Closure, Verdict};
 use crate::problem::Problem;
+use crate::report::errors::unpredicted;
 use crate::report::quantity::{decimals, number};
-use crate::study::{Comparison, ErrorSummary, Identification, Noise};
+use crate::study::{Comparison, ErrorSummary, Errors, Identification, Noise};
 
 /// A length [m] in mm with about three digits.
 fn mm(length: f64) -> String {
@@ -50,6 +51,14 @@ fn spread(errors: &ErrorSummary) -> String {
     format!("rms {} mm, largest {} mm", mm(errors.rms.norm), mm(errors.max.norm))
 }
 
+fn missing(arms: &[(&str, &Errors)]) -> Markup {
+    html! { @if let Some(words) = unpredicted(arms) { p.note { (words) } } }
+}
+
+fn missing_of(found: &Identification) -> Markup {
+    missing(&[("the nominal arm", &found.registered), ("the arm as identified", &found.fitted)])
+}
+
 fn distrust(found: &Identification) -> Markup {
     html! { @if let Some(reason) = &found.distrust { p.note { "Not to be trusted: " (reason.to_string()) } } }
 }
@@ -68,6 +77,7 @@ pub(super) fn of_identification(problem: &Problem, found: &Identification) -> Ma
         (change(found.registered.held_out.mean.norm, held_out.mean.norm, &format!("{} held-out poses", held_out.n)))
         p { (before(problem)) }
         (distrust(found))
+        (missing_of(found))
         dl.facts {
             (poses(found))
             (parameters(found))
@@ -87,6 +97,7 @@ pub(super) fn of_comparison(problem: &Problem, comparison: &Comparison) -> Marku
         (change(joint.registered.held_out.mean.norm, held_out.mean.norm, &format!("{} held-out poses, everything fitted at once", held_out.n)))
         p { (before(problem)) }
         (distrust(joint))
+        (missing_of(joint))
         dl.facts {
             (poses(joint))
             (parameters(joint))
@@ -122,7 +133,7 @@ pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
         (change(first.mean.norm, best.mean.norm, &format!("{} held-out poses, before {with}", last.n)))
         p {
             @if corrected.is_some() { "Without the correction " (mm(last.mean.norm)) " mm. " }
-            @if !closure.effects.is_empty() {
+            @if !closure.effects.is_empty() && gain.value.is_finite() {
                 "Gain of the effects " b { (shown(gain.value)) " mm" } ", 95 % interval " (shown(gain.low)) " to "
                 (shown(gain.high)) " mm. "
             }
@@ -130,6 +141,7 @@ pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
             (meaning)
         }
         (distrust(after))
+        (missing(&[("the nominal arm", &fit.registered), ("the declared model", &fit.fitted), ("the model after the loop", &after.fitted)]))
         dl.facts {
             (fact("Verdict", verdict))
             (fact("Effects found", &closure.effects.len().to_string()))

@@ -18,6 +18,7 @@ use crate::picture::Picture;
 use crate::problem::Problem;
 use crate::study::{Comparison, Identification};
 use figures::Figure;
+pub use figures::is_figure;
 use page::{grid, section};
 
 /// A report for people.
@@ -54,8 +55,8 @@ pub fn identification_page(problem: &Problem, found: &Identification, picture: &
     let body = html! {
         (headline::of_identification(problem, found))
         (section("Errors", &figures.show([figures::errors(picture), figures::vectors(picture)])))
-        (left(&mut figures, picture))
-        (identified(&mut figures, found, picture))
+        (left(&mut figures, found, picture))
+        (identified(&mut figures, found, picture, "estimate.json"))
     };
     figures.page(problem, "identification", &body)
 }
@@ -72,8 +73,8 @@ pub fn comparison_page(problem: &Problem, comparison: &Comparison, picture: &Pic
             (parameters::comparison_table(comparison))
         }))
         (section("Errors of the joint fit", &figures.show([figures::errors(picture), figures::vectors(picture)])))
-        (left(&mut figures, picture))
-        (identified(&mut figures, joint, picture))
+        (left(&mut figures, joint, picture))
+        (identified(&mut figures, joint, picture, "the estimate.json of flexcal identify"))
     };
     figures.page(problem, "comparison", &body)
 }
@@ -90,40 +91,40 @@ pub fn closure_page(problem: &Problem, closure: &Closure, picture: &Picture) -> 
         }))
         (section("Errors before and after", &figures.show([figures::errors(picture), figures::vectors(picture)])))
         (section("What pointed there", &html! {
-            div.columns {
+            div.columns.stack {
                 (figures.show(figures::ranking(&closure.before)))
                 div { (effects::rounds(closure)) (effects::absent(&closure.before)) }
             }
         }))
         (section("What is left", &html! {
             (figures.show(figures::histogram(picture).into_iter().chain(figures::order(picture))))
-            (checks::list(&closure.before.findings, &closure.findings))
+            (checks::list(closure))
         }))
-        (identified(&mut figures, &closure.after, picture))
+        (identified(&mut figures, &closure.after, picture, "the estimate.json of flexcal identify problem.closed.toml"))
     };
     figures.page(problem, "closed loop", &body)
 }
 
 /// What a fit leaves, and what the checks say of it.
-fn left(figures: &mut Figures, picture: &Picture) -> Markup {
+fn left(figures: &mut Figures, found: &Identification, picture: &Picture) -> Markup {
     section(
         "What is left",
         &html! {
             (figures.show(figures::histogram(picture).into_iter().chain(figures::order(picture))))
-            (checks::of(&picture.findings))
+            (checks::of(&picture.findings, found.reduced_chi2))
         },
     )
 }
 
-/// Parameters, what they share, and what nobody sees.
-fn identified(figures: &mut Figures, found: &Identification, picture: &Picture) -> Markup {
+/// Parameters, what they share, and what nobody sees; `file` holds what is folded.
+fn identified(figures: &mut Figures, found: &Identification, picture: &Picture, file: &str) -> Markup {
     let shared =
         figures::correlation(&picture.correlations).into_iter().chain(figures::spectrum(&found.identifiability));
     html! {
-        (section("Parameters", &parameters::table(found)))
+        (section("Parameters", &parameters::table(found, file)))
         (section("What the poses can tell", &html! {
             (figures.show(shared))
-            (parameters::blind(found))
+            (parameters::blind(found, file))
         }))
     }
 }

@@ -2,33 +2,59 @@
 
 use maud::{Markup, html};
 
+use crate::fit::BlindCombination;
 use crate::report::parameters::{blind_words, verdict};
 use crate::report::quantity::{Display, decimals, number};
+use crate::report::waves::{Line, Shown, shown};
 use crate::solver::AtBound;
 use crate::study::{Comparison, ErrorSummary, Estimate, Identification};
 
 /// Half the width of a bar in standard errors: wider changes run off it.
 const REACH: f64 = 10.0;
+/// Blind combinations that are not folded.
+const SHOWN_BLIND: usize = 10;
 /// Decimals of a value that has no error, and of any value at most.
 const PLAIN: usize = 4;
 const MOST: usize = 6;
 
 /// Nominal, estimate, change and standard error of every free parameter, with the change drawn in standard errors.
-pub(super) fn table(found: &Identification) -> Markup {
+pub(super) fn table(found: &Identification, file: &str) -> Markup {
+    let Shown { lines: lines_of, lower } = shown(&found.estimates);
     html! {
-        p { "Bars: the change from nominal in units of its standard error, up to ten either way (changes beyond that rest at the end; "
+        // A narrow page hides these columns.
+        p.o { "Bars: the change from nominal in units of its standard error, up to ten either way (changes beyond that rest at the end; "
             "an orange mark there is a bound), with one standard error about it. Identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations." }
+        (lines(&lines_of))
+        @if !lower.is_empty() {
+            details {
+                summary { "The lower waves: " (lower.len()) " coefficients" }
+                (lines(&lower.iter().map(|estimate| Line::Parameter(estimate)).collect::<Vec<_>>()))
+            }
+            p.folded { "The lower waves are left out on paper: they are in " (file) "." }
+        }
+        @if !found.active_constraints.is_empty() {
+            p { "Held by a constraint: "
+                (found.active_constraints.iter().map(|held| held.words.clone()).collect::<Vec<_>>().join("; ")) }
+        }
+    }
+}
+
+fn lines(lines: &[Line]) -> Markup {
+    html! {
         div.scroll { table {
             thead { tr {
                 th.l { "parameter" } th.o { "nominal" } th { "estimate" } th.o { "change" } th { "± 1 σ" } th.l { "unit" }
                 th.l.o { "change / σ" } th.l.o { "identified" }
             } }
-            tbody { @for estimate in &found.estimates { (row(estimate)) } }
+            tbody {
+                @for line in lines {
+                    @match line {
+                        Line::Parameter(estimate) => (row(estimate)),
+                        Line::Lower(waves, joint) => tr { td.l colspan="8" { "and " (waves) " lower waves of joint " (joint) } },
+                    }
+                }
+            }
         } }
-        @if !found.active_constraints.is_empty() {
-            p { "Held by a constraint: "
-                (found.active_constraints.iter().map(|held| held.words.clone()).collect::<Vec<_>>().join("; ")) }
-        }
     }
 }
 
@@ -75,9 +101,13 @@ fn bar(estimate: &Estimate) -> Markup {
     }
 }
 
-/// The combinations that no measurement sees, and strong correlations, in words.
-pub(super) fn blind(found: &Identification) -> Markup {
+/// The combinations that no measurement sees, in words; many of them folded, and in `file`.
+pub(super) fn blind(found: &Identification, file: &str) -> Markup {
     let blind = &found.identifiability.blind;
+    let (first, more) = blind.split_at(blind.len().min(SHOWN_BLIND));
+    let list = |combinations: &[BlindCombination]| {
+        html! { ul.plain { @for one in combinations { li.skip { (blind_words(one, &found.unknowns)) } } } }
+    };
     html! {
         @if blind.is_empty() {
             p { "At the nominal arm the data see every combination of the parameters." }
@@ -85,7 +115,11 @@ pub(super) fn blind(found: &Identification) -> Markup {
             h3 { "Blind combinations" }
             p { "Their parameters can change together in these proportions, each scaled by its effect, and no predicted position \
                  moves." }
-            ul.plain { @for combination in blind { li.skip { (blind_words(combination, &found.unknowns)) } } }
+            (list(first))
+            @if !more.is_empty() {
+                details { summary { (more.len()) " more" } (list(more)) }
+                p.folded { (more.len()) " more are left out on paper: they are in " (file) "." }
+            }
         }
     }
 }

@@ -70,10 +70,13 @@ li.skip{color:var(--muted)}
 .found{margin:0 0 18px}
 .found p{margin:3px 0}
 .found td.l{white-space:normal;overflow-wrap:anywhere}
+details{margin:8px 0}
+summary{cursor:pointer;color:var(--accent);font-size:14px}
+.folded{display:none}
 code{font:13px ui-monospace,SFMono-Regular,Menlo,Consolas,monospace}
 footer{margin-top:56px;padding-top:14px;border-top:1px solid var(--grid);font-size:13px;color:var(--muted)}
 @media (max-width:560px){main{padding:24px 16px 40px}h1{font-size:22px}.big{font-size:34px;gap:4px 12px}h2{margin-top:40px}.bar{width:64px}td,th{padding:3px 6px}th{white-space:normal}.o{display:none}table{font-size:13px}td.l:first-child{white-space:normal;overflow-wrap:anywhere}}
-@media print{@page{margin:14mm}body{font-size:11pt}main{max-width:none;padding:0}.grid{grid-template-columns:1fr 1fr;gap:18px 22px}h2{margin-top:26px;break-after:avoid}.big{font-size:34px}.scroll{overflow:visible}table{font-size:8.5pt}td,th{padding:2px 6px}tr{break-inside:avoid}figcaption,ul.plain li{font-size:9pt}.columns{grid-template-columns:1fr 1fr;gap:4px 22px}.bar{width:80px;-webkit-print-color-adjust:exact;print-color-adjust:exact}}
+@media print{@page{margin:12mm}body{font-size:10.5pt}main{max-width:none;padding:0}.grid{grid-template-columns:1fr 1fr;gap:18px 22px}figure:last-child:nth-child(odd){grid-column:1/-1;max-width:98mm}.found{margin:0 0 6px}.stack{display:block}h3{break-after:avoid}h2{margin:20px 0 8px;padding-top:10px;break-after:avoid}dl.facts{margin:14px 0 0;gap:8px 20px}.big{margin-top:18px}.under{margin-bottom:12px}.big{font-size:34px}.scroll{overflow:visible}table{font-size:8.5pt}td,th{padding:2px 6px}tr{break-inside:avoid}figcaption,ul.plain li{font-size:9pt}.columns{grid-template-columns:1fr 1fr;gap:4px 22px}.bar{width:80px;-webkit-print-color-adjust:exact;print-color-adjust:exact}details:not([open]){display:none}details:not([open])+.folded{display:block}}
 ";
 
 fn hex(colour: RGBColor) -> String {

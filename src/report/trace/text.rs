@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::super::document::{Block, Point, to_text};
+use super::super::errors::counted;
 use super::super::quantity::number;
 use super::super::{effect, findings};
 use crate::diagnosis::{Apart, Ranked, Trace};
@@ -21,6 +22,8 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
         Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
         Block::list(findings::all(&trace.findings)),
     ];
+    let another = findings::another_size(&trace.findings, trace.fit.reduced_chi2);
+    blocks.extend(another.map(|words| Block::Text(words.to_owned())));
     blocks.extend(ranking(problem, trace, SHOWN, "trace.json holds them all"));
     blocks.extend(not_seen(trace));
     to_text(&blocks)
@@ -28,16 +31,18 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
 
 fn headline(problem: &Problem, fit: &Identification) -> String {
     let (fitted, held_out) = (&fit.fitted.identification, &fit.fitted.held_out);
-    let size = fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {chi2:.2}, 1 for noise alone"));
-    format!(
-        "{}\n{} parameters from {} poses{size}; on {} held-out poses the error is {} mm in the mean, rms {} mm",
-        problem.title,
-        fit.unknowns.len(),
-        fitted.n,
-        held_out.n,
-        number(held_out.mean.norm * 1e3, 4),
-        number(held_out.rms.norm * 1e3, 4),
-    )
+    let size =
+        fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", number(chi2, 2)));
+    let error = match held_out.unpredicted {
+        0 => format!(
+            "on {} held-out poses the error is {} mm in the mean, rms {} mm",
+            held_out.n,
+            number(held_out.mean.norm * 1e3, 4),
+            number(held_out.rms.norm * 1e3, 4),
+        ),
+        _ => counted(held_out, "held-out"),
+    };
+    format!("{}\n{} parameters from {} poses{size}; {error}", problem.title, fit.unknowns.len(), fitted.n)
 }
 
 /// The candidates that stand out, at most so many of them, how to read them, and `where_all` are.

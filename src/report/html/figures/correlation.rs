@@ -8,7 +8,7 @@ use super::frame::{ACCENT, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, wr
 use crate::picture::Correlations;
 
 /// Parameters that are drawn at most.
-const MOST: usize = 40;
+const MOST: usize = 20;
 /// Room for names, at least and at most.
 const NAMES: (i32, i32) = (118, 230);
 /// Width of a letter as a part of its height.

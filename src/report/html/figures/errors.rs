@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use super::frame::{
     ACCENT, Area, Axis, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, legend, line, px, radius, range,
 };
-use super::{Figure, thinned};
+use super::{Figure, left_out, thinned};
 use crate::picture::{Picture, Stand, State};
 use crate::report::quantity::number;
 
@@ -44,6 +44,7 @@ pub fn errors(picture: &Picture) -> Figure {
     let size = (WIDTH, 24 + 4 * PANEL + 34);
     let mut norms: Vec<f64> =
         states.last().map_or_else(Vec::new, |state| state.errors.iter().map(Vector3::norm).collect());
+    norms.retain(|norm| norm.is_finite());
     norms.sort_by(f64::total_cmp);
     let typical = norms.get(norms.len() / 2).copied().unwrap_or(1e-3).max(1e-9);
     let floor = (FLOOR * typical * 1e3).log10();
@@ -70,6 +71,9 @@ pub fn errors(picture: &Picture) -> Figure {
         }
         Ok(())
     });
+    // In any of the states: their dots are not there.
+    let lost = |k: &usize| states.iter().any(|state| !state.errors[*k].norm().is_finite());
+    let without = (0..picture.held_out.len()).filter(lost).count();
     let floor = number(10.0_f64.powf(floor), 4);
     Figure {
         name: "held-out-errors".to_owned(),
@@ -77,7 +81,8 @@ pub fn errors(picture: &Picture) -> Figure {
         caption: format!(
             "Absolute error in x, y, z of the measuring frame and its norm, on a logarithmic scale: one division of ten down \
              is ten times better. None of these poses took part in fitting. Values below {floor} mm are drawn at the lower \
-             edge.{}",
+             edge.{}{}",
+            left_out(without),
             thinned(step)
         ),
         svg,
@@ -91,6 +96,7 @@ fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[State], (axis, step): (usize
         let value = |error: &Vector3<f64>| if axis == 3 { error.norm() } else { error[axis].abs() };
         let points: Vec<(f64, f64)> = (0..state.errors.len())
             .step_by(step)
+            .filter(|&k| state.errors[k].norm().is_finite())
             .map(|k| (k as f64 + 1.0, (value(&state.errors[k]) * 1e3).log10().clamp(y.range.0, y.range.1)))
             .collect();
         chart.draw_series(LineSeries::new(points.iter().copied(), colour.mix(0.45).stroke_width(3)))?;

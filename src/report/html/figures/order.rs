@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use super::frame::{
     ACCENT, Axis, FAINT, GRID, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
 };
-use super::{Figure, thinned};
+use super::{Figure, left_out, thinned};
 use crate::picture::{Picture, Residual};
 
 /// Poses that are drawn at most.
@@ -14,8 +14,10 @@ const PANEL: i32 = 92;
 
 /// Residual coordinates in the order of time, with the band of ±2 σ.
 pub fn order(picture: &Picture) -> Option<Figure> {
-    let fitted: Vec<&Residual> =
-        picture.residuals.iter().filter(|residual| !residual.held_out && residual.error.norm().is_finite()).collect();
+    let mut fitted: Vec<&Residual> = picture.residuals.iter().filter(|residual| !residual.held_out).collect();
+    let all = fitted.len();
+    fitted.retain(|residual| residual.error.norm().is_finite());
+    let without = all - fitted.len();
     let step = every(fitted.len(), MOST);
     let shown: Vec<&Residual> = fitted.into_iter().step_by(step).collect();
     let first = range(shown.iter().map(|residual| residual.time));
@@ -53,7 +55,8 @@ pub fn order(picture: &Picture) -> Option<Figure> {
         title: "The residuals one after another".to_owned(),
         caption: format!(
             "Residuals measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
-             should lie within the band. Runs of equal sign, drifts and steps are structure.{}",
+             should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}",
+            left_out(without),
             thinned(step)
         ),
         svg,

@@ -14,6 +14,8 @@ const NAMES: i32 = 214;
 /// Room for numbers.
 const NUMBERS: i32 = 66;
 const TOP: i32 = 26;
+/// Decades in which 2 and 5 have room for their numbers, too.
+const CLOSE: f64 = 2.2;
 
 struct Entry {
     name: String,
@@ -91,7 +93,7 @@ fn rows(entries: &[Entry], label: &str) -> String {
                 if (low..=high).contains(&value) {
                     let at = place(value);
                     area.draw(&PathElement::new(vec![(at, px(TOP)), (at, px(bottom))], line(GRID, 1.0)))?;
-                    if part < 1.5 || high - low < 1.5 {
+                    if part < 1.5 || high - low < CLOSE {
                         let digits = usize::try_from(-decade).unwrap_or_default();
                         write(
                             area,

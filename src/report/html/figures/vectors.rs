@@ -7,7 +7,7 @@ use super::frame::{
     ACCENT, Area, Axis, BELOW, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, legend, line, px, radius, range,
     with_margin, write,
 };
-use super::{Figure, thinned};
+use super::{Figure, left_out, thinned};
 use crate::picture::{Picture, Residual};
 use crate::report::quantity::number;
 
@@ -23,7 +23,8 @@ const GREATEST: f64 = 330.0;
 pub fn vectors(picture: &Picture) -> Figure {
     let finite = |residual: &&Residual| residual.error.norm().is_finite();
     let all: Vec<&Residual> = picture.residuals.iter().filter(finite).collect();
-    let step = every(all.len(), MOST);
+    let count = all.len();
+    let step = every(count, MOST);
     let shown: Vec<&Residual> = all.into_iter().step_by(step).collect();
     let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
     let width = f64::from(WIDTH - LEFT - 12);
@@ -60,8 +61,9 @@ pub fn vectors(picture: &Picture) -> Figure {
         caption: format!(
             "Each stroke starts at a measured position (dot) and shows the residual measured − predicted there, drawn {} times \
              too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
-             structure; a tangle is noise.{}",
+             structure; a tangle is noise.{}{}",
             short(larger),
+            left_out(picture.residuals.len() - count),
             thinned(step)
         ),
         svg,
