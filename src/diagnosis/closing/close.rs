@@ -71,6 +71,13 @@ pub struct Closure {
     pub gain: Interval,
 }
 
+impl Closure {
+    /// Error on held-out poses once an effect was in the model, where more was added after it.
+    pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
+        Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
+    }
+}
+
 /// Finds what `problem` lacks, from the identification rows alone; held-out rows only measure the outcome.
 ///
 /// # Errors

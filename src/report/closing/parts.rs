@@ -113,14 +113,13 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
 
 fn point(closure: &Closure, found: &Found) -> Point {
     let mut details = Values::of(&found.estimates).lines();
-    let after = found.held_out_after;
-    let mm = |value: f64| number(value * 1e3, 4);
-    details.push(format!(
-        "{}, the probability that it is chance; held-out error after the round that added it: mean {} mm, rms {} mm",
-        effect::p(found.p_value),
-        mm(after.mean.norm),
-        mm(after.rms.norm)
-    ));
+    let mut chance = format!("{}, the probability that it is chance", effect::p(found.p_value));
+    if let Some(then) = closure.held_out_once(found) {
+        let mm = |value: f64| number(value * 1e3, 4);
+        let (mean, rms) = (mm(then.mean.norm), mm(then.rms.norm));
+        let _ = write!(chance, "; held-out error once it was in the model: mean {mean} mm, rms {rms} mm");
+    }
+    details.push(chance);
     if !found.alternatives.is_empty() {
         let named: Vec<String> =
             found.alternatives.iter().take(SHOWN).map(|other| closure.before.describe(other)).collect();

@@ -52,8 +52,12 @@ fn one(found: &Found, closure: &Closure) -> Markup {
     html! {
         div.found {
             h3 { (capital(&closure.before.describe(&found.effect))) }
-            p { code { (named(&found.effect)) } ", " (chance(found.p_value)) "; once it was in the model, held-out poses were off by "
-                (number(found.held_out_after.mean.norm * 1e3, 3)) " mm on average" }
+            p {
+                code { (named(&found.effect)) } ", " (chance(found.p_value))
+                @if let Some(then) = closure.held_out_once(found) {
+                    "; once it was in the model, held-out poses were off by " (number(then.mean.norm * 1e3, 3)) " mm on average"
+                }
+            }
             table {
                 @for (name, value) in &values.shown {
                     tr { td.l { code { (name) } } td { (value.replace('-', "−")) } }
