@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Lines that a file may have.
-const LONGEST: usize = 500;
+const LONGEST: usize = 300;
 
 /// Everything below the arm.
 const GROUND: &[&str] = &["scalar", "spatial", "units", "error", "problem", "measurement"];
