@@ -34,8 +34,7 @@ fn score(data: &Data, found: &Identification) -> Score {
         Some(Distrust::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
         Some(Distrust::Misses { .. }) => return Score::Failed("misses-the-data"),
         Some(Distrust::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
-        // How many poses there are is what the study compares.
-        Some(Distrust::TooFewPoses { .. }) | None => {}
+        None => {}
     }
     let held_out = &found.fitted.held_out;
     if !held_out.rms.norm.is_finite() {

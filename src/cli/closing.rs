@@ -56,13 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names = results.map(|(name, _)| name).join(", ");
         output::print(&format!("\nWritten to {}: {names}, report.html\n", folder.display()))?;
     }
-    if closure.after.is_trusted() {
-        return Ok(Outcome::Done);
-    }
-    if !common.quiet {
-        diagnostic::warn(&report::why_not_trusted(&closure.after));
-    }
-    Ok(Outcome::NotTrusted)
+    Ok(diagnostic::judged(&closure.after, common.quiet))
 }
 
 /// A file as seen from a folder; absolute where no relative path leads there.

@@ -42,11 +42,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&report::compare_text(&problem, &comparison))?;
         output::print(&format!("\nWritten to {}: compare.json, report.md, report.html\n", folder.display()))?;
     }
-    if comparison.joint.is_trusted() {
-        return Ok(Outcome::Done);
-    }
-    if !common.quiet {
-        diagnostic::warn(&report::why_not_trusted(&comparison.joint));
-    }
-    Ok(Outcome::NotTrusted)
+    Ok(diagnostic::judged(&comparison.joint, common.quiet))
 }

@@ -6,7 +6,10 @@ use std::io::Write as _;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{InputError, Location, Warning};
-use flexcal::study::IdentifyError;
+use flexcal::report;
+use flexcal::study::{Identification, IdentifyError};
+
+use super::Outcome;
 
 /// Wide enough that messages keep to one line.
 const WIDTH: usize = 1000;
@@ -39,6 +42,18 @@ pub fn print_warnings(warnings: &[Warning]) {
 /// Prints one line of warning to standard error.
 pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
+}
+
+/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on priors.
+pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
+    if !quiet {
+        match (fit.is_trusted(), fit.too_few_poses) {
+            (false, _) => warn(&report::why_not_trusted(fit)),
+            (true, Some(few)) => warn(&few.to_string()),
+            (true, None) => {}
+        }
+    }
+    if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }
 }
 
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {

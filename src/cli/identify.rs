@@ -107,11 +107,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&report::estimate_text(&problem, &identification))?;
         output::print(&format!("\nWritten to {}: estimate.json, report.md, report.html\n", folder.display()))?;
     }
-    if identification.is_trusted() {
-        return Ok(Outcome::Done);
-    }
-    if !common.quiet {
-        diagnostic::warn(&report::why_not_trusted(&identification));
-    }
-    Ok(Outcome::NotTrusted)
+    Ok(diagnostic::judged(&identification, common.quiet))
 }

@@ -130,9 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Ok(Outcome::Done);
     }
     if !common.quiet {
-        diagnostic::warn(
-            "a fit to the plan would not be to be trusted, for it leaves too much to priors: plan more poses",
-        );
+        diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
     }
     Ok(Outcome::NotTrusted)
 }

@@ -40,11 +40,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&report::trace_text(&problem, &trace))?;
         output::print(&format!("\nWritten to {}\n", path.display()))?;
     }
-    if trace.fit.is_trusted() {
-        return Ok(Outcome::Done);
-    }
-    if !common.quiet {
-        diagnostic::warn(&report::why_not_trusted(&trace.fit));
-    }
-    Ok(Outcome::NotTrusted)
+    Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

@@ -70,6 +70,8 @@ pub struct Check {
     pub coordinates: usize,
     /// How many of the poses differ from each other.
     pub different: usize,
+    /// Free parameters without a prior.
+    pub without_prior: usize,
 }
 
 /// Judges poses.
@@ -132,6 +134,7 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise, count)),
         coordinates: 3 * count,
         different: different(&poses.pose_numbers(problem), 0..count),
+        without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
 }
 
@@ -145,9 +148,9 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 }
 
 impl Check {
-    /// Whether the poses decide every parameter as far as poses of their kind can, and a fit to them is to be trusted.
+    /// Whether the poses decide every parameter as far as poses of their kind can, and measure as many coordinates as parameters have no prior.
     pub fn suffices(&self) -> bool {
-        self.forecast.open <= self.growth.open && 3 * self.different >= self.forecast.expected.len()
+        self.forecast.open <= self.growth.open && 3 * self.different >= self.without_prior
     }
 }
 

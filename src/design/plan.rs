@@ -76,7 +76,8 @@ pub struct Plan {
     pub planned: Forecast,
     /// Of the poses given and as many others, drawn at random again and again.
     pub random: Vec<Forecast>,
-    /// Whether the plan decides every parameter as far as all candidates together can, and a fit to it is to be trusted.
+    /// Whether the plan decides every parameter as far as all candidates together can, and measures as many
+    /// coordinates as parameters have no prior.
     pub suffices: bool,
 }
 
@@ -157,7 +158,8 @@ pub fn plan(
         .collect();
     let planned = forecast(&told);
     let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
-    let suffices = planned.open <= attainable && 3 * apart >= parameters.len();
+    let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
+    let suffices = planned.open <= attainable && 3 * apart >= without_prior;
     Ok(Plan { poses: chosen, candidates: tried, starts, value, planned, random, suffices })
 }
 

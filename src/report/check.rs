@@ -138,7 +138,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
 /// Why poses do not suffice, in one line.
 pub fn why_not_sufficient(check: &Check) -> String {
     let (forecast, different) = (&check.forecast, check.different);
-    let (of, parameters) = (forecast.poses, forecast.expected.len());
+    let (of, parameters) = (forecast.poses, check.without_prior);
     let open = forecast.open.saturating_sub(check.growth.open);
     if open > 0 {
         let noun = if open == 1 { "combination" } else { "combinations" };
@@ -148,8 +148,8 @@ pub fn why_not_sufficient(check: &Check) -> String {
         );
     }
     format!(
-        "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters that are free: \
-         priors would decide most of them; more poses are needed",
+        "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters without \
+         a prior: more poses are needed",
         3 * different
     )
 }

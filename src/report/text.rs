@@ -95,7 +95,9 @@ pub(super) fn noise(problem: &Problem, result: &Identification) -> String {
             "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors.\n"
                 .to_owned()
         }
-        (Noise::Declared, Some(_)) if result.distrust.as_ref().is_some_and(Distrust::is_of_too_few) => {
+        (Noise::Declared, Some(_))
+            if result.too_few_poses.is_some() || matches!(result.distrust, Some(Distrust::TooFewEquations { .. })) =>
+        {
             "There are not enough different poses to judge the declared σ, or the model.\n".to_owned()
         }
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.\n".to_owned(),

@@ -10,7 +10,7 @@ use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::trust::{Distrust, beyond_prior, misses, underdetermined};
+use super::trust::{Distrust, TooFewPoses, beyond_prior, misses, underdetermined};
 use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{Identifiability, Loss};
@@ -186,11 +186,11 @@ pub fn identify_model(
     let distrust = too_few_equations(&fitting, &numbers, &unknowns)
         .or(misses)
         .or(distrust)
-        .or_else(|| beyond_prior(model, &end.x))
-        .or_else(|| (3 * poses < parameters).then_some(Distrust::TooFewPoses { poses, parameters }));
+        .or_else(|| beyond_prior(model, &end.x));
     let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,
+        too_few_poses: (3 * poses < parameters).then_some(TooFewPoses { poses, parameters }),
         strategy,
         solver,
         solver_reason: options.solver.reason(model),

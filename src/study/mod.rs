@@ -30,4 +30,4 @@ pub use placement::Placement;
 pub use progress::{Progress, ProgressSink};
 pub use stage::StageError;
 pub use strategy::{SolverChoice, Strategy};
-pub use trust::Distrust;
+pub use trust::{Distrust, TooFewPoses};

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
-use super::{ActiveConstraint, Distrust, ErrorSummary, Outlier, SolverChoice, Strategy};
+use super::{ActiveConstraint, Distrust, ErrorSummary, Outlier, SolverChoice, Strategy, TooFewPoses};
 use crate::fit::Identifiability;
 use crate::parameter::{Parameter, Unit};
 use crate::solver::{AtBound, Termination};
@@ -68,6 +68,8 @@ pub struct Identification {
     pub termination: Termination,
     /// Why the fit is not to be trusted, if it is not.
     pub distrust: Option<Distrust>,
+    /// Whether the poses are too few to say much without priors.
+    pub too_few_poses: Option<TooFewPoses>,
     /// Steps tried, over all stages.
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.

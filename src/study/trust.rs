@@ -33,13 +33,6 @@ pub enum Distrust {
         /// Unknowns without a prior.
         unknowns: usize,
     },
-    /// Fewer coordinates measured in different poses than parameters: priors decide what measurements do not.
-    TooFewPoses {
-        /// Different poses.
-        poses: usize,
-        /// Parameters that are fitted.
-        parameters: usize,
-    },
     /// The fit did not converge.
     NotConverged(Termination),
     /// The fit of bases and targets of held-out sessions did not converge.
@@ -70,15 +63,6 @@ impl fmt::Display for Distrust {
                      again adds none)"
                 )
             }
-            Self::TooFewPoses { poses, parameters } => {
-                let noun = if *poses == 1 { "pose measures" } else { "different poses measure" };
-                write!(
-                    f,
-                    "{poses} {noun} {} coordinates, fewer than the {parameters} parameters that are fitted: priors decide most \
-                     of it",
-                    3 * poses
-                )
-            }
             Self::NotConverged(termination @ Termination::DomainEdge) => {
                 write!(f, "{termination}; units, signs of joints, or sessions are wrong, or the table's columns")
             }
@@ -100,10 +84,24 @@ impl fmt::Display for Distrust {
     }
 }
 
-impl Distrust {
-    /// Whether the poses are too few to say anything of the fit, good or bad.
-    pub fn is_of_too_few(&self) -> bool {
-        matches!(self, Self::TooFewEquations { .. } | Self::TooFewPoses { .. })
+/// Fewer coordinates measured in different poses than parameters: priors decide what measurements do not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooFewPoses {
+    /// Different poses.
+    pub poses: usize,
+    /// Parameters that are fitted.
+    pub parameters: usize,
+}
+
+impl fmt::Display for TooFewPoses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { poses, parameters } = self;
+        let noun = if *poses == 1 { "pose measures" } else { "different poses measure" };
+        write!(
+            f,
+            "{poses} {noun} {} coordinates, fewer than the {parameters} parameters that are fitted: priors decide most of it",
+            3 * poses
+        )
     }
 }
 

@@ -1,6 +1,6 @@
 //! The whole story: before, what was found, after, what remains.
 
-use super::super::candidates::{Candidates, covers, parts};
+use super::super::candidates::{Candidates, covers};
 use super::super::checks::Findings;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
@@ -109,7 +109,7 @@ pub fn close(
         unexplained
     };
     let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
-    let effects = found(&rounds, &fitted, findings.is_structured());
+    let effects = found(&rounds, &fitted, (findings.is_structured(), wave_sigma.is_some()));
     let verdict = match (&unexplained, effects.is_empty()) {
         (Some(_), _) => Verdict::Unexplained,
         (None, true) => Verdict::NothingFound,
@@ -188,16 +188,14 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     Ok(None)
 }
 
-/// Every added effect with what is known of it.
-fn found(rounds: &Rounds, fitted: &Fitted, structured: bool) -> Vec<Found> {
+/// Every added effect with what is known of it, where structure is left, and where waves share a prior.
+fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bool)) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
     let library = fitted.library(rounds.data, &candidates, &rounds.generics);
     let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
     let added = rounds.added(fitted);
     // Of many orders under one prior none may stand out by itself.
-    let several = |effect: &&Effect| parts(effect).len() > 1;
-    let mut tested = rounds.tested(fitted);
-    tested.extend(rounds.test(fitted, added.iter().filter(several).cloned().collect()));
+    let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
         let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known));
