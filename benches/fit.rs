@@ -8,8 +8,8 @@ use common::lunar::Lunar;
 use common::minpack::Minpack;
 use common::ur10::Ur10;
 use divan::Bencher;
-use flexcal::fit::{Fit, LeastSquares, Objective};
-use flexcal::solver::{Settings, Solution, minimise};
+use flexcal::least_squares::solver::{Settings, Solution, minimise};
+use flexcal::least_squares::{Fit, LeastSquares, Objective};
 use nalgebra::DVector;
 
 fn main() {

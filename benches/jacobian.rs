@@ -8,7 +8,7 @@ use common::lunar::Lunar;
 use common::ur10::Ur10;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use flexcal::fit::{Block, LeastSquares, check_jacobian};
+use flexcal::least_squares::{Block, LeastSquares, check_jacobian};
 use nalgebra::{DMatrix, DVector};
 
 /// Poses of the rigid arm: a block as the fit makes them.

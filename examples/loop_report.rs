@@ -4,11 +4,11 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use flexcal::diagnosis::close;
+use flexcal::diagnose::close;
+use flexcal::identify::Options;
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::study::Options;
-use flexcal::{picture, report};
+use flexcal::report::{self, plot_data};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (measurements, _) = Measurements::read(files, &problem)?;
     let split = Split::new(&problem, &measurements)?;
     let closure = close(&problem, &measurements, &split, &Options::default())?;
-    let shown = picture::of_closure(&problem, &measurements, &split, &closure)?;
+    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure)?;
     let page = report::closure_page(&problem, &closure, &shown);
     fs::create_dir_all(folder.join("figures"))?;
     for (name, figure) in &page.figures {

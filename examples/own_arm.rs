@@ -6,10 +6,10 @@
 use std::error::Error;
 use std::path::Path;
 
+use flexcal::identify::{Options, identify};
 use flexcal::measurement::{Labels, Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::rig::{Simulation, Truth, simulate};
-use flexcal::study::{Options, identify};
+use flexcal::simulate::{Simulation, Truth, simulate};
 
 /// One row a joint: Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β). Two joints give way under their loads.
 const ARM: &str = r#"

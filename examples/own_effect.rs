@@ -6,12 +6,12 @@
 use std::error::Error;
 use std::path::Path;
 
-use flexcal::effect::{Term, named};
+use flexcal::identify::{Options, Placement, identify, identify_model};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::Model;
-use flexcal::parameter::{Driver, JointField, Slot};
+use flexcal::model::effect::{Term, named};
+use flexcal::model::parameter::{Driver, JointField, Slot};
 use flexcal::problem::Problem;
-use flexcal::study::{Options, Placement, identify, identify_model};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let problem = Problem::read(Path::new("problems/lunar-sampler"))?;

@@ -6,47 +6,45 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Lines that a file may have.
-const LONGEST: usize = 300;
+/// Lines from which on a file needs a reason.
+const LONGEST: usize = 500;
 
-/// Everything below the arm.
-const GROUND: &[&str] = &["scalar", "spatial", "units", "error", "problem", "measurement"];
+/// What is read from files, and what it is made of.
+const GROUND: &[&str] = &["scalar", "spatial", "quantity", "error", "problem", "measurement"];
 
 /// Each room of the house and the rooms that it may use, from the ground up.
 const STOREYS: &[(&str, &[&[&str]])] = &[
     ("scalar", &[]),
-    ("units", &[]),
+    ("quantity", &[]),
     ("spatial", &[&["scalar"]]),
-    ("error", &[GROUND]),
-    ("problem", &[GROUND]),
-    ("measurement", &[GROUND]),
+    ("error", &[]),
+    ("problem", &[&["quantity", "error", "spatial"]]),
+    ("measurement", &[&["quantity", "error", "problem"]]),
     // Least squares knows no arms.
-    ("fit", &[&["scalar", "error"]]),
-    ("solver", &[&["scalar", "error", "fit"]]),
+    ("least_squares", &[&["scalar", "error"]]),
     // The physics knows no sensors; the test rig shares no physics.
-    ("arm", &[&["scalar", "spatial", "error", "problem"]]),
-    ("rig", &[&["scalar", "spatial", "units", "error", "problem"]]),
-    ("parameter", &[&["scalar", "spatial", "error", "problem", "arm"]]),
-    ("effect", &[&["scalar", "spatial", "error", "problem", "arm", "parameter"]]),
-    ("model", &[&["scalar", "spatial", "error", "problem", "arm", "parameter", "effect", "fit"]]),
+    ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
+    ("simulate", &[&["scalar", "spatial", "quantity", "error", "problem"]]),
+    ("model", &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]]),
     // The paper checks the model, so it shares no physics with it.
-    ("paper", &[&["spatial", "error", "problem", "fit", "solver"]]),
-    ("study", &[GROUND, BELOW_STUDY]),
-    ("diagnosis", &[GROUND, BELOW_STUDY, &["study"]]),
+    ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
+    ("identify", &[GROUND, BELOW_IDENTIFY]),
+    ("diagnose", &[GROUND, BELOW_IDENTIFY, &["identify"]]),
     // Which poses to measure, and what they will tell.
-    ("design", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
+    ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),
     // Many fits to what model or rig measure.
-    ("campaign", &[GROUND, BELOW_STUDY, &["study", "rig"]]),
-    // What figures show, as numbers.
-    ("picture", &[GROUND, BELOW_STUDY, &["study", "diagnosis"]]),
-    ("report", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture"]]),
-    ("cli", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture", "report", "rig"]]),
-    ("main", &[GROUND, BELOW_STUDY, &["study", "diagnosis", "design", "campaign", "picture", "report", "rig", "cli"]]),
+    ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate"]]),
+    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo"]]),
+    ("cli", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate"]]),
+    (
+        "main",
+        &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "cli"]],
+    ),
 ];
-const BELOW_STUDY: &[&str] = &["arm", "parameter", "effect", "model", "paper", "fit", "solver"];
+const BELOW_IDENTIFY: &[&str] = &["mechanics", "model", "paper", "least_squares"];
 
 /// Rooms that read no files.
-const WITHOUT_FILES: &[&str] = &["scalar", "spatial", "units", "fit", "solver", "arm", "parameter", "effect", "model"];
+const WITHOUT_FILES: &[&str] = &["scalar", "spatial", "quantity", "least_squares", "mechanics", "model"];
 const FILES: &[&str] = &["std::fs", "std::path", "std::io", "csv::", "toml::", "serde_json::"];
 
 /// Rooms that print.
@@ -245,20 +243,23 @@ fn every_file_is_a_module_of_its_folder() {
 #[test]
 fn broken_rules_are_found_with_their_lines() {
     let source = |path: &str, text: &str| Source { path: PathBuf::from(path), text: text.to_owned() };
-    let text = "//! use crate::study;\nuse crate::{\n    error::X,\n    arm::{Arm, model},\n};\nuse super::super::study::Y;\n\
+    let text = "//! use crate::identify;\nuse crate::{\n    error::X,\n    mechanics::{Arm, model},\n};\nuse super::super::super::identify::Y;\n\
                 fn f() { crate::report::g(); } // crate::cli\n";
-    let broken = upward(&source("solver/bounded.rs", text));
+    let broken = upward(&source("least_squares/solver/bounded.rs", text));
     let expected = [
-        "src/solver/bounded.rs:4: solver uses arm",
-        "src/solver/bounded.rs:7: solver uses report",
-        "src/solver/bounded.rs:6: solver uses study",
+        "src/least_squares/solver/bounded.rs:4: least_squares uses mechanics",
+        "src/least_squares/solver/bounded.rs:7: least_squares uses report",
+        "src/least_squares/solver/bounded.rs:6: least_squares uses identify",
     ];
     assert_eq!(broken, expected);
-    assert_eq!(upward(&source("arm/mod.rs", "use super::measurement;\n")), ["src/arm/mod.rs:1: arm uses measurement"]);
+    assert_eq!(
+        upward(&source("mechanics/mod.rs", "use super::measurement;\n")),
+        ["src/mechanics/mod.rs:1: mechanics uses measurement"]
+    );
     assert_eq!(upward(&source("cli/loop.rs", text)), [] as [&str; 0]);
     assert_eq!(upward(&source("attic.rs", "")).len(), 1);
-    let printing = source("study/mod.rs", "fn f() {\n    eprintln!(\"x\");\n    sprint!();\n}\n");
-    assert_eq!(holding(&printing, PRINTS), ["src/study/mod.rs:2: study has eprintln!"]);
-    let reading = source("arm/mod.rs", "use std::fs;\n");
-    assert_eq!(holding(&reading, FILES), ["src/arm/mod.rs:1: arm has std::fs"]);
+    let printing = source("identify/mod.rs", "fn f() {\n    eprintln!(\"x\");\n    sprint!();\n}\n");
+    assert_eq!(holding(&printing, PRINTS), ["src/identify/mod.rs:2: identify has eprintln!"]);
+    let reading = source("mechanics/mod.rs", "use std::fs;\n");
+    assert_eq!(holding(&reading, FILES), ["src/mechanics/mod.rs:1: mechanics has std::fs"]);
 }

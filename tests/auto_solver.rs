@@ -7,9 +7,9 @@ mod common;
 use std::fs;
 
 use common::arms::{path, with_parameters};
+use flexcal::identify::SolverChoice;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::study::SolverChoice;
 
 /// The solver of `auto` takes at most this many times as long, summed over a class, as the fastest that reaches every optimum.
 const SLOWER: f64 = 2.0;

@@ -6,9 +6,9 @@ mod common;
 
 use common::arms::{measured as read, parse, path, with_parameters};
 use common::made::{at_random, labels, measure, model_of, split_at};
+use flexcal::identify::{Distrust, Estimate, Identification, Options, Strategy, identify};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::study::{Distrust, Estimate, Identification, Options, Strategy, identify};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

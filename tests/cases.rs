@@ -8,9 +8,9 @@ mod common;
 use std::path::PathBuf;
 
 use common::arms::{measured, path};
+use flexcal::identify::{Identification, Options, identify};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::study::{Identification, Options, identify};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 /// Fits one of `tests/cases`: held-out rms of the norm below `limit_mm`, χ² within its 99.9 % limits.
@@ -68,7 +68,7 @@ fn three_sessions_of_a_measured_ur10() {
     let (measurements, _) = Measurements::read(&files, &problem).unwrap();
     let split = Split::new(&problem, &measurements).unwrap();
     let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
-    let mean = |errors: &flexcal::study::Errors| errors.held_out.mean.norm * 1e3;
+    let mean = |errors: &flexcal::identify::Errors| errors.held_out.mean.norm * 1e3;
     let (registered, fitted) = (mean(&found.registered), mean(&found.fitted));
     println!(
         "UR10: {} poses, held-out mean {fitted:.4} mm (registered {registered:.3}), rank {} of {}, {} steps, {:.2} s",

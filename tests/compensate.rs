@@ -6,13 +6,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::identify::{Options, Placement, compensate, identify};
 use flexcal::measurement::{Measurements, Split};
+use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::report::{commands_csv, poses_csv};
-use flexcal::rig::{Truth, simulate};
-use flexcal::study::{Options, Placement, compensate, identify};
+use flexcal::simulate::{Truth, simulate};
 use nalgebra::Vector3;
 
 fn case(name: &str) -> PathBuf {
@@ -159,7 +159,7 @@ fn limits_are_kept_and_targets_out_of_reach_are_named() {
     assert!(commands.iter().all(|command| (-0.2..=0.3).contains(&command.configuration[1])));
     // Where the shoulder starts well inside its range, a correction is enough.
     let inside = commands.iter().skip(1).filter(|command| (-0.15..=0.25).contains(&rows.configuration(command.row)[1]));
-    let inside: Vec<bool> = inside.map(flexcal::study::Command::is_reached).collect();
+    let inside: Vec<bool> = inside.map(flexcal::identify::Command::is_reached).collect();
     assert!(inside.len() > 10 && inside.iter().all(|reached| *reached));
 }
 

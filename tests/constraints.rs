@@ -6,11 +6,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use flexcal::diagnosis::trace;
+use flexcal::diagnose::trace;
+use flexcal::identify::{
+    Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify,
+};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
 use flexcal::report::{estimate_json, estimate_text};
-use flexcal::study::{Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify};
 
 fn cases() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases")

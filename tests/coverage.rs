@@ -7,12 +7,12 @@ mod common;
 
 use common::arms::{measured, parse, path};
 use common::made::{at_random, draw, measure, model_of, part, split_at};
-use flexcal::fit::{Identifiability, jacobian};
+use flexcal::identify::{Options, Placement, identify};
+use flexcal::least_squares::{Identifiability, jacobian};
 use flexcal::measurement::{Measurements, Split};
+use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::parameter::Unit;
 use flexcal::problem::Problem;
-use flexcal::study::{Options, Placement, identify};
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -5,13 +5,13 @@ mod common;
 
 use common::arms::golden_problem;
 use common::made::{at_random, normal, split_at};
-use flexcal::effect::{Term, named};
-use flexcal::fit::jacobian;
+use flexcal::identify::{Options, Placement, identify_model};
+use flexcal::least_squares::jacobian;
 use flexcal::measurement::Measurements;
+use flexcal::model::effect::{Term, named};
+use flexcal::model::parameter::{ArmField, Driver, JointField, Quantity, Slot};
 use flexcal::model::{Model, PoseResiduals, TermsError};
-use flexcal::parameter::{ArmField, Driver, JointField, Quantity, Slot};
 use flexcal::problem::Problem;
-use flexcal::study::{Options, Placement, identify_model};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

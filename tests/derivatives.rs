@@ -6,12 +6,12 @@ mod common;
 
 use common::arms::{ODD, golden_problem, measured, parse, path, with_parameters};
 use common::made::{at_random, draw, labels, model_of, part};
-use flexcal::fit::{check_jacobian, jacobian};
+use flexcal::identify::Placement;
+use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
 use flexcal::model::PoseResiduals;
-use flexcal::parameter::Unit;
+use flexcal::model::parameter::Unit;
 use flexcal::problem::{Equilibrium, Problem};
-use flexcal::study::Placement;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -5,7 +5,7 @@
 mod common;
 
 use common::arms::{golden, golden_problem, table_2};
-use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::problem::{Equilibrium, Problem};
 use nalgebra::Vector3;
 

@@ -4,8 +4,8 @@
 mod collections;
 
 use collections::more_garbow_hillstrom::problems;
-use flexcal::fit::Fit;
-use flexcal::solver::{Settings, Termination, minimise};
+use flexcal::least_squares::Fit;
+use flexcal::least_squares::solver::{Settings, Termination, minimise};
 use nalgebra::DVector;
 
 /// Starts from which no minimum is reached, and why.

@@ -8,11 +8,11 @@ use common::arms::{
     golden, golden_problem, measured, parse, path, table_2_deviations, with_parameters, without_elasticity,
 };
 use common::made::{at_random, draw, labels, measure, model_of, part, predicted, split_at};
+use flexcal::identify::{Identification, Options, Strategy, identify};
+use flexcal::least_squares::solver::AtBound;
 use flexcal::measurement::{Measurements, Split};
-use flexcal::parameter::{Parameter, Unit};
+use flexcal::model::parameter::{Parameter, Unit};
 use flexcal::problem::Problem;
-use flexcal::solver::AtBound;
-use flexcal::study::{Identification, Options, Strategy, identify};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -6,12 +6,12 @@ mod common;
 
 use common::arms::{measured, path};
 use common::made::part;
-use flexcal::diagnosis::close;
+use flexcal::diagnose::close;
+use flexcal::identify::{ErrorSummary, Options, identify};
 use flexcal::measurement::{Measurements, Split};
-use flexcal::picture;
 use flexcal::problem::Problem;
+use flexcal::report::plot_data;
 use flexcal::report::{self, Page};
-use flexcal::study::{ErrorSummary, Options, identify};
 use nalgebra::Vector3;
 
 /// Elements without an end.
@@ -78,13 +78,13 @@ fn a_closed_loop_shows_what_it_found() {
         measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
     }
     let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
-    let shown = picture::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure).unwrap();
     let page = report::closure_page(&problem, &closure, &shown);
     check(&page);
-    assert!(closure.effects.iter().any(|found| flexcal::effect::name(&found.effect) == "tracker-drift"));
+    assert!(closure.effects.iter().any(|found| flexcal::model::effect::name(&found.effect) == "tracker-drift"));
     assert_eq!(shown.causes.len(), closure.effects.len());
     for found in &closure.effects {
-        assert!(page.html.contains(flexcal::effect::name(&found.effect)));
+        assert!(page.html.contains(flexcal::model::effect::name(&found.effect)));
         for estimate in &found.estimates {
             assert!(page.html.contains(&estimate.name), "{}", estimate.name);
         }
@@ -98,7 +98,7 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
     let again = report::closure_page(&problem, &closure, &shown);
     assert_eq!(page, again);
-    let other = picture::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    let other = plot_data::of_closure(&problem, &measurements, &split, &closure).unwrap();
     assert_eq!(report::closure_page(&problem, &closure, &other).html, page.html);
 }
 
@@ -106,7 +106,7 @@ fn a_closed_loop_shows_what_it_found() {
 fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     let (problem, measurements, split) = case("tests/cases/a-none.csv");
     let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
-    let shown = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let shown = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
     let close = |errors: &[Vector3<f64>], summary: &ErrorSummary| {
         let ratio = ErrorSummary::of(errors).rms.norm / summary.rms.norm;
         assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
@@ -138,7 +138,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
 fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let (problem, measurements, split) = case("tests/cases/a-none.csv");
     let mut found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
-    let mut shown = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let mut shown = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
     let last = shown.states.len() - 1;
     let errors = &mut shown.states[last].errors;
     for error in errors.iter_mut().take(3) {
@@ -153,7 +153,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let dots = |page: &Page| {
         page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
     };
-    let whole = picture::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let whole = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
     assert_eq!(dots(&page) + 12, dots(&report::identification_page(&problem, &found, &whole)));
     for text in
@@ -169,7 +169,7 @@ fn thousands_of_poses_make_no_large_page() {
     let found = identify(&problem, &few, &split, &Options::default()).unwrap();
     let many = part(&few, (0..6600).map(|k| k % few.len()));
     let split = Split::new(&problem, &many).unwrap();
-    let shown = picture::of_identification(&problem, &many, &split, &found).unwrap();
+    let shown = plot_data::of_identification(&problem, &many, &split, &found).unwrap();
     let page = report::identification_page(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());

@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnosis::{Verdict, close};
+use flexcal::diagnose::{Verdict, close};
+use flexcal::identify::{Identification, Options, identify};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
-use flexcal::study::{Identification, Options, identify};
 use nalgebra::Vector3;
 
 /// Length of a gross error [m].

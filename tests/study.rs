@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use assert_cmd::Command;
-use flexcal::campaign::{Campaign, Results, Shard, Store, collect, pending, run};
+use flexcal::monte_carlo::{Campaign, Results, Shard, Store, collect, pending, run};
 use flexcal::report;
 use serde_json::Value;
 

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 use std::process::Output;
 
 use assert_cmd::Command;
+use flexcal::identify::{Distrust, Options, identify};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::study::{Distrust, Options, identify};
 use serde_json::Value;
 
 /// A SCARA: two joints that turn, a slide, a wrist.

@@ -9,12 +9,12 @@ use std::path::Path;
 
 use common::arms::parse;
 use common::made::{normal, predicted};
-use flexcal::campaign::table;
-use flexcal::diagnosis::{WAVES, close};
+use flexcal::diagnose::{WAVES, close};
+use flexcal::identify::{Identification, Options};
 use flexcal::measurement::{Measurements, Split};
+use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, EffectDeclaration, Freedom, Problem};
-use flexcal::rig::{Truth, simulate};
-use flexcal::study::{Identification, Options};
+use flexcal::simulate::{Truth, simulate};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 

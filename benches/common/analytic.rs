@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use flexcal::fit::{Block, LeastSquares};
+use flexcal::least_squares::{Block, LeastSquares};
+use flexcal::model::parameter::{JointField, Slot};
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::parameter::{JointField, Slot};
 use nalgebra::{DVector, Vector3};
 
 /// The residuals of [`PoseResiduals`] of a rigid arm of revolute joints, base at the origin.

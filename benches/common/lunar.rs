@@ -1,10 +1,10 @@
 //! The lunar sampler: two elastic links and three elastic joints, statics on the bent arm, 32 parameters with priors.
 
-use flexcal::fit::{Fit, LinearRows};
+use flexcal::identify::Placement;
+use flexcal::least_squares::{Fit, LinearRows};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
-use flexcal::study::Placement;
 use nalgebra::{DMatrix, DVector};
 
 /// The arm and its 28 identification poses.

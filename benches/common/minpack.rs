@@ -1,7 +1,7 @@
 //! The MINPACK port of the crate `levenberg-marquardt` on the same residuals and derivatives.
 
-use flexcal::fit::{LeastSquares, LinearRows, jacobian, residual_vector};
-use flexcal::solver::Settings;
+use flexcal::least_squares::solver::Settings;
+use flexcal::least_squares::{LeastSquares, LinearRows, jacobian, residual_vector};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
 use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};

@@ -8,7 +8,7 @@ pub mod ur10;
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{LeastSquares, jacobian, residual_vector};
+use flexcal::least_squares::{LeastSquares, jacobian, residual_vector};
 use nalgebra::{DMatrix, DVector};
 
 /// A file of the repository.

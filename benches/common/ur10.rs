@@ -1,7 +1,7 @@
 //! A rigid UR10 with errors drawn at random, measured with noise.
 
-use flexcal::arm::Setup;
-use flexcal::fit::LeastSquares as _;
+use flexcal::least_squares::LeastSquares as _;
+use flexcal::mechanics::Setup;
 use flexcal::model::{Model, Pose, PoseResiduals};
 use flexcal::problem::Problem;
 use nalgebra::{DVector, Vector3};
@@ -44,7 +44,7 @@ impl Ur10 {
         let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
         let mut truth = DVector::zeros(model.parameters.len());
         for k in identifiable.clone() {
-            let angle = model.parameters[k].unit() == flexcal::parameter::Unit::Angle;
+            let angle = model.parameters[k].unit() == flexcal::model::parameter::Unit::Angle;
             truth[k] = normal(&mut random) * if angle { ERRORS.0 } else { ERRORS.1 };
         }
         let configurations: Vec<[f64; 6]> =

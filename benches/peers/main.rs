@@ -18,8 +18,8 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use common::ur10::{NOISE, Ur10};
-use flexcal::fit::Fit;
-use flexcal::solver::{Settings, minimise};
+use flexcal::least_squares::Fit;
+use flexcal::least_squares::solver::{Settings, minimise};
 use nalgebra::DVector;
 
 fn main() {

@@ -1,11 +1,11 @@
 //! The arms: a rigid UR10, and the lunar sampler bending under its loads.
 
-use flexcal::fit::{LeastSquares, LinearRows};
+use flexcal::identify::Placement;
+use flexcal::least_squares::solver::Bounds;
+use flexcal::least_squares::{LeastSquares, LinearRows};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
-use flexcal::solver::Bounds;
-use flexcal::study::Placement;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

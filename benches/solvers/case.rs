@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use flexcal::fit::{Fit, LeastSquares, LinearRows, Objective as _};
-use flexcal::solver::{Bounds, Settings};
+use flexcal::least_squares::solver::{Bounds, Settings};
+use flexcal::least_squares::{Fit, LeastSquares, LinearRows, Objective as _};
 use nalgebra::DVector;
 
 use crate::collections::{more_garbow_hillstrom, nist};

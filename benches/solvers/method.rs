@@ -3,8 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-use flexcal::fit::LeastSquares as _;
-use flexcal::solver::{
+use flexcal::least_squares::LeastSquares as _;
+use flexcal::least_squares::solver::{
     Bounds, GaussNewtonSettings, PseudoInverseSettings, Solution, minimise, minimise_bounded, minimise_gauss_newton,
     minimise_pseudo_inverse,
 };

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::study::{Options, SolverChoice, Strategy, identify};
+use flexcal::identify::{Options, SolverChoice, Strategy, identify};
 use nalgebra::DVector;
 
 use crate::arms::Lunar;
@@ -96,7 +96,7 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     let each = SolverChoice::EACH;
     let solve = |k: usize| cost(&Options { strategy: Strategy::Sequential, solver: each[k], ..Options::default() });
     let (runs, seconds) = repeated(each.len(), solve, |run| run.2);
-    let row = |((run, seconds), solver): ((&(f64, flexcal::study::Identification, f64), f64), SolverChoice)| {
+    let row = |((run, seconds), solver): ((&(f64, flexcal::identify::Identification, f64), f64), SolverChoice)| {
         let (cost, found, _) = run;
         let gap = cost / best - 1.0;
         Row {

@@ -12,8 +12,8 @@ use argmin::core::{CostFunction, Error, Executor, Gradient, Hessian, IterState, 
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use argmin::solver::trustregion::{Steihaug, TrustRegion};
-use flexcal::fit::{Linearisation, Objective};
-use flexcal::solver::Settings;
+use flexcal::least_squares::solver::Settings;
+use flexcal::least_squares::{Linearisation, Objective};
 use nalgebra::{DMatrix, DVector};
 
 use crate::method::End;

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-use flexcal::fit::{Block, LeastSquares};
+use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 
 /// The problem itself while there is time; after that no point lies in its domain, which ends any solver.

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use clap::Args;
-use flexcal::study::Options;
-use flexcal::{diagnosis, picture, report};
+use flexcal::diagnose;
+use flexcal::identify::Options;
+use flexcal::report::{self, plot_data};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -33,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let text = fs::read_to_string(common.problem_file())?;
     let line = common.talks().then(Line::new);
     let options = Options { progress: line.as_ref().map(Line::sink), ..Options::default() };
-    let result = diagnosis::close(&problem, &measurements, &split, &options);
+    let result = diagnose::close(&problem, &measurements, &split, &options);
     if let Some(line) = line {
         line.clear();
     }
@@ -46,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
         ("report.md", &report::loop_markdown(&problem, &closure)),
     ];
-    let shown = picture::of_closure(&problem, &measurements, &split, &closure)?;
+    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure)?;
     let page = report::closure_page(&problem, &closure, &shown);
     output::write_report(&folder, &results, &page)?;
     if common.json {

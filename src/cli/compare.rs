@@ -3,7 +3,8 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::{picture, report, study};
+use flexcal::identify;
+use flexcal::report::{self, plot_data};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -25,14 +26,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Input { problem, measurements, split } = common.read()?;
     let line = common.talks().then(Line::new);
     let sink = line.as_ref().map(Line::sink);
-    let result = study::compare(&problem, &measurements, &split, sink.as_ref());
+    let result = identify::compare(&problem, &measurements, &split, sink.as_ref());
     if let Some(line) = line {
         line.clear();
     }
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
-    let shown = picture::of_comparison(&problem, &measurements, &split, &comparison)?;
+    let shown = plot_data::of_comparison(&problem, &measurements, &split, &comparison)?;
     let told = report::comparison_markdown(&problem, &comparison, &shown.findings);
     let page = report::comparison_page(&problem, &comparison, &shown);
     output::write_report(&folder, &[("compare.json", &json), ("report.md", &told)], &page)?;

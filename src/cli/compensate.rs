@@ -9,7 +9,7 @@ use clap::Args;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::{report, study};
+use flexcal::{identify, report};
 use serde::Deserialize;
 
 use super::input::Common;
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
     }
-    let placement = study::Placement::of(&targets);
+    let placement = identify::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let (values, trusted) = read(&arguments.estimate, &problem, &model)?;
     if !trusted && !common.quiet {
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let x = model
         .vector_of(|name| values.get(name).copied())
         .map_err(|name| EstimateError::Missing { file: arguments.estimate.clone(), name })?;
-    let commands = study::compensate(&problem, &model, &x, &targets)?;
+    let commands = identify::compensate(&problem, &model, &x, &targets)?;
     let folder = common.folder(&problem);
     let path = output::write(&folder, "commands.csv", &report::commands_csv(&problem, &targets, &commands))?;
     if common.json {
@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&report::commands_text(&problem, &targets, &commands))?;
         output::print(&format!("\nWritten to {}\n", path.display()))?;
     }
-    let all = commands.iter().all(study::Command::is_reached);
+    let all = commands.iter().all(identify::Command::is_reached);
     Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
 }
 

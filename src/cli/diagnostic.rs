@@ -6,8 +6,8 @@ use std::io::Write as _;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{InputError, Location, Warning};
+use flexcal::identify::{Identification, IdentifyError};
 use flexcal::report;
-use flexcal::study::{Identification, IdentifyError};
 
 use super::Outcome;
 

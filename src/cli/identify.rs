@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use clap::{Args, ValueEnum};
-use flexcal::study::{self, Options, SolverChoice, Strategy};
-use flexcal::{picture, report};
+use flexcal::identify::{self, Options, SolverChoice, Strategy};
+use flexcal::report::{self, plot_data};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -90,14 +90,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         progress: line.as_ref().map(Line::sink),
         ..Options::default()
     };
-    let result = study::identify(&problem, &measurements, &split, &options);
+    let result = identify::identify(&problem, &measurements, &split, &options);
     if let Some(line) = line {
         line.clear();
     }
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
-    let shown = picture::of_identification(&problem, &measurements, &split, &identification)?;
+    let shown = plot_data::of_identification(&problem, &measurements, &split, &identification)?;
     let told = report::identification_markdown(&problem, &identification, &shown.findings);
     let page = report::identification_page(&problem, &identification, &shown);
     output::write_report(&folder, &[("estimate.json", &json), ("report.md", &told)], &page)?;

@@ -7,7 +7,7 @@ use flexcal::design::{DesignError, Ranges};
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{PoseRanges, Truth};
+use flexcal::simulate::{PoseRanges, Truth};
 
 use super::diagnostic;
 

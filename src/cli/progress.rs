@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use flexcal::study::{Progress, ProgressSink};
+use flexcal::identify::{Progress, ProgressSink};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A fit faster than this shows nothing.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::rig::{Simulation, Truth, simulate};
+use flexcal::simulate::{Simulation, Truth, simulate};
 
 use super::{Outcome, diagnostic, output};
 

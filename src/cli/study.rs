@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::campaign::{self, Campaign, CellResult, Shard, Store};
+use flexcal::monte_carlo::{self, Campaign, CellResult, Shard, Store};
 use flexcal::report;
 
 use super::progress::FitBar;
@@ -95,18 +95,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 fn fit(common: &Common, campaign: &Campaign, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
-    let parts = campaign::pending(campaign, store, shard)?;
+    let parts = monte_carlo::pending(campaign, store, shard)?;
     let own = campaign.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = own.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
     let bar = common.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
-    let done = campaign::run(campaign, store, &parts, || bar.iter().for_each(FitBar::advance));
+    let done = monte_carlo::run(campaign, store, &parts, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     Ok(done?)
 }
 
 fn finish(common: &Common, campaign: &Campaign, folder: &Path, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
-    let results = campaign::collect(campaign, stores)?;
+    let results = monte_carlo::collect(campaign, stores)?;
     let json = report::study_json(campaign, &results);
     let texts = [
         ("study.json", json.as_str()),

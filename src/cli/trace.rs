@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::study::Options;
-use flexcal::{diagnosis, report};
+use flexcal::identify::Options;
+use flexcal::{diagnose, report};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -27,7 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Input { problem, measurements, split } = common.read()?;
     let line = common.talks().then(Line::new);
     let options = Options { progress: line.as_ref().map(Line::sink), ..Options::default() };
-    let result = diagnosis::trace(&problem, &measurements, &split, &options);
+    let result = diagnose::trace(&problem, &measurements, &split, &options);
     if let Some(line) = line {
         line.clear();
     }

@@ -5,11 +5,11 @@
 
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
-use crate::diagnosis::{Detection, detectable};
+use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
+use crate::identify::Placement;
 use crate::measurement::{Labels, Measurements, Split, different};
 use crate::problem::Problem;
-use crate::study::Placement;
 
 /// Poses in which predictions are judged.
 const WORKSPACE: usize = 500;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::parameter::Parameter;
+use crate::model::parameter::Parameter;
 
 /// An eigenvalue of the prior's share above this: the prior, not the data, decides the combination.
 const MOSTLY_PRIOR: f64 = 0.5;

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::criterion::{Criterion, Yardstick};
 use super::scan::Scan;
 use super::sensitivity::Sensitivity;
-use crate::fit::Identifiability;
-use crate::parameter::Parameter;
+use crate::least_squares::Identifiability;
+use crate::model::parameter::Parameter;
 
 /// Part of the information of average poses that every plan has: keeps plans with too few poses comparable.
 const RIDGE: f64 = 1e-6;

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::Sensitivity;
-use crate::fit::{Identifiability, Uncertainty};
-use crate::parameter::{Parameter, Unit};
+use crate::least_squares::{Identifiability, Uncertainty};
+use crate::model::parameter::{Parameter, Unit};
 
 /// A part this large in combinations that stay open leaves a parameter without an error of its own.
 const PARTLY_OPEN: f64 = 1e-3;

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Forecast, Prediction, Sensitivity};
-use crate::parameter::Parameter;
+use crate::model::parameter::Parameter;
 
 /// Numbers of poses that are looked at.
 const LADDER: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384];

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-use crate::fit::{Block, LeastSquares as _, Triangle};
+use crate::least_squares::{Block, LeastSquares as _, Triangle};
 use crate::model::{Model, Pose, PoseResiduals};
 
 /// Poses differentiated together.

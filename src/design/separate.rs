@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::plan::{DRAWN, DRAWS, EVENLY, FIRST_DRAW, choose};
 use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
-use crate::diagnosis::{Separation, separation};
-use crate::effect;
+use crate::diagnose::{Separation, separation};
 use crate::measurement::Measurements;
+use crate::model::effect;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Two effects to tell apart, and a problem that declares both.

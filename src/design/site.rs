@@ -8,11 +8,11 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{DesignError, Sensitivity};
+use crate::identify::Placement;
 use crate::measurement::Measurements;
 use crate::model::Model;
-use crate::parameter::{BeamField, Parameter, Slot};
+use crate::model::parameter::{BeamField, Parameter, Slot};
 use crate::problem::Problem;
-use crate::study::Placement;
 
 /// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter [kg].
 const PROBE_MASS: f64 = 1.0;

@@ -6,7 +6,7 @@ use std::convert::identity;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest};
 use crate::problem::{HeldOut, JointKind, Problem};
-use crate::units::{self, ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
+use crate::quantity::suffix::{self, ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
 
 /// What a column stands for; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -232,7 +232,7 @@ impl Numbering {
         match suffix {
             Some(suffix) => match kind.unit(suffix) {
                 Some(unit) => Ok(Meaning::Read(role, unit.to_si)),
-                None if strict && units::suffixes().any(|known| known == suffix) => {
+                None if strict && suffix::suffixes().any(|known| known == suffix) => {
                     Err(InputErrorKind::WrongUnit { noun: kind.noun, suffix: suffix.to_owned(), write: write() })
                 }
                 None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),

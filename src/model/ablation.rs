@@ -1,8 +1,8 @@
 //! Models that leave a part of the elasticity out.
 
 use super::Model;
-use crate::arm::Flexibility;
-use crate::parameter::{ArmField, BeamField, Slot};
+use crate::mechanics::Flexibility;
+use crate::model::parameter::{ArmField, BeamField, Slot};
 
 /// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the arm stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::Model;
 use super::driven::Commands;
 use super::observation::Observation;
-use crate::parameter::{Driver, JointField, Parameter, Slot};
+use crate::model::parameter::{Driver, JointField, Parameter, Slot};
 use crate::problem::{JointKind, Problem};
 
 impl Model {

@@ -12,9 +12,9 @@ use super::inputs::{Input, inputs};
 use super::observation::Observation;
 use super::rigid::Rigid;
 use super::{Model, Pose};
-use crate::arm::Setup;
-use crate::fit::Block;
-use crate::parameter::{Driver, Slot};
+use crate::least_squares::Block;
+use crate::mechanics::Setup;
+use crate::model::parameter::{Driver, Slot};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, rotation_axes};
 

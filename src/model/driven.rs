@@ -1,8 +1,8 @@
 //! What adds to the joints' commands, pose by pose.
 
 use super::Model;
-use crate::arm::Setup;
-use crate::parameter::{Driver, JointField, Slot};
+use crate::mechanics::Setup;
+use crate::model::parameter::{Driver, JointField, Slot};
 
 /// A known addition to a joint's coordinate: value × driver.
 #[derive(Debug, Clone, Copy, PartialEq)]

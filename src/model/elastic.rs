@@ -9,8 +9,8 @@ use num_dual::Dual64;
 use super::Model;
 use super::derivative::Rows;
 use super::inputs::Input;
-use crate::arm::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Setup, Workspace};
-use crate::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::mechanics::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Setup, Workspace};
+use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
 use crate::spatial::Frame;
 
 /// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.

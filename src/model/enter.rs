@@ -1,7 +1,7 @@
 //! How a parameter enters the arm, by its slot.
 
-use crate::arm::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Thermal};
-use crate::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::mechanics::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Thermal};
+use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;

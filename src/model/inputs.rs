@@ -1,7 +1,7 @@
 //! The scalars of the arm that parameters act on: one derivative serves every parameter that is driven at one place.
 
 use super::Model;
-use crate::parameter::{Driver, Slot};
+use crate::model::parameter::{Driver, Slot};
 
 /// A scalar of the arm with the columns of the parameters that act on it.
 #[derive(Debug, Clone)]

@@ -5,10 +5,12 @@ mod ablation;
 mod command;
 mod derivative;
 mod driven;
+pub mod effect;
 mod elastic;
 mod enter;
 mod inputs;
 mod observation;
+pub mod parameter;
 mod poses;
 mod rigid;
 mod terms;
@@ -19,10 +21,11 @@ pub use terms::TermsError;
 
 use nalgebra::Vector3;
 
-use crate::arm::Arm;
-use crate::effect;
 use crate::error::InputError;
-use crate::parameter::{Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::mechanics::Arm;
+use crate::model::parameter::{
+    Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve,
+};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;

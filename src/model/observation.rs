@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Model;
-use crate::arm::Setup;
-use crate::parameter::{Driver, Slot};
+use crate::mechanics::Setup;
+use crate::model::parameter::{Driver, Slot};
 
 /// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]

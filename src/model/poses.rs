@@ -9,8 +9,8 @@ use super::Model;
 use super::derivative::Linearised;
 use super::driven::Commands;
 use super::observation::Observation;
-use crate::arm::{Equilibrated, Setup, Workspace};
-use crate::fit::{Block, CHUNK_ITEMS, LeastSquares};
+use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
+use crate::mechanics::{Equilibrated, Setup, Workspace};
 
 /// One measured pose as the model sees it.
 #[derive(Debug, Clone, Copy)]

@@ -8,8 +8,8 @@ use num_dual::Dual64;
 
 use super::derivative::Rows;
 use super::inputs::Input;
-use crate::arm::{Angle, Arm, Coordinates, Joint, Setup};
-use crate::parameter::{JointField, Slot};
+use crate::mechanics::{Angle, Arm, Coordinates, Joint, Setup};
+use crate::model::parameter::{JointField, Slot};
 use crate::spatial::{Frame, turn_x, turn_y, turn_z};
 
 /// A rigid arm, motion by motion.

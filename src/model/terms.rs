@@ -1,7 +1,7 @@
 //! Which parameters of effects the model has room for.
 
 use crate::error::InputError;
-use crate::parameter::{BeamField, Driver, EffectParameter, JointField, Quantity, Slot};
+use crate::model::parameter::{BeamField, Driver, EffectParameter, JointField, Quantity, Slot};
 use crate::problem::{JointKind, Problem};
 
 /// Why a model cannot take a parameter of an effect.

@@ -6,9 +6,9 @@ use super::form::{Form, Misprint, Reading};
 use super::loads::Setup;
 use super::residuals::GeometryResiduals;
 use super::{EndPoint, Parameters};
-use crate::fit::{Block, Fit, Triangle};
+use crate::least_squares::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
+use crate::least_squares::{Block, Fit, Triangle};
 use crate::problem::Problem;
-use crate::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
 
 /// A pose with its measured position.
 #[derive(Debug, Clone, Copy, PartialEq)]

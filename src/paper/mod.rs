@@ -12,7 +12,7 @@
 //! | 12-27 transfer to the end point | [`transfer`], [`joint_transfer`], [`link_transfer`], [`Elastic`] |
 //! | 28-38 geometric errors | [`geometric`] |
 //! | 39-41 end-point error | [`EndPoint`] |
-//! | 42-45 least squares, iteration | [`least_squares`], [`identify`], [`crate::solver::PseudoInverse`] |
+//! | 42-45 least squares, iteration | [`least_squares`], [`identify`], [`crate::least_squares::solver::PseudoInverse`] |
 //!
 //! Shares no physics with the model: forces are resolved in the frames of the rigid arm and every effect is of first order.
 //!

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::form::Reading;
 use super::identify::Measured;
 use super::{EndPoint, Parameters};
-use crate::fit::{Block, LeastSquares};
+use crate::least_squares::{Block, LeastSquares};
 use crate::problem::Problem;
 
 /// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.

@@ -6,7 +6,7 @@ use super::item::Item;
 use super::section::Section;
 use super::{Beam, Body, Hoist, Joint, JointKind, effects};
 use crate::error::{InputError, InputErrorKind};
-use crate::units::{ANGLE, FORCE, Kind, LENGTH, MASS, RIGIDITY, STIFFNESS};
+use crate::quantity::suffix::{ANGLE, FORCE, Kind, LENGTH, MASS, RIGIDITY, STIFFNESS};
 
 /// Every `[[joint]]`, at least one.
 pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputError> {

@@ -3,7 +3,7 @@
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::units::{ANGLE, LENGTH};
+use crate::quantity::suffix::{ANGLE, LENGTH};
 
 /// `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
 #[derive(Debug, Clone)]

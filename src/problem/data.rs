@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::units::{LENGTH, TEMPERATURE};
+use crate::quantity::suffix::{LENGTH, TEMPERATURE};
 
 /// `[data]`.
 #[derive(Debug, Clone)]

@@ -8,7 +8,7 @@ use super::item::{Document, Item};
 use super::section::Section;
 use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::units::TIME;
+use crate::quantity::suffix::TIME;
 
 /// The effects by name.
 pub(crate) const NAMES: [&str; 21] = [

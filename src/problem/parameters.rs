@@ -3,7 +3,7 @@
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::units::{ANGLE, Kind, LENGTH, RELATIVE};
+use crate::quantity::suffix::{ANGLE, Kind, LENGTH, RELATIVE};
 
 /// One line of `[parameters]`.
 #[derive(Debug, Clone)]

@@ -12,7 +12,7 @@ use super::{
     robust,
 };
 use crate::error::{InputError, InputErrorKind};
-use crate::units::{ACCELERATION, ANGLE, LENGTH, MASS};
+use crate::quantity::suffix::{ACCELERATION, ANGLE, LENGTH, MASS};
 
 impl Problem {
     /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.

@@ -7,7 +7,7 @@ use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
 use crate::error::{InputError, InputErrorKind, Location, nearest};
-use crate::units::{self, Kind, Unit};
+use crate::quantity::suffix::{self, Kind, Unit};
 
 /// A table that is being read.
 pub(crate) struct Section<'a, 'i> {
@@ -129,7 +129,7 @@ impl<'a, 'i> Section<'a, 'i> {
             let write = kind.spelled(base);
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: kind.noun, write }));
         }
-        for suffix in units::suffixes().filter(|suffix| kind.unit(suffix).is_none()) {
+        for suffix in suffix::suffixes().filter(|suffix| kind.unit(suffix).is_none()) {
             if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
                 let (suffix, write) = (suffix.to_owned(), kind.spelled(base));
                 return Err(item.error(InputErrorKind::WrongUnit { noun: kind.noun, suffix, write }));

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::cells::quoted;
 use super::json::to_text;
 use super::quantity::{fixed, number};
+use crate::identify::Command;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, Problem};
-use crate::study::Command;
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::json::{Both, to_text};
+use crate::identify::{Baseline, Comparison, Identification, SolverChoice};
 use crate::problem::Problem;
-use crate::study::{Baseline, Comparison, Identification, SolverChoice};
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {

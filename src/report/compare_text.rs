@@ -2,9 +2,9 @@
 
 use super::quantity::{number, table};
 use super::text::no_errors;
+use crate::identify::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
+use crate::least_squares::solver::Termination;
 use crate::problem::Problem;
-use crate::solver::Termination;
-use crate::study::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
 
 /// Table 3 of [Chen2021], 50 poses, mm: before, with elasticity, geometry alone; x, y, z and sum of each.
 const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [

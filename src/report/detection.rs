@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::document::{Block, Table, to_text};
 use super::effect;
 use super::quantity::{Display, decimals, number};
-use crate::diagnosis::{Detectable, Detection, Size};
-use crate::effect::{name, place};
+use crate::diagnose::{Detectable, Detection, Size};
+use crate::model::effect::{name, place};
 use crate::problem::Effect;
 
 /// Effects of a family on a screen.

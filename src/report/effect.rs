@@ -3,10 +3,10 @@
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::quantity::{Display, decimals, number};
-use crate::diagnosis::Trace;
-use crate::effect::{self, Argument};
+use crate::diagnose::Trace;
+use crate::identify::Estimate;
+use crate::model::effect::{self, Argument};
 use crate::problem::Effect;
-use crate::study::Estimate;
 
 /// Decimals of a value at most.
 const MOST: usize = 6;

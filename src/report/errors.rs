@@ -1,6 +1,6 @@
 //! Poses whose errors nobody knows.
 
-use crate::study::{ErrorSummary, Errors};
+use crate::identify::{ErrorSummary, Errors};
 
 /// For each arm by name the poses that have no equilibrium with it, so that no mean over their errors exists; `None` where
 /// all errors are known.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::quantity::number;
-use crate::diagnosis::{Check, Findings, Test};
+use crate::diagnose::{Check, Findings, Test};
 
 /// One check.
 #[derive(Debug, Serialize)]

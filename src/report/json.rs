@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::fit::{BlindCombination, Identifiability};
+use crate::identify::{ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise, Outlier};
+use crate::least_squares::solver::AtBound;
+use crate::least_squares::{BlindCombination, Identifiability};
 use crate::problem::Problem;
-use crate::solver::AtBound;
-use crate::study::{ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, Noise, Outlier};
 
 /// An error summary in millimetres.
 #[derive(Debug, Serialize)]

@@ -6,9 +6,9 @@ use super::findings;
 use super::parameters::{blind_text, correlation_text, parameter_blocks};
 use super::quantity::number;
 use super::text::{conditioning, no_errors, noise, outliers, why_not_trusted};
-use crate::diagnosis::Findings;
+use crate::diagnose::Findings;
+use crate::identify::{Comparison, ErrorSummary, Identification};
 use crate::problem::Problem;
-use crate::study::{Comparison, ErrorSummary, Identification};
 
 /// An identification as Markdown, ending in a line break.
 pub fn identification_markdown(problem: &Problem, found: &Identification, findings: &Findings) -> String {

@@ -20,6 +20,7 @@ mod json;
 mod markdown;
 mod parameters;
 mod plan;
+pub mod plot_data;
 mod poses;
 mod quantity;
 mod separation;

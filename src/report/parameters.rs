@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use super::document::{Block, Table};
 use super::quantity::{Display, decimals, number, table};
 use super::waves::{Line, shown};
-use crate::fit::{BlindCombination, Identifiability};
-use crate::parameter::Unit;
-use crate::solver::AtBound;
-use crate::study::{Estimate, Identification};
+use crate::identify::{Estimate, Identification};
+use crate::least_squares::solver::AtBound;
+use crate::least_squares::{BlindCombination, Identifiability};
+use crate::model::parameter::Unit;
 
 /// Decimals of a value that has no error.
 const PLAIN: usize = 4;

@@ -1,6 +1,6 @@
 //! Numbers with units, as people read them.
 
-use crate::parameter::Unit;
+use crate::model::parameter::Unit;
 
 /// From here on numbers are written with a power of ten.
 const HUGE: f64 = 1e12;

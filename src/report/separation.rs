@@ -6,7 +6,7 @@ use super::document::{Block, Table, to_text};
 use super::effect;
 use super::quantity::{Display, decimals, number};
 use crate::design::Separated;
-use crate::diagnosis::{Separation, Side};
+use crate::diagnose::{Separation, Side};
 
 /// Decimals of any size at most.
 const MOST: usize = 6;

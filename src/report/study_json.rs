@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::json::to_text;
-use crate::campaign::{Campaign, CellResult, ParameterResult, Results};
+use crate::monte_carlo::{Campaign, CellResult, ParameterResult, Results};
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {

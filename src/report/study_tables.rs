@@ -1,7 +1,7 @@
 //! `study.csv`, `parameters.csv`, `timing.csv`: tables for other programs, SI units except where a column says otherwise.
 
 use super::cells::quoted;
-use crate::campaign::{Campaign, CellResult, Results};
+use crate::monte_carlo::{Campaign, CellResult, Results};
 
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 

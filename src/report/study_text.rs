@@ -2,7 +2,7 @@
 
 use super::quantity::{number, table};
 use super::study_json::millimetres;
-use crate::campaign::{Campaign, CellResult, Results, Source};
+use crate::monte_carlo::{Campaign, CellResult, Results, Source};
 
 /// A study as text, ending in a line break.
 pub fn study_text(campaign: &Campaign, results: &Results) -> String {

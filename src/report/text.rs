@@ -5,9 +5,9 @@ use super::parameters::{blind_text, correlation_text, parameter_table};
 use std::fmt::Write as _;
 
 use super::quantity::{number, table};
-use crate::fit::Identifiability;
+use crate::identify::{Distrust, ErrorSummary, Identification, Noise};
+use crate::least_squares::Identifiability;
 use crate::problem::Problem;
-use crate::study::{Distrust, ErrorSummary, Identification, Noise};
 
 /// Outliers that fit on a screen.
 const SHOWN_OUTLIERS: usize = 20;

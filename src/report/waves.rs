@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::effect::{MOST_LISTED, SHOWN_WAVES};
-use crate::study::Estimate;
+use crate::identify::Estimate;
 
 /// A line of a table of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ pub(super) fn shown(estimates: &[Estimate]) -> Shown<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameter::Unit;
+    use crate::model::parameter::Unit;
 
     fn estimate(name: String, value: f64) -> Estimate {
         Estimate {

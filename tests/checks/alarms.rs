@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::diagnosis::{Check, Driver, Findings};
+use flexcal::diagnose::{Check, Driver, Findings};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;

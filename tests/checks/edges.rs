@@ -1,6 +1,6 @@
 //! What cannot be tested says why, odd inputs are taken, and threads change nothing.
 
-use flexcal::diagnosis::{Driver, Findings, Sequence, Test, Untestable};
+use flexcal::diagnose::{Driver, Findings, Sequence, Test, Untestable};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 

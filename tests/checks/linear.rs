@@ -1,6 +1,6 @@
 //! Linear fits with known structure in what they leave.
 
-use flexcal::diagnosis::{Check, Driver, Findings, Remainder, Test, check};
+use flexcal::diagnose::{Check, Driver, Findings, Remainder, Test, check};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

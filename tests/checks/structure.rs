@@ -1,6 +1,6 @@
 //! Structure in what a fit leaves is found and named.
 
-use flexcal::diagnosis::{Check, Findings, Sequence, Test};
+use flexcal::diagnose::{Check, Findings, Sequence, Test};
 use nalgebra::Vector3;
 use rand::RngExt as _;
 use rayon::prelude::*;

@@ -9,7 +9,7 @@ pub mod nist;
 
 use std::ops::Range;
 
-use flexcal::fit::{Block, LeastSquares};
+use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 use num_dual::Dual64;
 

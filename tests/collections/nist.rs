@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use flexcal::fit::{Block, LeastSquares};
+use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 use num_dual::Dual64;
 

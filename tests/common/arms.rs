@@ -5,9 +5,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::arm::{Angle, Arm};
 use flexcal::measurement::Measurements;
-use flexcal::parameter::{JointField, Parameter, Slot};
+use flexcal::mechanics::{Angle, Arm};
+use flexcal::model::parameter::{JointField, Parameter, Slot};
 use flexcal::problem::Problem;
 use nalgebra::DVector;
 

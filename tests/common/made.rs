@@ -4,11 +4,11 @@
 
 use std::path::PathBuf;
 
+use flexcal::identify::Placement;
 use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::parameter::Unit;
 use flexcal::problem::{JointKind, Problem};
-use flexcal::study::Placement;
 use nalgebra::{DVector, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;

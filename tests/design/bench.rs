@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use flexcal::design::Ranges;
+use flexcal::identify::{Identification, Options, identify};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
-use flexcal::rig::{Conditions, Rig, Truth, simulate};
-use flexcal::study::{Identification, Options, identify};
+use flexcal::simulate::{Conditions, Rig, Truth, simulate};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;

@@ -165,12 +165,12 @@ fn examples_of_arguments_are_effects_of_the_arm() {
     let (problem, _) = super::bench::lunar();
     let read = |text: &str| problem.effect(text, Path::new("--separate"));
     let mut written = 0;
-    for family in flexcal::effect::FAMILIES {
+    for family in flexcal::model::effect::FAMILIES {
         let Err(error) = read(family.name) else { continue };
         let error = error.to_string();
         let Some((_, example)) = error.split_once("write '") else { continue };
         let read = read(example.trim_end_matches('\'')).unwrap();
-        assert_eq!(flexcal::effect::name(&read.effect), family.name);
+        assert_eq!(flexcal::model::effect::name(&read.effect), family.name);
         written += 1;
     }
     assert_eq!(written, 13);

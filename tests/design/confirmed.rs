@@ -2,7 +2,7 @@
 
 use flexcal::design::{Candidates, Criterion, Extremes, Plan, PlanOptions, plan};
 use flexcal::problem::Problem;
-use flexcal::rig::Truth;
+use flexcal::simulate::Truth;
 use nalgebra::DVector;
 use rayon::prelude::*;
 

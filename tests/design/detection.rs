@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use flexcal::design::Extremes;
-use flexcal::diagnosis::{detectable, trace};
-use flexcal::effect;
+use flexcal::diagnose::{detectable, trace};
+use flexcal::identify::Options;
 use flexcal::measurement::{Measurements, Split};
+use flexcal::model::effect;
 use flexcal::problem::{Effect, Freedom, Problem};
-use flexcal::study::Options;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

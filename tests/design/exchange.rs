@@ -3,7 +3,7 @@
 use flexcal::design::{
     Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity, Site, plan,
 };
-use flexcal::parameter::Parameter;
+use flexcal::model::parameter::Parameter;
 use rayon::ThreadPoolBuilder;
 
 use super::bench::{lunar, ranges};

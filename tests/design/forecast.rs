@@ -2,7 +2,7 @@
 
 use flexcal::design::{Check, Expected, Extremes, Judged, check};
 use flexcal::measurement::Measurements;
-use flexcal::parameter::Unit;
+use flexcal::model::parameter::Unit;
 use flexcal::problem::{Freedom, Problem};
 use nalgebra::DVector;
 use rand::SeedableRng as _;

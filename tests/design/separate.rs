@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use flexcal::design::{Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate};
-use flexcal::diagnosis::close;
+use flexcal::diagnose::close;
+use flexcal::identify::Options;
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{Cause, TrueEffect, Truth};
-use flexcal::study::Options;
+use flexcal::simulate::{Cause, TrueEffect, Truth};
 use rayon::prelude::*;
 
 use super::bench::{lunar, measure, ranges, true_arm};

@@ -6,7 +6,7 @@ use flexcal::error::Location;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::{Effect, EffectDeclaration, Equilibrium, JointKind, Problem};
-use flexcal::rig::{Cause, Conditions, TrueEffect};
+use flexcal::simulate::{Cause, Conditions, TrueEffect};
 use nalgebra::DVector;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -112,7 +112,7 @@ pub fn conditions(rows: &Measurements, row: usize) -> Conditions {
 pub fn of_effects(model: &Model) -> Vec<usize> {
     let is_effect = |name: &str| {
         let family = name.split(['[', '.']).next().unwrap();
-        flexcal::effect::FAMILIES.iter().any(|known| known.name == family)
+        flexcal::model::effect::FAMILIES.iter().any(|known| known.name == family)
     };
     (0..model.parameters.len()).filter(|&k| is_effect(&model.parameters[k].name)).collect()
 }

@@ -1,8 +1,8 @@
 //! Commands for an arm whose effects follow its commands, tried on the virtual rig.
 
+use flexcal::identify::compensate;
 use flexcal::problem::Effect;
-use flexcal::rig::Rig;
-use flexcal::study::compensate;
+use flexcal::simulate::Rig;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

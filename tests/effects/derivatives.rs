@@ -1,11 +1,11 @@
 //! Derivatives of effects by dual numbers against extrapolated differences.
 
-use flexcal::fit::{check_jacobian, jacobian};
+use flexcal::identify::Placement;
+use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
+use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::parameter::Unit;
 use flexcal::problem::{Effect, Equilibrium, Problem};
-use flexcal::study::Placement;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,10 +1,10 @@
 //! Declared effects are found from 28 noisy poses, within their errors.
 
+use flexcal::identify::{Identification, Options, identify, identify_model};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::Ablation;
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::Rig;
-use flexcal::study::{Identification, Options, identify, identify_model};
+use flexcal::simulate::Rig;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

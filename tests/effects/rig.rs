@@ -2,7 +2,7 @@
 
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Effect, JointKind, Problem};
-use flexcal::rig::Rig;
+use flexcal::simulate::Rig;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,8 @@
 //! What the rules of `[parameters]` make of the parameters of effects.
 
-use flexcal::diagnosis::detectable;
-use flexcal::effect::name;
-use flexcal::parameter::Parameter;
+use flexcal::diagnose::detectable;
+use flexcal::model::effect::name;
+use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
 
 use rand::SeedableRng as _;

@@ -1,10 +1,10 @@
 //! The lunar sampler, its golden positions, and what the dual-number model says of it.
 
-use flexcal::arm;
-use flexcal::fit::jacobian;
+use flexcal::least_squares::jacobian;
+use flexcal::mechanics;
+use flexcal::model::parameter::Parameter;
 use flexcal::model::{Model, Pose, PoseResiduals};
 use flexcal::paper::{EndPoint, Mdh, Parameters, Reading, Setup};
-use flexcal::parameter::Parameter;
 use flexcal::problem::{Equilibrium, Freedom, Problem, Quantities};
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -23,8 +23,8 @@ impl Row {
         Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
     }
 
-    pub fn arm_setup(&self) -> arm::Setup<'_> {
-        arm::Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..arm::Setup::of(&self.q) }
+    pub fn arm_setup(&self) -> mechanics::Setup<'_> {
+        mechanics::Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..mechanics::Setup::of(&self.q) }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Eq. 3-27: deflections of links and joints, and what they do to the end point.
 
+use flexcal::model::parameter::{BeamField, JointField, Slot};
 use flexcal::paper::{
     Chain, Flexibility, Form, LinkTerms, Loads, Parameters, Reading, joint, joint_transfer, link_transfer, transfer,
 };
-use flexcal::parameter::{BeamField, JointField, Slot};
 use nalgebra::{DVector, Matrix4, Vector6};
 
 use super::arm::{both, dual_jacobian, end, model, odd_problem, odd_rows, problem, rows};

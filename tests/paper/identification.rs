@@ -1,11 +1,11 @@
 //! The paper's procedure end to end, eq. 42-45, on positions of the dual-number model.
 
-use flexcal::arm::{Equilibrated, Workspace};
+use flexcal::least_squares::solver::Termination;
+use flexcal::mechanics::{Equilibrated, Workspace};
 use flexcal::paper::{
     Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading, StiffnessStage, identify,
 };
 use flexcal::problem::Problem;
-use flexcal::solver::Termination;
 use nalgebra::{DVector, Vector3};
 
 use super::arm::{Row, end, model, place_in_e, problem, rows, table_2_errors};

@@ -1,11 +1,11 @@
 //! Solvers of eq. 45: the pseudo-inverse iteration, and argmin's Gauss–Newton method beside it.
 
-use flexcal::fit::{Fit, jacobian};
-use flexcal::model::{Model, Pose, PoseResiduals};
-use flexcal::solver::{
+use flexcal::least_squares::solver::{
     Divergence, GaussNewtonSettings, PseudoInverseSettings, Settings, Termination, minimise, minimise_gauss_newton,
     minimise_pseudo_inverse,
 };
+use flexcal::least_squares::{Fit, jacobian};
+use flexcal::model::{Model, Pose, PoseResiduals};
 use nalgebra::{DVector, Vector3};
 
 use super::arm::{Row, model, problem, rigid, rows};

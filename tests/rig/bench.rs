@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{Cause, Conditions, Rig, TrueEffect};
+use flexcal::simulate::{Cause, Conditions, Rig, TrueEffect};
 use nalgebra::Vector3;
 
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");

@@ -1,7 +1,7 @@
 //! Every effect is inert at zero, moves positions when it is not, and does what its law says.
 
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{Cause, Conditions, Shape, TrueEffect};
+use flexcal::simulate::{Cause, Conditions, Shape, TrueEffect};
 use nalgebra::Vector3;
 
 use super::bench::{effect, golden, lunar_sampler, position};

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use flexcal::problem::Problem;
-use flexcal::rig::Rig;
+use flexcal::simulate::Rig;
 
 use super::bench::{Golden, golden, lunar_sampler, position, stiffer, table_2};
 

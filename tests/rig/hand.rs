@@ -1,7 +1,7 @@
 //! Results that can be checked by hand: a straight arm of one link, clamped or on one joint.
 
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::Conditions;
+use flexcal::simulate::Conditions;
 use nalgebra::Vector3;
 
 use super::bench::{effect, position, problem};
@@ -96,7 +96,7 @@ fn a_hanging_soft_joint_comes_to_rest_and_a_column_that_buckles_does_not() {
     let angle = end.z.atan2(end.x);
     near(angle - (-80.0_f64).to_radians(), -10.0 * G * 2.0 * angle.cos() / 20.0, 1e-9);
     arm.joints[0].theta = 100.0_f64.to_radians();
-    let standing = flexcal::rig::Rig::new(arm, Vec::new()).position(&at(10.0));
+    let standing = flexcal::simulate::Rig::new(arm, Vec::new()).position(&at(10.0));
     if let Ok(end) = standing {
         // It may fall over and hang.
         assert!(end.z < 0.0);

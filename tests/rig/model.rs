@@ -1,8 +1,8 @@
 //! The closed-form beams against the rig, on arms with everything that a problem may declare.
 
-use flexcal::arm::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::problem::Problem;
-use flexcal::rig::Conditions;
+use flexcal::simulate::Conditions;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -6,7 +6,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
-use flexcal::rig::{Conditions, Rig, Simulation, Truth, simulate};
+use flexcal::simulate::{Conditions, Rig, Simulation, Truth, simulate};
 use serde_json::Value;
 
 use super::bench::{ROOT, problem};

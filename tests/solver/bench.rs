@@ -1,7 +1,7 @@
 //! What the tests of this theme share.
 
-use flexcal::fit::{Linearisation, Objective};
-use flexcal::solver::{Bounds, Inequalities, Settings};
+use flexcal::least_squares::solver::{Bounds, Inequalities, Settings};
+use flexcal::least_squares::{Linearisation, Objective};
 use nalgebra::DVector;
 
 /// A function of the collections as a problem.

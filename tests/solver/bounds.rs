@@ -1,7 +1,7 @@
 //! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the answers of `SciPy`.
 
-use flexcal::fit::{Fit, Linearisation, Objective};
-use flexcal::solver::{AtBound, Bounds, Termination, minimise, minimise_bounded};
+use flexcal::least_squares::solver::{AtBound, Bounds, Termination, minimise, minimise_bounded};
+use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::DVector;
 
 use super::bench::{Guarded, analytic, tight, vector};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use flexcal::fit::{Block, LeastSquares, check_jacobian};
+use flexcal::least_squares::{Block, LeastSquares, check_jacobian};
 use nalgebra::DVector;
 use num_dual::Dual64;
 

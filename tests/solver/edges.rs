@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use argmin::core::observers::Observe;
 use argmin::core::{Error, KV, State as _};
-use flexcal::fit::{Block, Fit, LeastSquares, LinearRows, RowsError};
-use flexcal::solver::{Settings, State, Termination, minimise, minimise_observed};
+use flexcal::least_squares::solver::{Settings, State, Termination, minimise, minimise_observed};
+use flexcal::least_squares::{Block, Fit, LeastSquares, LinearRows, RowsError};
 use nalgebra::{DMatrix, DVector};
 
 /// r = A x + b.

@@ -1,9 +1,9 @@
 //! Linear inequalities: agreement where none is active, exact active ones, never outside, and the answers of `SciPy`.
 
-use flexcal::fit::{Fit, Linearisation, Objective};
-use flexcal::solver::{
+use flexcal::least_squares::solver::{
     AtBound, Bounds, Inequalities, Termination, minimise, minimise_bounded, minimise_constrained, nearest,
 };
+use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::{DMatrix, DVector};
 
 use super::bench::{Guarded, analytic, tight, vector};

@@ -1,7 +1,7 @@
 //! Certified values of the NIST Statistical Reference Datasets.
 
-use flexcal::fit::Fit;
-use flexcal::solver::{Settings, Solution, minimise};
+use flexcal::least_squares::Fit;
+use flexcal::least_squares::solver::{Settings, Solution, minimise};
 use nalgebra::DVector;
 
 use crate::collections::nist::{Dataset, datasets};
@@ -39,7 +39,7 @@ const TIGHT: Settings = Settings {
 
 #[test]
 fn certified_values_are_a_minimum_of_the_stored_data() {
-    use flexcal::fit::Objective;
+    use flexcal::least_squares::Objective;
     for dataset in datasets() {
         let rss = 2.0 * Fit::new(&dataset).cost(&dataset.certified);
         // Eleven certified digits cannot reach the residual of Lanczos1, 1.4e-25.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use flexcal::fit::{Block, CHUNK_ITEMS, Fit, LeastSquares, Loss, Objective};
-use flexcal::solver::{Settings, minimise};
+use flexcal::least_squares::solver::{Settings, minimise};
+use flexcal::least_squares::{Block, CHUNK_ITEMS, Fit, LeastSquares, Loss, Objective};
 use nalgebra::DVector;
 
 const HUBER: Loss = Loss::Huber { threshold: 1.345 };

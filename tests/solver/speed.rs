@@ -3,8 +3,8 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use flexcal::fit::{Block, Linearisation, Objective, Triangle};
-use flexcal::solver::{Factor, Settings, minimise};
+use flexcal::least_squares::solver::{Factor, Settings, minimise};
+use flexcal::least_squares::{Block, Linearisation, Objective, Triangle};
 use nalgebra::{DMatrix, DVector};
 
 fn wave(i: usize) -> f64 {

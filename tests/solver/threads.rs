@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use flexcal::fit::{Block, CHUNK_ITEMS, Fit, LeastSquares, Objective, jacobian, residual_vector};
-use flexcal::solver::{Settings, minimise};
+use flexcal::least_squares::solver::{Settings, minimise};
+use flexcal::least_squares::{Block, CHUNK_ITEMS, Fit, LeastSquares, Objective, jacobian, residual_vector};
 use nalgebra::DVector;
 
 /// Damped waves sampled at many times, three residuals each.

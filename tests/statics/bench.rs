@@ -1,6 +1,6 @@
 //! What the tests of this theme share.
 
-use flexcal::arm::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, Setup, StaticsError, Workspace};
+use flexcal::mechanics::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, Setup, StaticsError, Workspace};
 use flexcal::problem::{Equilibrium, JointKind};
 use flexcal::spatial::Frame;
 use nalgebra::Vector3;

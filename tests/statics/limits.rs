@@ -1,9 +1,9 @@
 //! Many elements, no loads, small deflections, and loads too great for an equilibrium.
 
-use flexcal::arm::{Arm, Equilibrated, Setup, StaticsError, Workspace};
+use flexcal::identify::Placement;
+use flexcal::mechanics::{Arm, Equilibrated, Setup, StaticsError, Workspace};
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Equilibrium;
-use flexcal::study::Placement;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -94,7 +94,7 @@ fn a_pose_without_equilibrium_has_no_residual() {
     let poses = Placement::of(&rows).poses(&rows, &[0, 1, 2], 1e-3);
     let residuals = PoseResiduals::new(&model, poses, (0..x.len()).collect(), x.clone());
     assert!(residuals.position_errors(&x).iter().all(|error| error.iter().all(|e| e.is_nan())));
-    let jacobian = flexcal::fit::jacobian(&residuals, &x);
+    let jacobian = flexcal::least_squares::jacobian(&residuals, &x);
     assert_eq!(jacobian.shape(), (9, x.len()));
 }
 

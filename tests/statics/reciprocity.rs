@@ -1,6 +1,6 @@
 //! Maxwell–Betti: what one force does to another's place is what the other does to its.
 
-use flexcal::arm::{Hoist, Joint};
+use flexcal::mechanics::{Hoist, Joint};
 use nalgebra::Vector3;
 
 use super::bench::{TARGET, arms, frame, position, rigid, softer};

@@ -1,6 +1,6 @@
 //! An arm turned or mirrored as a whole is the same arm.
 
-use flexcal::arm::{Angle, Arm, Beam, Joint};
+use flexcal::mechanics::{Angle, Arm, Beam, Joint};
 use flexcal::problem::{Equilibrium, JointKind};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 

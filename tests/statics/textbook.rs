@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use flexcal::arm::{Angle, Arm, Flexibility, Hoist, Joint, PointMass};
+use flexcal::mechanics::{Angle, Arm, Flexibility, Hoist, Joint, PointMass};
 use nalgebra::Vector3;
 
 use super::bench::{GRAVITY, LENGTH, STIFF, arm, beam, frame, joint, position};

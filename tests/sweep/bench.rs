@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flexcal::campaign::table;
 use flexcal::measurement::{Measurements, Split};
+use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
-use flexcal::rig::{Cause, Shape, TrueEffect, Truth, simulate};
+use flexcal::simulate::{Cause, Shape, TrueEffect, Truth, simulate};
 
 use crate::common::arms::path;
 
@@ -97,7 +97,7 @@ pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
     let mut truth = Truth::parse(&format!("{given}{DRAWN}"), Path::new("truth.toml"), &arm).unwrap();
     truth.effects = effects.to_vec();
-    truth.poses.held_out = flexcal::rig::HeldOutRows::AllBut(size.identification);
+    truth.poses.held_out = flexcal::simulate::HeldOutRows::AllBut(size.identification);
     let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();
     let rows = simulated.rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);

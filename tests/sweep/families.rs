@@ -1,7 +1,7 @@
 //! Every family at a realistic size: what is true on the rig, and how the declared problem lacks it.
 
 use flexcal::problem::{Effect, Equilibrium, Problem};
-use flexcal::rig::TrueEffect;
+use flexcal::simulate::TrueEffect;
 
 use crate::bench::{catalogued, lunar};
 

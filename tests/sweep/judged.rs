@@ -1,9 +1,9 @@
 //! One set through the loop, and what the loop makes of it beside the truth.
 
-use flexcal::diagnosis::{Closure, Verdict, close};
-use flexcal::effect;
+use flexcal::diagnose::{Closure, Verdict, close};
+use flexcal::identify::{Identification, Options, identify};
+use flexcal::model::effect;
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
-use flexcal::study::{Identification, Options, identify};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use crate::bench::{NOISE, SIGMA, Set, Size, measured};

@@ -1,8 +1,8 @@
 //! What no catalogue holds: a bump or a step of one joint's coordinate.
 
-use flexcal::diagnosis::{Closure, close};
-use flexcal::rig::Shape;
-use flexcal::study::Options;
+use flexcal::diagnose::{Closure, close};
+use flexcal::identify::Options;
+use flexcal::simulate::Shape;
 
 use crate::bench::{NOISE, Size, lunar, measured, outside};
 use crate::judged::named;

@@ -1,10 +1,10 @@
 //! A representative part of the sweep, and the cases of `tests/cases`.
 
-use flexcal::diagnosis::{Verdict, close};
+use flexcal::diagnose::{Verdict, close};
+use flexcal::identify::{Options, identify};
 use flexcal::measurement::Split;
 use flexcal::problem::{Effect, EffectDeclaration};
-use flexcal::rig::Shape;
-use flexcal::study::{Options, identify};
+use flexcal::simulate::Shape;
 use rayon::prelude::*;
 
 use crate::bench::{NOISE, SMALL, lunar};

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::super::json::{Both, Summary, to_text};
 use super::super::{effect, findings};
-use crate::diagnosis::{Closure, Correction, Found, Interval, Step, Unexplained, Verdict};
+use crate::diagnose::{Closure, Correction, Found, Interval, Step, Unexplained, Verdict};
+use crate::identify::{Estimate, Identification};
 use crate::problem::Problem;
-use crate::study::{Estimate, Identification};
 
 #[derive(Debug, Serialize)]
 struct Document<'a> {

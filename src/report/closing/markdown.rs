@@ -5,7 +5,7 @@ use super::super::parameters::parameter_blocks;
 use super::super::quantity::number;
 use super::super::{findings, trace};
 use super::parts;
-use crate::diagnosis::{Closure, Step};
+use crate::diagnose::{Closure, Step};
 use crate::problem::Problem;
 
 /// Candidates that a report shows.

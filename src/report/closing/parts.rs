@@ -8,9 +8,9 @@ use super::super::errors::unpredicted;
 use super::super::findings;
 use super::super::quantity::number;
 use super::super::text::why_not_trusted;
-use crate::diagnosis::{Closure, Correction, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
+use crate::diagnose::{Closure, Correction, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
+use crate::identify::ErrorSummary;
 use crate::problem::{JointKind, Problem};
-use crate::study::ErrorSummary;
 
 /// Where all parameters of the final fit are.
 pub(super) const ALL: &str = "the estimate.json of `flexcal identify problem.closed.toml`";

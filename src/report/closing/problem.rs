@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
 use super::super::effect::{Values, p};
-use crate::diagnosis::{Closure, Found, Trace, WAVES};
-use crate::effect::{self, Argument};
+use crate::diagnose::{Closure, Found, Trace, WAVES};
+use crate::model::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text

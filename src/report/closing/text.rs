@@ -3,7 +3,7 @@
 use super::super::document::{Block, to_text};
 use super::super::findings;
 use super::parts;
-use crate::diagnosis::Closure;
+use crate::diagnose::Closure;
 use crate::problem::Problem;
 
 /// What the loop came to as text, ending in a line break.

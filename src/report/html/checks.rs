@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::diagnosis::{Check, Closure, Findings};
+use crate::diagnose::{Check, Closure, Findings};
 use crate::report::findings::another_size;
 
 /// Checks of both fits side by side.

@@ -3,11 +3,11 @@
 use maud::{Markup, html};
 
 use super::figures::{self, Figure, capital, power_of_ten};
-use crate::diagnosis::{Closure, Found, Trace, Unexplained};
-use crate::effect;
-use crate::picture::Picture;
+use crate::diagnose::{Closure, Found, Trace, Unexplained};
+use crate::model::effect;
 use crate::problem::Effect;
 use crate::report::effect::Values;
+use crate::report::plot_data::Picture;
 use crate::report::quantity::number;
 
 /// Alternatives that are named.

@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use crate::diagnosis::{Closure, Verdict};
+use crate::diagnose::{Closure, Verdict};
+use crate::identify::{Comparison, ErrorSummary, Errors, Identification, Noise};
 use crate::problem::Problem;
 use crate::report::errors::unpredicted;
 use crate::report::quantity::{decimals, number};
-use crate::study::{Comparison, ErrorSummary, Errors, Identification, Noise};
 
 /// A length [m] in mm with about three digits.
 fn mm(length: f64) -> String {

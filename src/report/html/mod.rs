@@ -13,10 +13,10 @@ mod style;
 
 use maud::{Markup, html};
 
-use crate::diagnosis::Closure;
-use crate::picture::Picture;
+use crate::diagnose::Closure;
+use crate::identify::{Comparison, Identification};
 use crate::problem::Problem;
-use crate::study::{Comparison, Identification};
+use crate::report::plot_data::Picture;
 use figures::Figure;
 pub use figures::is_figure;
 use page::{grid, section};

@@ -2,12 +2,12 @@
 
 use maud::{Markup, html};
 
-use crate::fit::BlindCombination;
+use crate::identify::{Comparison, ErrorSummary, Estimate, Identification};
+use crate::least_squares::BlindCombination;
+use crate::least_squares::solver::AtBound;
 use crate::report::parameters::{blind_words, verdict};
 use crate::report::quantity::{Display, decimals, number};
 use crate::report::waves::{Line, Shown, shown};
-use crate::solver::AtBound;
-use crate::study::{Comparison, ErrorSummary, Estimate, Identification};
 
 /// Half the width of a bar in standard errors: wider changes run off it.
 const REACH: f64 = 10.0;

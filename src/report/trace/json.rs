@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::json::{Both, to_text};
 use super::super::{effect, findings};
-use crate::diagnosis::{Ranked, Trace};
+use crate::diagnose::{Ranked, Trace};
 use crate::problem::{Effect, Problem};
 
 #[derive(Debug, Serialize)]

@@ -6,9 +6,9 @@ use super::super::document::{Block, Point, to_text};
 use super::super::errors::counted;
 use super::super::quantity::number;
 use super::super::{effect, findings};
-use crate::diagnosis::{Apart, Ranked, Trace};
+use crate::diagnose::{Apart, Ranked, Trace};
+use crate::identify::Identification;
 use crate::problem::{JointKind, Problem};
-use crate::study::Identification;
 
 /// Candidates that fit on a screen.
 const SHOWN: usize = 6;

@@ -6,8 +6,8 @@ use super::frame::{
     ACCENT, Axis, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
 };
 use super::{Figure, thinned};
-use crate::parameter::Unit;
-use crate::picture::{Abscissa, Cause, Ordinate, Point};
+use crate::model::parameter::Unit;
+use crate::report::plot_data::{Abscissa, Cause, Ordinate, Point};
 
 /// Poses that are drawn at most.
 const MOST: usize = 500;

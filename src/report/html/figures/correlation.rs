@@ -5,7 +5,7 @@ use plotters::style::text_anchor::HPos;
 
 use super::Figure;
 use super::frame::{ACCENT, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
-use crate::picture::Correlations;
+use crate::report::plot_data::Correlations;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 20;

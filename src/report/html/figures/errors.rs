@@ -7,7 +7,7 @@ use super::frame::{
     ACCENT, Area, Axis, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, legend, line, px, radius, range,
 };
 use super::{Figure, left_out, thinned};
-use crate::picture::{Picture, Stand, State};
+use crate::report::plot_data::{Picture, Stand, State};
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.

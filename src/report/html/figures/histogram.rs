@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 use super::Figure;
 use super::frame::{ACCENT, Axis, FAINT, WIDTH, chart, figure, legend, line, px};
-use crate::picture::Picture;
+use crate::report::plot_data::Picture;
 
 const HEIGHT: i32 = 280;
 /// Least that the axis reaches [σ]; else four times what the residuals scatter. What lies beyond is counted into the last bar.

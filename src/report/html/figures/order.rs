@@ -6,7 +6,7 @@ use super::frame::{
     ACCENT, Axis, FAINT, GRID, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
 };
 use super::{Figure, left_out, thinned};
-use crate::picture::{Picture, Residual};
+use crate::report::plot_data::{Picture, Residual};
 
 /// Poses that are drawn at most.
 const MOST: usize = 300;

@@ -5,8 +5,8 @@ use plotters::style::text_anchor::HPos;
 
 use super::Figure;
 use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
-use crate::diagnosis::{Ranked, Trace};
-use crate::effect;
+use crate::diagnose::{Ranked, Trace};
+use crate::model::effect;
 use crate::problem::Effect;
 use crate::report::quantity::number;
 

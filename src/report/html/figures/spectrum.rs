@@ -4,7 +4,7 @@ use plotters::prelude::*;
 
 use super::Figure;
 use super::frame::{ACCENT, Axis, FAINT, WARM, WIDTH, chart, figure, legend, line, px, radius};
-use crate::fit::Identifiability;
+use crate::least_squares::Identifiability;
 
 const HEIGHT: i32 = 280;
 /// Singular values below this part of the largest are drawn there.

@@ -5,8 +5,8 @@ use plotters::style::text_anchor::HPos;
 
 use super::Figure;
 use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, legend, line, px, radius, write};
+use crate::identify::{Comparison, Errors};
 use crate::report::quantity::{decimals, number};
-use crate::study::{Comparison, Errors};
 
 const ROW: i32 = 22;
 /// Room for names.
@@ -58,7 +58,7 @@ fn solvers(name: &str) -> usize {
 
 /// The same for every part of the elasticity that is kept; nothing for an arm without any.
 pub fn ablations(comparison: &Comparison) -> Option<Figure> {
-    let entry = |(part, found): &(crate::model::Ablation, crate::study::Identification)| Entry {
+    let entry = |(part, found): &(crate::model::Ablation, crate::identify::Identification)| Entry {
         name: part.as_str().to_owned(),
         errors: found.fitted,
     };

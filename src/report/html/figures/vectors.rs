@@ -8,7 +8,7 @@ use super::frame::{
     with_margin, write,
 };
 use super::{Figure, left_out, thinned};
-use crate::picture::{Picture, Residual};
+use crate::report::plot_data::{Picture, Residual};
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.

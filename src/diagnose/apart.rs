@@ -1,0 +1,106 @@
+//! Which pose would tell two effects apart that the measured poses hardly tell.
+
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::data::{Data, SEED};
+use super::fitted::{Fitted, Normal};
+use super::neighbourhood::Library;
+use crate::measurement::Measurements;
+use crate::problem::Effect;
+
+/// Poses that are looked at.
+const POSES: usize = 400;
+
+/// A pose that tells two effects apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Apart {
+    /// The other effect.
+    pub other: Effect,
+    /// Configuration within the measured ranges, shape = (joints) [rad] or [m].
+    pub configuration: Vec<f64>,
+    /// Payload [kg], hoist force [N] and temperature [°C] there, where the data have such a column.
+    pub payload: Option<f64>,
+    /// Hoist force [N].
+    pub hoist: Option<f64>,
+    /// Temperature [°C].
+    pub temperature: Option<f64>,
+    /// Distance between what the arm does with the one effect and with the other, each fitted to the measured poses [m].
+    pub difference: f64,
+}
+
+/// Poses within the measured ranges: every quantity of a pose from some identification row, each from another.
+pub(super) fn shuffled(data: &Data) -> Measurements {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let rows = data.rows();
+    let drawn: Vec<usize> = (0..POSES).map(|_| rows[rng.random_range(0..rows.len())]).collect();
+    let mut poses = data.measurements.select(&drawn);
+    let mut from = || rows[rng.random_range(0..rows.len())];
+    let (measured, n) = (data.measurements, poses.joints);
+    for pose in 0..POSES {
+        for joint in 0..n {
+            poses.configurations[pose * n + joint] = measured.configurations[from() * n + joint];
+        }
+        let columns = [
+            (&mut poses.payload, &measured.payload),
+            (&mut poses.hoist, &measured.hoist),
+            (&mut poses.temperature, &measured.temperature),
+        ];
+        for (column, known) in columns {
+            if let (Some(column), Some(known)) = (column, known) {
+                column[pose] = known[from()];
+            }
+        }
+    }
+    poses
+}
+
+/// The pose of `poses`, which `there` describes, where the fits with the one effect and with the other differ most.
+pub(super) fn apart(
+    fitted: &Fitted,
+    here: &Library,
+    there: &Library,
+    poses: &Measurements,
+    (one, other): (&Effect, &Effect),
+) -> Option<Apart> {
+    let moved = |effect: &Effect| {
+        let columns = beside(here.fitted(), &here.columns(effect));
+        let step = fitted.step(here, &columns);
+        beside(there.fitted(), &there.columns(effect)) * step
+    };
+    let difference: DVector<f64> = moved(one) - moved(other);
+    let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
+    let best = (0..poses.len()).max_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
+    let at = |column: &Option<Vec<f64>>| column.as_ref().map(|column| column[best]);
+    Some(Apart {
+        other: other.clone(),
+        configuration: poses.configuration(best).to_vec(),
+        payload: at(&poses.payload),
+        hoist: at(&poses.hoist),
+        temperature: at(&poses.temperature),
+        difference: distance(best),
+    })
+}
+
+impl Fitted {
+    /// Step of all fitted parameters and those of `columns` behind them to their common optimum.
+    fn step(&self, library: &Library, columns: &DMatrix<f64>) -> DVector<f64> {
+        let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
+        let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
+        let mut gradient = columns.tr_mul(library.residual());
+        for (j, &k) in self.unknowns.iter().enumerate() {
+            if let Some(sigma) = self.model.parameters[k].sigma {
+                gradient[j] += self.found.x[k] / (sigma * sigma);
+            }
+        }
+        Normal::new(columns, priors, &gradient, &self.closed_among(columns.ncols())).step
+    }
+}
+
+fn beside(left: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let first = left.ncols();
+    let mut both = left.resize_horizontally(first + right.ncols(), 0.0);
+    both.columns_mut(first, right.ncols()).copy_from(right);
+    both
+}

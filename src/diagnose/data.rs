@@ -1,0 +1,202 @@
+//! The identification poses as a diagnosis sees them.
+
+use std::collections::BTreeMap;
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::residual_tests::Driver;
+use crate::measurement::{Measurements, Split};
+use crate::model::effect::Conditions;
+use crate::model::parameter::Quantity;
+use crate::problem::{JointKind, Problem};
+
+/// Blocks of a cross-validation.
+const BLOCKS: usize = 10;
+/// Seed of what is random in a diagnosis: blocks, permutations, bootstrap.
+pub(super) const SEED: u64 = 20_211_206;
+/// Poses that a station shift must leave on either side.
+const LEAST_SIDE: usize = 3;
+/// Times of a station shift that are tried at most.
+const MOST_TIMES: usize = 200;
+
+/// Measurements and which of their rows take part.
+#[derive(Debug, Clone)]
+pub(super) struct Data<'a> {
+    pub measurements: &'a Measurements,
+    pub split: &'a Split,
+    /// Number of the conditions of each identification row; rows with the same are repeats.
+    pub setup: Vec<usize>,
+    /// Block of each identification row; repeats share one.
+    pub block: Vec<usize>,
+}
+
+impl<'a> Data<'a> {
+    pub fn new(measurements: &'a Measurements, split: &'a Split) -> Self {
+        let rows = &split.identification;
+        let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
+        let configurations = number(rows.iter().map(|&row| bits(measurements.configuration(row))));
+        let count = configurations.iter().max().map_or(0, |last| last + 1);
+        let mut order: Vec<usize> = (0..count).collect();
+        order.shuffle(&mut ChaCha8Rng::seed_from_u64(SEED));
+        let mut block_of = vec![0; count];
+        for (place, configuration) in order.into_iter().enumerate() {
+            block_of[configuration] = place % BLOCKS.min(count.max(1));
+        }
+        let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
+        Self { measurements, split, setup, block }
+    }
+
+    /// The identification rows.
+    pub fn rows(&self) -> &'a [usize] {
+        &self.split.identification
+    }
+
+    /// A column at the identification rows.
+    fn pick(&self, column: &[f64]) -> Vec<f64> {
+        self.rows().iter().map(|&row| column[row]).collect()
+    }
+
+    /// The same with no more than `most` identification rows, taken evenly.
+    pub fn thinned(&self, most: usize) -> Vec<usize> {
+        let rows = self.rows();
+        rows.iter().copied().step_by(rows.len().div_ceil(most).max(1)).collect()
+    }
+
+    /// Values of a quantity at the identification rows.
+    fn values(&self, of: Quantity) -> Vec<f64> {
+        let measurements = self.measurements;
+        let column = |column: &Option<Vec<f64>>| column.as_deref().map_or_else(Vec::new, |all| self.pick(all));
+        match of {
+            Quantity::Command(joint) => self.rows().iter().map(|&row| measurements.configuration(row)[joint]).collect(),
+            Quantity::Temperature => column(&measurements.temperature),
+            Quantity::Payload => column(&measurements.payload),
+            Quantity::Hoist => column(&measurements.hoist),
+            Quantity::Elapsed => {
+                let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+                self.time().into_iter().map(|time| time - first).collect()
+            }
+        }
+    }
+
+    /// Range of a quantity at the identification rows.
+    pub fn range(&self, of: Quantity) -> (f64, f64) {
+        let widest = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+        self.values(of).into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), widest)
+    }
+
+    /// Number of distinct values of a quantity at the identification rows.
+    pub fn distinct(&self, of: Quantity) -> usize {
+        let mut values = self.values(of);
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values.len()
+    }
+
+    /// Time of each identification row [s].
+    pub fn time(&self) -> Vec<f64> {
+        self.pick(&self.measurements.time)
+    }
+
+    /// Session of each identification row.
+    pub fn session(&self) -> Vec<usize> {
+        self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
+    }
+
+    /// What the identification poses have and vary.
+    pub fn conditions(&self, problem: &Problem) -> Conditions {
+        let measurements = self.measurements;
+        let column = |joint: usize| {
+            let values = self.rows().iter().map(move |&row| measurements.configuration(row)[joint]);
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
+        };
+        let varies = |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
+        let payload = measurements.payload.as_deref().map(|all| self.pick(all));
+        let temperature = measurements.temperature.as_deref().map(|all| self.pick(all));
+        let n = measurements.joints;
+        let from = |joint: usize, side: f64| {
+            let came = |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] * side > 0.0);
+            measurements.approach.as_ref().is_some_and(came)
+        };
+        Conditions {
+            temperature: problem.data.reference_temperature.is_some() && temperature.is_some_and(varies),
+            approach: measurements.approach.is_some(),
+            both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
+            payload: payload.map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
+            ranges: (0..n).map(column).collect(),
+            times: shift_times(self.time()),
+            gravity: problem.gravity,
+        }
+    }
+
+    /// Everything that the residual may depend on, one value per identification row.
+    pub fn drivers(&self, problem: &Problem) -> Vec<Driver> {
+        let measurements = self.measurements;
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        let joint = |(index, _): (usize, _)| Driver {
+            name: format!("q{}", index + 1),
+            values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),
+        };
+        let mut drivers: Vec<Driver> = moving.map(joint).collect();
+        let columns = [
+            ("temperature", &measurements.temperature),
+            ("payload", &measurements.payload),
+            ("hoist", &measurements.hoist),
+        ];
+        for (name, column) in columns {
+            if let Some(column) = column {
+                drivers.push(Driver { name: name.to_owned(), values: self.pick(column) });
+            }
+        }
+        drivers.push(Driver { name: "time".to_owned(), values: self.time() });
+        if let Some(approach) = &measurements.approach {
+            let n = measurements.joints;
+            drivers.extend((0..n).map(|joint| Driver {
+                name: format!("approach{}", joint + 1),
+                values: self.rows().iter().map(|&row| approach[row * n + joint]).collect(),
+            }));
+        }
+        drivers
+    }
+}
+
+/// Times half way between poses that leave enough of them on either side, thinned evenly.
+fn shift_times(mut times: Vec<f64>) -> Vec<f64> {
+    times.sort_by(f64::total_cmp);
+    let count = times.len();
+    let inner = LEAST_SIDE..count.saturating_sub(LEAST_SIDE) + 1;
+    let between = |k: usize| (times[k] > times[k - 1]).then(|| 0.5 * (times[k - 1] + times[k]));
+    let all: Vec<f64> = inner.filter(|&k| k < count).filter_map(between).collect();
+    let every = all.len().div_ceil(MOST_TIMES).max(1);
+    all.into_iter().step_by(every).collect()
+}
+
+/// What one row was measured under, to the bit.
+fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
+    let mut key = bits(measurements.configuration(row));
+    let n = measurements.joints;
+    for column in [&measurements.payload, &measurements.hoist, &measurements.temperature].into_iter().flatten() {
+        key.push(column[row].to_bits());
+    }
+    if let Some(approach) = &measurements.approach {
+        key.extend(bits(&approach[row * n..(row + 1) * n]));
+    }
+    key.push(measurements.session.of_row[row] as u64);
+    key.extend(measurements.target.as_ref().map(|target| target.of_row[row] as u64));
+    key
+}
+
+pub(super) fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Numbers keys in order of appearance.
+fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
+    let mut known = BTreeMap::new();
+    keys.map(|key| {
+        let next = known.len();
+        *known.entry(key).or_insert(next)
+    })
+    .collect()
+}

@@ -1,0 +1,160 @@
+//! Which effects measurements in given poses would show, and from what size on.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::candidates::Candidates;
+use super::data::Data;
+use super::neighbourhood::{Library, Linear, tries};
+use super::power::ScanTest;
+use super::selection::LEVEL;
+use crate::error::InputError;
+use crate::identify::Placement;
+use crate::measurement::{Measurements, Split};
+use crate::model::Model;
+use crate::model::effect;
+use crate::model::parameter::{Unit, unit};
+use crate::problem::{Effect, Problem};
+
+/// Probability with which an effect of the stated size is found.
+pub(super) const POWER: f64 = 0.8;
+/// Seconds between poses whose times nobody knows.
+const TIME_STEP: f64 = 60.0;
+/// A direction of which less than this part of the length² is new is absorbed by the fit.
+const ABSORBED: f64 = 1e-8;
+
+/// What measurements in some poses would show of the effects of the catalogue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Probability with which an effect of the stated size is found.
+    pub power: f64,
+    /// Probability that chance points to any effect.
+    pub level: f64,
+    /// Every candidate that these poses can test, in the order of the catalogue.
+    pub effects: Vec<Detectable>,
+    /// The others, and why they cannot.
+    pub untestable: Vec<(Effect, &'static str)>,
+}
+
+/// From what size on an effect is found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detectable {
+    /// Which.
+    pub effect: Effect,
+    /// Of its parameters, those of one unit together.
+    pub sizes: Vec<Size>,
+}
+
+/// From what size on some parameters of an effect, all others at zero, make it known.
+///
+/// The size of one parameter is its absolute value, that of several their length √(Σ p²): for a harmonic its amplitude.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    /// Names: `joint-harmonic[3].sin1`, `joint-harmonic[3].cos1`.
+    pub parameters: Vec<String>,
+    /// Their unit.
+    pub unit: Unit,
+    /// 1 σ of the catalogue's prior, SI: no realistic effect is larger by much.
+    pub prior: f64,
+    /// In the direction (phase, axis) that is hardest to see, SI; `None` where the fitted parameters take it up wholly,
+    /// or leave hardly any degree of freedom to judge it by.
+    pub worst: Option<f64>,
+    /// In the direction that is easiest to see, SI.
+    pub best: Option<f64>,
+}
+
+impl Size {
+    /// Whether effects as large as the prior are found in some direction at least.
+    pub fn is_within_prior(&self) -> bool {
+        self.best.is_some_and(|best| best <= self.prior)
+    }
+}
+
+/// From what size on each effect of the catalogue would be found by the first round of the loop, were `poses` measured.
+///
+/// Linear about the nominal arm. With the columns C of an effect's parameters p, everything free projected out as a fit with
+/// priors does, an effect of size p has the noncentrality λ = pᵀ CᵀC p; it is found if F on k and ν − k degrees of freedom is
+/// beyond LEVEL / tries. Poses without a time are taken to be a minute apart.
+///
+/// # Errors
+/// Rules of `[parameters]` do not fit the arm.
+pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
+    let poses = timed(poses);
+    let Candidates { testable, untestable } = candidates(problem, &poses);
+    let (tries, families) = tries(&testable);
+    let effects = with_linear(problem, &poses, &testable, |library, linear| {
+        let sizes = |(effect, tries): (&Effect, f64)| Detectable {
+            sizes: sizes(problem, library, linear, effect, tries * families as f64),
+            effect: effect.clone(),
+        };
+        testable.par_iter().zip(tries).map(sizes).collect()
+    })?;
+    Ok(Detection { power: POWER, level: LEVEL, effects, untestable })
+}
+
+/// The poses with times.
+pub(super) fn timed(poses: &Measurements) -> Measurements {
+    let mut poses = poses.clone();
+    if !poses.time_measured {
+        poses.time = (0_u32..).take(poses.len()).map(|row| f64::from(row) * TIME_STEP).collect();
+    }
+    poses
+}
+
+/// What of the catalogue all these poses could show.
+pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
+    let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
+    Candidates::of(problem, &Data::new(poses, &split))
+}
+
+/// What `with` makes of the nominal arm in these poses, and of a fit of everything free before anything was measured there:
+/// priors hold, the residual says nothing.
+pub(super) fn with_linear<T>(
+    problem: &Problem,
+    poses: &Measurements,
+    effects: &[Effect],
+    with: impl FnOnce(&Library, &Linear) -> T,
+) -> Result<T, InputError> {
+    let placement = Placement::of(poses);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let n = model.parameters.len();
+    let (rows, unknowns): (Vec<usize>, Vec<usize>) = ((0..poses.len()).collect(), (0..n).collect());
+    let measured = placement.poses(poses, &rows, problem.data.position_sigma.unwrap_or(1.0));
+    let library = Library::new(problem, &model, measured, &unknowns, &DVector::zeros(n), (effects, &[]));
+    let columns = library.fitted();
+    let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
+    priors.extend(library.let_go());
+    let (residual, x) = (DVector::zeros(columns.nrows()), vec![0.0; priors.len()]);
+    let linear = Linear::new(&columns, &residual, &x, &priors, &DMatrix::zeros(0, priors.len()));
+    Ok(with(&library, &linear))
+}
+
+/// Sizes of an effect, by the units of its parameters; those whose zero means nothing, as the place of a mass, are left out.
+pub(super) fn sizes(problem: &Problem, library: &Library, linear: &Linear, effect: &Effect, tries: f64) -> Vec<Size> {
+    let score = linear.score(&library.columns(effect));
+    let test = ScanTest::new(score.rank(), linear.expected_freedom(), tries);
+    let needed = test.and_then(|test| test.noncentrality(POWER));
+    let parameters = effect::parameters_of(effect, problem);
+    let mut groups: Vec<(Unit, Vec<usize>)> = Vec::new();
+    for (k, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0) {
+        let own = unit(parameter.slot, parameter.driver);
+        match groups.iter_mut().find(|(unit, _)| *unit == own) {
+            Some((_, members)) => members.push(k),
+            None => groups.push((own, vec![k])),
+        }
+    }
+    let size = |(unit, members): (Unit, Vec<usize>)| {
+        let gram = score.gram.select_rows(&members).select_columns(&members);
+        let longest = members.iter().map(|&k| score.lengths[k]).fold(0.0, f64::max);
+        let seen = gram.symmetric_eigenvalues();
+        let from = |value: f64| (value > ABSORBED * longest).then(|| Some((needed? / value).sqrt())).flatten();
+        Size {
+            parameters: members.iter().map(|&k| parameters[k].name.clone()).collect(),
+            unit,
+            prior: members.iter().map(|&k| parameters[k].sigma).fold(0.0, f64::max),
+            worst: from(seen.min()),
+            best: from(seen.max()),
+        }
+    };
+    groups.into_iter().map(size).collect()
+}

@@ -1,0 +1,148 @@
+//! Columns of every effect that may be at work, without a fit: derivatives at the places, times drivers.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::least_squares::{Block, LeastSquares};
+use crate::model::effect::{self, Term};
+use crate::model::parameter::{BeamField, Slot};
+use crate::model::{Model, Pose, PoseResiduals};
+use crate::problem::{Effect, Problem};
+
+/// Poses linearised together.
+const CHUNK: usize = 256;
+/// Mass at which the place of an added mass is differentiated: without any, the place does not matter [kg].
+const PROBE_MASS: f64 = 1e-4;
+
+/// A model linearised with every place where effects may enter.
+pub(crate) struct Library<'a> {
+    problem: &'a Problem,
+    poses: Vec<Pose<'a>>,
+    places: Vec<(Slot, usize)>,
+    /// ∂r/∂(parameters, then places), shape = (3 N, …).
+    jacobian: DMatrix<f64>,
+    residual: DVector<f64>,
+    fitted: usize,
+    /// σ of the priors of what is let go: the columns behind those of the fitted parameters.
+    let_go: Vec<Option<f64>>,
+}
+
+impl<'a> Library<'a> {
+    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects and other places
+    /// given.
+    pub fn new(
+        problem: &'a Problem,
+        model: &Model,
+        poses: Vec<Pose<'a>>,
+        unknowns: &[usize],
+        x: &DVector<f64>,
+        (effects, places): (&[Effect], &[Slot]),
+    ) -> Self {
+        let mut slots: Vec<(Slot, f64)> = places.iter().map(|&slot| (slot, 0.0)).collect();
+        for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect::terms(effect, problem)) {
+            if !slots.iter().any(|(known, _)| *known == slot) {
+                slots.push((slot, nominal));
+            }
+        }
+        // Stiffnesses that the problem holds equal are let go: that they differ is no effect of any other kind.
+        let shared = |&k: &usize| match model.parameters[k].slot {
+            Slot::Beam { joint, field: BeamField::Bending } => {
+                let slot = Slot::Beam { joint, field: BeamField::Anisotropy };
+                Some((slot, model.parameters[k].sigma))
+            }
+            _ => None,
+        };
+        let shared: Vec<(Slot, Option<f64>)> = unknowns.iter().filter_map(shared).collect();
+        let let_go: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
+        slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
+        let first = model.parameters.len();
+        let probing = model.probing(&slots);
+        let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
+        for (index, (slot, _)) in slots.iter().enumerate() {
+            if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {
+                at[first + index] = PROBE_MASS;
+            }
+        }
+        let all: Vec<usize> = unknowns.iter().copied().chain(first..first + slots.len()).collect();
+        let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
+        let (jacobian, _) = linearise(&residuals, &residuals.reduced(&at));
+        let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
+        let (_, residual) = linearise(&plain, &DVector::zeros(0));
+        let fitted = unknowns.len();
+        let places = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index)).collect();
+        Self { problem, poses, places, jacobian, residual, fitted, let_go }
+    }
+
+    /// Columns of the fitted parameters and of what is let go beside them, shape = (3 N, n).
+    pub fn fitted(&self) -> DMatrix<f64> {
+        self.jacobian.columns(0, self.fitted + self.let_go.len()).into_owned()
+    }
+
+    /// σ of the priors of what is let go, in the order of its columns.
+    pub fn let_go(&self) -> &[Option<f64>] {
+        &self.let_go
+    }
+
+    /// Whitened residual, 3 N.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.residual
+    }
+
+    /// The poses.
+    pub fn poses(&self) -> &[Pose<'a>] {
+        &self.poses
+    }
+
+    /// Columns of an effect's parameters, shape = (3 N, k).
+    pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
+        let terms = effect::terms(effect, self.problem);
+        let mut columns = DMatrix::zeros(self.jacobian.nrows(), terms.len());
+        for (term, mut out) in terms.iter().zip(columns.column_iter_mut()) {
+            let Some(&(_, place)) = self.places.iter().find(|(slot, _)| *slot == term.slot) else { continue };
+            let at_place = self.jacobian.column(place);
+            for (k, pose) in self.poses.iter().enumerate() {
+                let driver = term.driver.value(&pose.setup);
+                for row in 3 * k..3 * k + 3 {
+                    out[row] = at_place[row] * driver;
+                }
+            }
+        }
+        columns
+    }
+
+    /// For each of an effect's parameters, whether it is never negative.
+    pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
+        effect::terms(effect, self.problem).iter().map(|term| term.never_negative).collect()
+    }
+
+    /// Column of a place, 3 N; `None` where no effect enters there.
+    pub fn place(&self, slot: Slot) -> Option<DVector<f64>> {
+        let &(_, place) = self.places.iter().find(|(known, _)| *known == slot)?;
+        Some(self.jacobian.column(place).into_owned())
+    }
+}
+
+/// Jacobian and residual of all items, in parallel, the same for any number of threads.
+fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (poses, n) = (residuals.items(), residuals.parameters());
+    let mut jacobian = DMatrix::zeros(3 * poses, n);
+    let mut residual = DVector::zeros(3 * poses);
+    let blocks: Vec<Block> = (0..poses.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let items = chunk * CHUNK..((chunk + 1) * CHUNK).min(poses);
+            let mut block = Block::zeros(3 * items.len(), n);
+            residuals.linearise(x, items, &mut block);
+            block
+        })
+        .collect();
+    let mut row = 0;
+    for block in blocks {
+        for j in 0..n {
+            jacobian.view_mut((row, j), (block.rows(), 1)).copy_from_slice(block.column(j));
+        }
+        residual.rows_mut(row, block.rows()).copy_from_slice(block.column(n));
+        row += block.rows();
+    }
+    (jacobian, residual)
+}

@@ -1,0 +1,136 @@
+//! What a residual says about columns that were not fitted, and what that means.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+/// A candidate is absorbed by the fit when less than this part of a column's length is new.
+const ABSORBED: f64 = 1e-4;
+/// Scatter, in units of σ, below which the residual is rounding and nothing is sought in it.
+pub(in crate::diagnose) const LEAST_SCATTER: f64 = 1e-3;
+
+/// What the residual says about columns that were not fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Score {
+    /// C̃ᵀC̃ of the columns with everything fitted projected out.
+    pub gram: DMatrix<f64>,
+    /// C̃ᵀr.
+    pub product: DVector<f64>,
+    /// ‖C‖² of each column before the projection.
+    pub lengths: Vec<f64>,
+}
+
+/// What is left of a fit in numbers: all that judging a candidate needs.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sums {
+    /// With priors.
+    pub squares: f64,
+    /// Of the data alone.
+    data_squares: f64,
+    /// Degrees of freedom of the data.
+    pub data_freedom: f64,
+}
+
+/// What a fit would gain by a candidate, and how probable that gain is by chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gain {
+    /// Reduction of the sum of squares.
+    pub squares: f64,
+    /// New directions.
+    pub freedom: usize,
+    /// F statistic.
+    pub f: f64,
+    /// Probability of as large an F by chance, for one candidate alone.
+    pub p: f64,
+    /// Change of ν ln(squares) + k ln ν: an information criterion without regard to how many candidates there are.
+    pub criterion: f64,
+}
+
+impl Sums {
+    /// Of a residual, priors below its first `rows`, that has `data_freedom` degrees of freedom in the data.
+    pub fn of(residual: &DVector<f64>, rows: usize, data_freedom: f64) -> Self {
+        let data_squares = residual.rows(0, rows).norm_squared();
+        Self { squares: residual.norm_squared(), data_squares, data_freedom }
+    }
+
+    /// Degrees of freedom of the whole sum of squares at the scatter of the data.
+    ///
+    /// With true priors it has 3 N, with priors far wider than the deviations 3 N − tr H: the data's scatter decides.
+    pub fn freedom(&self) -> f64 {
+        self.data_freedom * self.squares / self.data_squares.max(f64::MIN_POSITIVE)
+    }
+
+    /// What the fit gains by columns with this score.
+    pub fn gain(&self, score: &Score) -> Option<Gain> {
+        let (squares, freedom) = score.reduction()?;
+        self.gain_of(squares, freedom)
+    }
+
+    /// What a reduction of the sum of squares by so many new directions means.
+    pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
+        let degrees = self.freedom();
+        let total = self.squares.max(LEAST_SCATTER.powi(2) * degrees);
+        let left = degrees - freedom as f64;
+        if left < 1.0 || freedom == 0 {
+            return None;
+        }
+        let part = (squares / total).clamp(0.0, 1.0 - 1e-15);
+        let f = part / (1.0 - part) * left / freedom as f64;
+        let p = FisherSnedecor::new(freedom as f64, left).map_or(1.0, |chance| chance.sf(f)).max(f64::MIN_POSITIVE);
+        let criterion = degrees * (-part).ln_1p() + freedom as f64 * degrees.ln();
+        Some(Gain { squares, freedom, f, p, criterion })
+    }
+}
+
+impl Score {
+    /// What the fit would make of the columns' parameters, −G⁺b, each with its standard error for residuals of unit scatter.
+    pub fn estimates(&self) -> Vec<(f64, f64)> {
+        let k = self.lengths.len();
+        let scale: Vec<f64> = self.lengths.iter().map(|l| if *l > 0.0 { l.sqrt() } else { 1.0 }).collect();
+        let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
+        let inverted = eigen.eigenvalues.map(|value| if value > ABSORBED * ABSORBED { value.recip() } else { 0.0 });
+        let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
+        let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
+        let estimate = &inverse * product;
+        (0..k).map(|i| (-estimate[i] / scale[i], inverse[(i, i)].max(0.0).sqrt() / scale[i])).collect()
+    }
+
+    /// How many new directions the columns have.
+    pub fn rank(&self) -> usize {
+        self.reduction().map_or(0, |(_, rank)| rank)
+    }
+
+    /// bᵀ G⁺ b and the rank of G, scaled columns; `None` where nothing new is left of them.
+    fn reduction(&self) -> Option<(f64, usize)> {
+        let scale = DVector::from_iterator(self.lengths.len(), self.lengths.iter().map(|length| length.sqrt()));
+        let kept: Vec<usize> = (0..scale.len()).filter(|&j| scale[j] > 0.0).collect();
+        if kept.is_empty() {
+            return None;
+        }
+        let gram = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+            self.gram[(kept[i], kept[j])] / (scale[kept[i]] * scale[kept[j]])
+        });
+        let product = DVector::from_fn(kept.len(), |i, _| self.product[kept[i]] / scale[kept[i]]);
+        let eigen = gram.symmetric_eigen();
+        let mut sum = 0.0;
+        let mut rank = 0;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > ABSORBED * ABSORBED {
+                sum += vector.dot(&product).powi(2) / value;
+                rank += 1;
+            }
+        }
+        (rank > 0).then_some((sum, rank))
+    }
+
+    /// Takes off directions that have been fitted since: `along` = Cᵀq, `given` = qᵀr before they were fitted.
+    pub fn take_off(&mut self, along: &DMatrix<f64>, given: &DVector<f64>) {
+        self.gram -= along * along.transpose();
+        self.product -= along * given;
+    }
+
+    /// The reverse: the score without directions that were fitted.
+    pub fn give_back(&self, along: &DMatrix<f64>, given: &DVector<f64>) -> Self {
+        let (gram, product) = (&self.gram + along * along.transpose(), &self.product + along * given);
+        Self { gram, product, lengths: self.lengths.clone() }
+    }
+}

@@ -1,0 +1,213 @@
+//! The whole story: before, what was found, after, what remains.
+
+use super::super::candidates::{Candidates, covers};
+use super::super::data::Data;
+use super::super::fitted::Fitted;
+use super::super::residual_tests::Findings;
+use super::super::tracing::{Trace, check_fit, trace_fit};
+use super::super::unexplained::{self, Unexplained};
+use super::alternatives::Replacements;
+use super::interval::{self, Interval};
+use super::pick::LEVEL;
+use super::rounds::Rounds;
+pub use super::rounds::Step;
+use super::waves;
+use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
+use crate::measurement::{Measurements, Split};
+use crate::problem::{Effect, Problem};
+
+/// Effects that are exchanged for better ones at most.
+const MOST_EXCHANGES: usize = 4;
+
+/// What the loop came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// No effect, no structure.
+    NothingFound,
+    /// Effects were found and what is left passes the checks.
+    Explained,
+    /// Structure is left.
+    Unexplained,
+}
+
+/// An effect that the loop added.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Which.
+    pub effect: Effect,
+    /// Probability that it is none, corrected for the candidates tried.
+    pub p_value: f64,
+    /// Its parameters.
+    pub estimates: Vec<Estimate>,
+    /// Candidates that these data cannot tell from it, best first.
+    pub alternatives: Vec<Effect>,
+    /// Error on held-out poses after the first round that had it in the model, and none of what was dropped later; at the
+    /// end, if there is no such round.
+    pub held_out_after: ErrorSummary,
+}
+
+/// The loop from the declared problem to one that leaves nothing to find.
+#[derive(Debug, Clone)]
+pub struct Closure {
+    /// What it came to.
+    pub verdict: Verdict,
+    /// The fit of the declared problem, its checks, and what its residual points to.
+    pub before: Trace,
+    /// The fit with every effect that was found.
+    pub after: Identification,
+    /// Checks of what it leaves.
+    pub findings: Findings,
+    /// The problem with what was found declared.
+    pub closed: Problem,
+    /// In the order in which they were found.
+    pub effects: Vec<Found>,
+    /// What each round came to.
+    pub steps: Vec<Step>,
+    /// 1 σ of the prior that the closed problem has for the waves of joints, where they are many [rad].
+    pub wave_sigma: Option<f64>,
+    /// Structure that no effect explains.
+    pub unexplained: Option<Unexplained>,
+    /// Mean reduction of the error on held-out poses [m].
+    pub gain: Interval,
+}
+
+impl Closure {
+    /// Error on held-out poses once an effect was in the model, where more was added after it.
+    pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
+        Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
+    }
+}
+
+/// Finds what `problem` lacks, from the identification rows alone; held-out rows only measure the outcome.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn close(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Closure, IdentifyError> {
+    let data = Data::new(measurements, split);
+    let first = Fitted::new(problem.clone(), &data, options)?;
+    let before = trace_fit(&first, &data);
+    let errors_before = first.errors(&data, &split.held_out);
+    let declared = first.effects();
+    let mut rounds =
+        Rounds { data: &data, options, declared, generics: Vec::new(), steps: Vec::new(), seen: Vec::new() };
+    let mut fitted = rounds.run(first)?;
+    for _ in 0..if rounds.has_many_poses() { 1 } else { MOST_EXCHANGES } {
+        let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
+        fitted = rounds.run(next)?;
+    }
+    let (fitted, unexplained) = with_generic(&mut rounds, fitted)?;
+    let (fitted, wave_sigma) = waves::filled(&rounds, fitted)?;
+    let findings = check_fit(&fitted, &data);
+    let unexplained = if rounds.has_many_poses() {
+        unexplained::localise(&fitted, &data, rounds.generics.first(), LEVEL)
+    } else {
+        unexplained
+    };
+    let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
+    let effects = found(&rounds, &fitted, (findings.is_structured(), wave_sigma.is_some()));
+    let verdict = match (&unexplained, effects.is_empty()) {
+        (Some(_), _) => Verdict::Unexplained,
+        (None, true) => Verdict::NothingFound,
+        (None, false) => Verdict::Explained,
+    };
+    let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &split.held_out));
+    let steps = rounds.steps;
+    Ok(Closure {
+        verdict,
+        before,
+        after: fitted.found,
+        findings,
+        closed: fitted.problem,
+        effects,
+        steps,
+        wave_sigma,
+        unexplained,
+        gain,
+    })
+}
+
+/// The fit without effects that only stood in for smooth structure of another kind, and that structure; the fit as it was
+/// where in the end there is none.
+fn with_generic(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<Unexplained>), IdentifyError> {
+    let data = rounds.data;
+    let candidates = Candidates::of(&fitted.problem, data).testable;
+    let without =
+        if let Some((generic, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates) {
+            rounds.generics.push(generic);
+            let without = rounds.fit(&fitted, &rest)?;
+            let without = rounds.without_insignificant(without)?;
+            rounds.seen.clear();
+            rounds.note(&without);
+            rounds.run(without)?
+        } else if let Some(generic) = unexplained::strongest(&fitted, data, LEVEL) {
+            rounds.generics.push(generic);
+            let without = rounds.without_insignificant(fitted.clone())?;
+            if rounds.is_new(&without) {
+                rounds.note(&without);
+            }
+            without
+        } else {
+            return Ok((fitted, None));
+        };
+    let left = unexplained::localise(&without, data, rounds.generics.first(), LEVEL);
+    if left.is_some() {
+        return Ok((without, left));
+    }
+    rounds.generics.clear();
+    rounds.note(&fitted);
+    Ok((fitted, None))
+}
+
+/// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
+fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
+    let added = rounds.added(fitted);
+    if added.len() < 2 {
+        return Ok(None);
+    }
+    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let generics = rounds.generics.clone();
+    let library = fitted.library(rounds.data, &candidates, &generics);
+    let replacements = Replacements::new(fitted, &library, &candidates, &generics);
+    for effect in &added {
+        let other = replacements.of(effect, false);
+        if let Some(better) = &other.better {
+            let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
+            let next = rounds.fit(fitted, &kept)?;
+            let next = rounds.without_insignificant(next)?;
+            if rounds.is_new(&next) {
+                rounds.note(&next);
+                return Ok(Some(next));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Every added effect with what is known of it, where structure is left, and where waves share a prior.
+fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bool)) -> Vec<Found> {
+    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let library = fitted.library(rounds.data, &candidates, &rounds.generics);
+    let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
+    let added = rounds.added(fitted);
+    // Of many orders under one prior none may stand out by itself.
+    let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
+    let first_with = |effect: &Effect| {
+        let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
+        let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known));
+        let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
+        step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
+    };
+    let one = |effect: Effect| Found {
+        p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
+        estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
+        alternatives: replacements.of(&effect, structured).effects,
+        held_out_after: first_with(&effect),
+        effect,
+    };
+    added.iter().cloned().map(one).collect()
+}

@@ -1,0 +1,182 @@
+//! What the residual of one fit points to.
+
+use super::apart::{Apart, apart, shuffled};
+use super::candidates::Candidates;
+use super::data::{Data, SEED};
+use super::fitted::Fitted;
+use super::neighbourhood::{Scan, Tried};
+use super::residual_tests::{Findings, Remainder, check};
+use super::selection::LEVEL;
+use super::unexplained::named;
+use crate::identify::{Identification, IdentifyError, Noise, Options};
+use crate::measurement::{Measurements, Split};
+use crate::model::effect;
+use crate::problem::{Effect, Problem};
+
+/// Entries of a ranking.
+const MOST: usize = 20;
+/// Entries whose aliases and cross-validation are worked out.
+const LOOKED_AT: usize = 8;
+/// Two effects are alike where every direction of one is within this of the other [rad].
+const ALIKE: f64 = 0.35;
+
+/// A candidate as the residual sees it.
+#[derive(Debug, Clone)]
+pub struct Ranked {
+    /// Which effect.
+    pub effect: Effect,
+    /// Probability that chance would do as well, corrected for the candidates tried.
+    pub p_value: f64,
+    /// F statistic and its degrees of freedom.
+    pub f: (f64, usize),
+    /// Expected reduction of the root mean squared error on the identification poses [m].
+    pub gain: f64,
+    /// The same on identification poses left out in turn [m]; `None` where it was not worked out.
+    pub cross_validated: Option<f64>,
+    /// Entries of the ranking that it is hard to tell from, with the largest principal angle between them [rad].
+    pub alike: Vec<(Effect, f64)>,
+    /// A pose that would tell it from the first of those.
+    pub apart: Option<Apart>,
+}
+
+/// What the residual of the declared problem's fit points to.
+#[derive(Debug, Clone)]
+pub struct Trace {
+    /// The fit.
+    pub fit: Identification,
+    /// Checks of its residual.
+    pub findings: Findings,
+    /// Candidates by what they explain, best first; the best of each family at each place.
+    pub ranking: Vec<Ranked>,
+    /// Candidates that were tried, orders and times counted.
+    pub tried: usize,
+    /// Level that a corrected p must be below to stand out.
+    pub level: f64,
+    /// Candidates that these data cannot show, and why.
+    pub untestable: Vec<(Effect, &'static str)>,
+    /// Candidates that the fitted parameters absorb: nothing is left to show them.
+    pub absorbed: Vec<Effect>,
+    /// Whether times were measured; where not, the order of the rows stands for them.
+    pub time_measured: bool,
+}
+
+impl Trace {
+    /// What an effect is in these data, in words.
+    pub fn describe(&self, effect: &Effect) -> String {
+        effect::describe_in(effect, self.time_measured)
+    }
+}
+
+/// Traces the residual of `problem`, from the identification rows alone; changes nothing.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn trace(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Trace, IdentifyError> {
+    let data = Data::new(measurements, split);
+    Ok(trace_fit(&Fitted::new(problem.clone(), &data, options)?, &data))
+}
+
+/// Traces the residual of a fit.
+pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
+    let Candidates { testable, untestable } = Candidates::of(&fitted.problem, data);
+    let library = fitted.library(data, &testable, &[]);
+    let tried = testable.len();
+    let scan = Scan::new(&library, fitted.linear(&library, &[], &[]), testable);
+    let mut best: Vec<Tried> = Vec::new();
+    for tried in scan.ranking() {
+        let known = |other: &Tried| named_place(&scan.effects[other.index]) == named_place(&scan.effects[tried.index]);
+        if !best.iter().any(known) {
+            best.push(tried);
+        }
+    }
+    best.truncate(MOST);
+    let looked_at = best.iter().take(LOOKED_AT).filter(|tried| tried.corrected < LEVEL).count();
+    let rms = |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
+    let without = scan.linear.cross_validate(&data.block);
+    let poses = shuffled(data);
+    let looked: Vec<Effect> = best.iter().take(LOOKED_AT).map(|tried| scan.effects[tried.index].clone()).collect();
+    let all: Vec<usize> = (0..poses.len()).collect();
+    let elsewhere = Data { measurements: &poses, ..data.clone() };
+    let there = (looked_at > 0).then(|| fitted.library_of(&elsewhere, &all, &looked, &[]));
+    let ranked = |(place, tried): (usize, &Tried)| {
+        let close = place < looked_at;
+        let cross_validated = without.filter(|_| close).and_then(|without| {
+            let mut with = scan.linear.clone();
+            with.add(&scan.columns(tried.index));
+            Some(rms(without) - rms(with.cross_validate(&data.block)?))
+        });
+        let alike = best.iter().take(if close { LOOKED_AT } else { 0 }).filter(|other| other.index != tried.index);
+        let angle = |other: &Tried| {
+            let angle = scan.angle(tried.index, other.index).filter(|angle| *angle < ALIKE)?;
+            Some((scan.effects[other.index].clone(), angle))
+        };
+        let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
+        let own = &scan.effects[tried.index];
+        let pair = alike.first().zip(there.as_ref());
+        let apart = pair.and_then(|((other, _), there)| apart(fitted, &library, there, &poses, (own, other)));
+        Ranked {
+            effect: scan.effects[tried.index].clone(),
+            p_value: tried.corrected,
+            f: (tried.gain.f, tried.gain.freedom),
+            gain: rms(scan.linear.sums().squares) - rms(scan.linear.sums().squares - tried.gain.squares),
+            cross_validated,
+            alike,
+            apart,
+        }
+    };
+    let ranking = best.iter().enumerate().map(ranked).collect();
+    let absorbed = scan.absorbed().into_iter().cloned().collect();
+    Trace {
+        fit: fitted.found.clone(),
+        findings: check_fit(fitted, data),
+        ranking,
+        tried,
+        level: LEVEL,
+        untestable,
+        absorbed,
+        time_measured: data.measurements.time_measured,
+    }
+}
+
+/// Checks what a fit of `problem` leaves of the identification rows.
+///
+/// # Errors
+/// Problem, data and fit do not belong together.
+pub fn examine(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    found: &Identification,
+) -> Result<Findings, IdentifyError> {
+    let data = Data::new(measurements, split);
+    Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
+}
+
+/// Checks what a fit leaves.
+pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
+    let library = fitted.library(data, &[], &[]);
+    let linear = fitted.linear(&library, &[], &[]);
+    let remainder = Remainder {
+        residual: &linear.data_residual(),
+        fitted: &linear.fitted(),
+        sigma_is_declared: fitted.found.noise == Noise::Declared,
+        time: &data.time(),
+        session: &data.session(),
+        setup: &data.setup,
+        drivers: &data.drivers(&fitted.problem),
+    };
+    check(&remainder, SEED)
+}
+
+/// Family and place, orders and times left out.
+pub(super) fn named_place(effect: &Effect) -> String {
+    match effect {
+        Effect::StationShift { .. } => crate::model::effect::name(effect).to_owned(),
+        other => named(other),
+    }
+}

@@ -1,0 +1,199 @@
+//! The fits of an identification: bases and targets first, then the strategy's stages, then held-out sessions.
+
+use nalgebra::DVector;
+
+use super::placement::Late;
+use super::registration::register;
+use super::stage::{Gauge, Stage, StageEnd, StageError};
+use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::least_squares::Loss;
+use crate::least_squares::solver::{AtBound, Settings, Termination};
+use crate::measurement::{Measurements, Split};
+use crate::model::parameter::Parameter;
+use crate::model::{Model, PoseResiduals};
+
+/// Sweeps after which a sequential strategy is given up.
+const MAX_SWEEPS: usize = 2000;
+/// A sequential strategy has settled when a sweep lowers the cost by less than this part.
+const SWEEP_SETTLED: f64 = 1e-6;
+/// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage changes are wasted.
+const SWEEP_STEPS: u64 = 2;
+
+/// What all fits of an identification share.
+pub(super) struct Fitting<'a> {
+    pub model: &'a Model,
+    pub measurements: &'a Measurements,
+    pub split: &'a Split,
+    pub placement: &'a Placement,
+    /// Bases and targets that only held-out rows use.
+    pub late: Late,
+    pub strategy: Strategy,
+    pub solver: SolverChoice,
+    /// How the residual of a pose counts in the strategy's fits.
+    pub loss: Loss,
+    pub progress: Option<&'a ProgressSink>,
+    /// Steps after which a stage of the strategy is stopped.
+    pub max_steps: Option<u64>,
+    /// 1 σ of a coordinate in rows without one of their own [m].
+    pub sigma: f64,
+}
+
+/// Where a fit ended.
+pub(super) struct FitEnd {
+    /// Full parameter vector.
+    pub x: DVector<f64>,
+    pub termination: Termination,
+    pub iterations: u64,
+    pub evaluations: u64,
+    /// For each unknown of the fit.
+    pub at_bound: Vec<Option<AtBound>>,
+    pub gauge: Gauge,
+}
+
+impl From<StageEnd> for FitEnd {
+    fn from(end: StageEnd) -> Self {
+        let StageEnd { x, solution, gauge } = end;
+        let evaluations = solution.evaluations();
+        let (termination, iterations) = (solution.termination, solution.iterations);
+        Self { x, termination, iterations, evaluations, at_bound: solution.at_bound, gauge }
+    }
+}
+
+impl<'a> Fitting<'a> {
+    /// Parameters of a kind, those of late bases and targets left out.
+    fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
+        let all = self.model.parameters.iter().enumerate();
+        all.filter(|&(k, parameter)| !self.late.parameters[k] && choose(parameter)).map(|(k, _)| k).collect()
+    }
+
+    fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+        Stage {
+            model: self.model,
+            poses: self.placement.poses(self.measurements, rows, self.sigma),
+            unknowns,
+            solver: self.solver,
+            max_steps: Settings::default().max_iterations,
+            loss: Loss::Squares,
+            counts_fixed: false,
+            progress: self.progress,
+        }
+    }
+
+    /// A stage that fits bases and targets, by the solver that `auto` takes whichever was asked for.
+    fn placing(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+        let mut stage = self.stage(rows, unknowns);
+        stage.solver = SolverChoice::Auto.decide(self.model);
+        stage
+    }
+
+    /// A stage of the strategy: on the identification rows, with the problem's loss.
+    fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
+        let stage = self.stage(&self.split.identification, unknowns);
+        Stage { loss: self.loss, max_steps: self.max_steps.unwrap_or(stage.max_steps), ..stage }
+    }
+
+    /// Everything that the strategy varies, as one stage on the identification rows.
+    pub fn whole(&self) -> Stage<'a> {
+        let varied = |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
+        self.strategy_stage(self.choose(varied))
+    }
+
+    /// Bases and targets of held-out sessions, as one stage on their rows.
+    pub fn late_stage(&self) -> Option<Stage<'a>> {
+        let unknowns: Vec<usize> =
+            self.late.parameters.iter().enumerate().filter(|(_, late)| **late).map(|(k, _)| k).collect();
+        (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(&self.late.rows, unknowns) })
+    }
+
+    /// First row whose pose has no equilibrium on the nominal arm.
+    pub fn without_equilibrium(&self) -> Option<usize> {
+        let rows: Vec<usize> = (0..self.measurements.len()).collect();
+        let errors = self.position_errors(&rows, &DVector::zeros(self.model.parameters.len()));
+        errors.iter().position(|error| error.x.is_nan())
+    }
+
+    /// The nominal arm with bases and targets fitted where they are free.
+    pub fn registered(&self) -> Result<DVector<f64>, StageError> {
+        let mut x = DVector::zeros(self.model.parameters.len());
+        let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
+        let mut known = vec![false; self.placement.bases.len()];
+        for pose in &poses {
+            known[pose.base] = true;
+        }
+        let late = self.placement.poses(self.measurements, &self.late.rows, self.sigma);
+        poses.extend(late.into_iter().filter(|pose| !known[pose.base]));
+        register(self.model, &poses, &mut x);
+        let placements = self.choose(|parameter| parameter.slot.is_placement());
+        if !placements.is_empty() {
+            x = self.placing(&self.split.identification, placements).run(&x)?.x;
+        }
+        match self.late_stage() {
+            Some(stage) => Ok(stage.run(&x)?.x),
+            None => Ok(x),
+        }
+    }
+
+    /// Runs the strategy's stages from `start`; several are repeated until the cost settles.
+    pub fn run(&self, start: &DVector<f64>) -> Result<FitEnd, StageError> {
+        let whole = self.whole();
+        let [first, rest @ ..] = self.strategy.stages() else { return Ok(whole.run(start)?.into()) };
+        if rest.is_empty() {
+            return Ok(self.strategy_stage(self.choose(first)).run(start)?.into());
+        }
+        let mut end = FitEnd {
+            x: start.clone(),
+            termination: Termination::IterationLimit,
+            iterations: 0,
+            evaluations: 0,
+            at_bound: vec![None; whole.unknowns.len()],
+            gauge: Gauge::default(),
+        };
+        let mut cost = f64::INFINITY;
+        // Short stages may all be turned back where a long one gets on: only a sweep of long ones can end it.
+        let mut long = self.strategy == Strategy::OneSweep;
+        for _ in 0..MAX_SWEEPS {
+            let mut termination = Termination::Cost;
+            for chosen in self.strategy.stages() {
+                let mut stage = self.strategy_stage(self.choose(chosen));
+                if !long {
+                    stage.max_steps = SWEEP_STEPS;
+                }
+                let StageEnd { x, solution, .. } = stage.run(&end.x)?;
+                end.x = x;
+                end.iterations += solution.iterations;
+                end.evaluations += solution.evaluations();
+                if termination.converged() {
+                    termination = solution.termination;
+                }
+                for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
+                    if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
+                        end.at_bound[j] = at_bound;
+                    }
+                }
+            }
+            let next = whole.cost(&end.x);
+            let settled = cost - next <= SWEEP_SETTLED * next;
+            if self.strategy == Strategy::OneSweep || !next.is_finite() || (settled && long) {
+                end.termination = termination;
+                break;
+            }
+            long = settled;
+            cost = next;
+        }
+        let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
+        Ok(end)
+    }
+
+    /// Errors on both parts of the data with the full parameter vector `x`.
+    pub fn errors(&self, x: &DVector<f64>) -> Errors {
+        let of = |rows: &[usize]| ErrorSummary::of(&self.position_errors(rows, x));
+        Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
+    }
+
+    /// Residuals measured − predicted of some rows, measuring frame [m].
+    pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
+        let poses = self.placement.poses(self.measurements, rows, self.sigma);
+        PoseResiduals::new(self.model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
+    }
+}

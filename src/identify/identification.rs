@@ -1,0 +1,261 @@
+//! From measurements to estimates with their errors.
+
+use std::time::Instant;
+
+use nalgebra::DVector;
+
+use super::active::ActiveConstraint;
+use super::fitting::{FitEnd, Fitting};
+use super::outcome::{Estimate, Identification, Noise, enter};
+use super::placement::UNKNOWN_SIGMA;
+use super::stage::StageError;
+use super::statistics::Statistics;
+use super::trust::{Distrust, TooFewPoses, beyond_prior, misses, underdetermined};
+use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::error::{InputError, InputErrorKind};
+use crate::least_squares::{Identifiability, Loss};
+use crate::measurement::{Measurements, Split, different};
+use crate::model::Model;
+use crate::model::parameter::Parameter;
+use crate::problem::{Effect, EffectDeclaration, JointKind, Problem, Robust, RobustLoss};
+
+/// An undeclared σ has settled when it changes by less than this part.
+const NOISE_SETTLED: f64 = 1e-3;
+/// Fits after which the search for an undeclared σ stops.
+const MAX_NOISE_FITS: usize = 20;
+/// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding [m].
+const LEAST_NOISE: f64 = 1e-9;
+
+/// How to identify.
+#[derive(Clone, Default)]
+pub struct Options {
+    /// Which parameters are fitted together.
+    pub strategy: Strategy,
+    /// By which solver.
+    pub solver: SolverChoice,
+    /// Told of every step.
+    pub progress: Option<ProgressSink>,
+    /// Values [SI] by name from which the fit starts; the registered nominal arm gives the others.
+    pub start: Vec<(String, f64)>,
+    /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
+    pub max_steps: Option<u64>,
+}
+
+/// Why an identification could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// There is no row to identify from.
+    #[error("no pose to identify from")]
+    NoPoses,
+    /// Problem and data do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A fit could not be set up.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// Bounds or constraints were declared for a solver that cannot keep them.
+    #[error(
+        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded or auto, or leave out \
+         min, max and [[constraint]]"
+    )]
+    BoundsIgnored {
+        /// The solver that was asked for.
+        solver: &'static str,
+    },
+    /// A strategy has nothing to vary.
+    #[error("strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]")]
+    NothingToFit {
+        /// The strategy that was asked for.
+        strategy: &'static str,
+    },
+}
+
+/// Identifies the free parameters of `problem` from the identification rows; held-out rows decide nothing.
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let placement = Placement::of(measurements);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    identify_model(&model, problem, measurements, split, options)
+}
+
+/// Declared effects of which the measurements hold nothing are mistakes.
+fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
+    let slides = |joint: &usize| problem.joints[joint - 1].kind == JointKind::Prismatic;
+    for EffectDeclaration { effect, location } in &problem.effects {
+        let write = match effect {
+            effect if effect.is_thermal() && measurements.temperature.is_none() => "a column temperature_C",
+            Effect::Backlash { joint } if slides(joint) && measurements.approach.is_none() => "columns approach1, …",
+            _ => continue,
+        };
+        return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
+    }
+    Ok(())
+}
+
+/// As [`identify`], with a model of the problem that the caller has changed.
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify_model(
+    model: &Model,
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let clock = Instant::now();
+    check_columns(problem, measurements)?;
+    if split.identification.is_empty() {
+        return Err(IdentifyError::NoPoses);
+    }
+    let placement = Placement::of(measurements);
+    let (strategy, solver) = (options.strategy, options.solver.decide(model));
+    if solver != SolverChoice::Bounded && model.is_bounded() {
+        return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
+    }
+    let declared = problem.data.position_sigma;
+    let noise_is_declared = declared.is_some() || measurements.sigma.is_some();
+    let mut fitting = Fitting {
+        model,
+        measurements,
+        split,
+        placement: &placement,
+        late: placement.late(model, split),
+        strategy,
+        solver,
+        loss: problem.robust.map_or(Loss::Squares, loss),
+        progress: options.progress.as_ref(),
+        max_steps: options.max_steps,
+        sigma: declared.unwrap_or(UNKNOWN_SIGMA),
+    };
+    if let Some(row) = fitting.without_equilibrium() {
+        return Err(measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
+    }
+    let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
+    if strategy != Strategy::Joint && unknowns.iter().all(|parameter| parameter.slot.is_placement()) {
+        return Err(IdentifyError::NothingToFit { strategy: strategy.as_str() });
+    }
+
+    let start = fitting.registered()?;
+    let registered = fitting.errors(&start);
+    if !noise_is_declared {
+        fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
+    }
+    let mut begin = start.clone();
+    for (k, parameter) in model.parameters.iter().enumerate() {
+        if let Some((_, value)) = options.start.iter().find(|(name, _)| *name == parameter.name) {
+            begin[k] = parameter.deviation(*value);
+        }
+    }
+    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, noise_is_declared)?;
+    let errors = fitting.position_errors(&split.identification, &end.x);
+    let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
+    let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
+    enter(&mut estimates, &fitting.whole(), &end, &statistics);
+    let numbers = measurements.pose_numbers(problem);
+    let poses = different(&numbers, split.identification.iter().copied());
+    let mut distrust = (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination));
+    if let Some(stage) = fitting.late_stage() {
+        let late: FitEnd = stage.run(&end.x)?.into();
+        end.iterations += late.iterations;
+        end.evaluations += late.evaluations;
+        distrust = distrust
+            .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
+        enter(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
+        end.x = late.x;
+    }
+    if noise == Noise::Unknown {
+        for estimate in &mut estimates {
+            estimate.std_error = None;
+        }
+    }
+    let fitted = fitting.errors(&end.x);
+    let squares = fitting.whole().poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>();
+    let declared_sigma = noise_is_declared.then(|| (squares / split.identification.len().max(1) as f64).sqrt());
+    let far = |of: &Errors| misses(measurements, &placement, &split.identification, &of.identification, declared_sigma);
+    // An arm that was near before the fit was driven away by a solver that did not converge.
+    let misses = far(&fitted).filter(|_| end.termination.converged() || far(&registered).is_some());
+    let parameters = unknowns.len();
+    let distrust = too_few_equations(&fitting, &numbers, &unknowns)
+        .or(misses)
+        .or(distrust)
+        .or_else(|| beyond_prior(model, &end.x));
+    let name = |j: usize| unknowns[j].name.clone();
+    Ok(Identification {
+        distrust,
+        too_few_poses: (3 * poses < parameters).then_some(TooFewPoses { poses, parameters }),
+        strategy,
+        solver,
+        solver_reason: options.solver.reason(model),
+        termination: end.termination,
+        iterations: end.iterations,
+        evaluations: end.evaluations,
+        noise,
+        registered,
+        fitted,
+        reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
+        noise_factor: statistics.noise_factor,
+        coordinates: 3 * split.identification.len(),
+        identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
+        estimates,
+        correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
+        unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        active_constraints: ActiveConstraint::all(&statistics.constraints, model),
+        outliers,
+        x: end.x,
+        seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+/// The whole fit, a base or a target with fewer coordinates than parameters without a prior; `numbers` are those of the poses.
+fn too_few_equations(fitting: &Fitting, numbers: &[usize], unknowns: &[&Parameter]) -> Option<Distrust> {
+    let Fitting { model, placement, late, split, .. } = fitting;
+    let coordinates = 3 * different(numbers, split.identification.iter().copied());
+    let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+    (coordinates < without_prior)
+        .then(|| Distrust::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
+        .or_else(|| underdetermined(model, placement, numbers, &split.identification, |k| !late.parameters[k]))
+        .or_else(|| underdetermined(model, placement, numbers, &late.rows, |k| late.parameters[k]))
+}
+
+/// Runs the strategy; where no σ is declared, again and again until the scatter about the fit is the σ assumed.
+fn fitted(
+    fitting: &mut Fitting,
+    start: &DVector<f64>,
+    noise_is_declared: bool,
+) -> Result<(FitEnd, Statistics, Noise), StageError> {
+    let mut fits = 0;
+    loop {
+        fits += 1;
+        let end = fitting.run(start)?;
+        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared)?;
+        let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
+        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
+        if noise_is_declared || settled || fits == MAX_NOISE_FITS {
+            let noise = match statistics.reduced_chi2 {
+                _ if noise_is_declared => Noise::Declared,
+                Some(_) => Noise::Estimated(fitting.sigma),
+                None => Noise::Unknown,
+            };
+            return Ok((end, statistics, noise));
+        }
+        fitting.sigma = next;
+    }
+}
+
+/// The loss that `[robust]` stands for, on the three coordinates of a position.
+fn loss(robust: Robust) -> Loss {
+    match robust.loss {
+        RobustLoss::Huber => Loss::Huber { threshold: robust.threshold.unwrap_or(Loss::HUBER_POSITION) },
+        RobustLoss::L1 => {
+            Loss::L1 { slope: Loss::L1_POSITION, smoothing: robust.threshold.unwrap_or(Loss::L1_SMOOTHING) }
+        }
+    }
+}

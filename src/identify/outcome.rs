@@ -1,0 +1,143 @@
+//! What an identification gives.
+
+use nalgebra::DVector;
+
+use super::fitting::FitEnd;
+use super::stage::Stage;
+use super::statistics::Statistics;
+use super::{ActiveConstraint, Distrust, ErrorSummary, Outlier, SolverChoice, Strategy, TooFewPoses};
+use crate::least_squares::Identifiability;
+use crate::least_squares::solver::{AtBound, Termination};
+use crate::model::parameter::{Parameter, Unit};
+
+/// A parameter of which the data gave no more than this part has no standard error.
+const NOTHING_LEARNED: f64 = 1e-6;
+
+/// Errors on both parts of the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// On the poses that are fitted.
+    pub identification: ErrorSummary,
+    /// On the poses that decide nothing.
+    pub held_out: ErrorSummary,
+}
+
+/// Where the assumed noise comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Noise {
+    /// From `position_sigma` or the column `sigma`.
+    Declared,
+    /// From the scatter about the fit, 1 σ per coordinate [m].
+    Estimated(f64),
+    /// Neither declared nor to be seen: the fit has no degrees of freedom.
+    Unknown,
+}
+
+/// A parameter after the fit; SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Name as in the problem file.
+    pub name: String,
+    /// Kind of quantity.
+    pub unit: Unit,
+    /// Nominal value.
+    pub nominal: f64,
+    /// Estimated value.
+    pub estimate: f64,
+    /// 1 σ; `None` where nothing was learned, where the value rests on a bound or is part of a combination that neither
+    /// data nor priors see, or where it was not fitted.
+    pub std_error: Option<f64>,
+    /// The bound on which the value rests.
+    pub at_bound: Option<AtBound>,
+    /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among blind combinations.
+    pub identified: f64,
+    /// Whether the strategy varied it.
+    pub fitted: bool,
+}
+
+/// An identified arm.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// Which parameters were fitted together.
+    pub strategy: Strategy,
+    /// The solver that was used.
+    pub solver: SolverChoice,
+    /// Why that one, where `auto` chose it.
+    pub solver_reason: Option<&'static str>,
+    /// Why it stopped.
+    pub termination: Termination,
+    /// Why the fit is not to be trusted, if it is not.
+    pub distrust: Option<Distrust>,
+    /// Whether the poses are too few to say much without priors.
+    pub too_few_poses: Option<TooFewPoses>,
+    /// Steps tried, over all stages.
+    pub iterations: u64,
+    /// Evaluations of the residual, with derivatives or without, over all stages.
+    pub evaluations: u64,
+    /// Time taken [s].
+    pub seconds: f64,
+    /// Where the noise comes from.
+    pub noise: Noise,
+    /// Of the nominal arm, with base and target fitted where they are free.
+    pub registered: Errors,
+    /// Of the identified arm.
+    pub fitted: Errors,
+    /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
+    /// Where the loss is robust, outliers are left out of it.
+    pub reduced_chi2: Option<f64>,
+    /// By how much the declared variance was raised for the standard errors, ≥ 1.
+    pub noise_factor: f64,
+    /// Measured coordinates that were fitted.
+    pub coordinates: usize,
+    /// Names of the fitted parameters, in the order of `identifiability`.
+    pub unknowns: Vec<String>,
+    /// What the identification data can tell about them, at the registered nominal arm.
+    pub identifiability: Identifiability,
+    /// Every free parameter.
+    pub estimates: Vec<Estimate>,
+    /// Pairs of parameters correlated by more than 0.9, strongest first.
+    pub correlations: Vec<(String, String, f64)>,
+    /// Constraints that hold the fitted parameters back, in the order of the file.
+    pub active_constraints: Vec<ActiveConstraint>,
+    /// Identification rows whose residual is too long to be noise, in the order of the rows.
+    pub outliers: Vec<Outlier>,
+    /// Full parameter vector of the model.
+    pub x: DVector<f64>,
+}
+
+impl Identification {
+    /// Whether the fit is to be trusted.
+    pub fn is_trusted(&self) -> bool {
+        self.distrust.is_none()
+    }
+}
+
+impl Estimate {
+    /// A parameter that no stage has varied.
+    pub(super) fn unfitted(parameter: &Parameter) -> Self {
+        Self {
+            name: parameter.name.clone(),
+            unit: parameter.unit(),
+            nominal: parameter.nominal,
+            estimate: parameter.nominal,
+            std_error: None,
+            at_bound: None,
+            identified: 0.0,
+            fitted: false,
+        }
+    }
+}
+
+/// Enters what a stage found into the estimates of its unknowns.
+pub(super) fn enter(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
+    for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
+        let x = end.x[k];
+        let learned = statistics.known[j] && statistics.identified[j] > NOTHING_LEARNED;
+        let estimate = &mut estimates[k];
+        estimate.estimate = parameter.value(x);
+        estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));
+        estimate.at_bound = end.at_bound[j];
+        estimate.identified = statistics.identified[j];
+        estimate.fitted = true;
+    }
+}

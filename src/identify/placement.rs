@@ -1,0 +1,109 @@
+//! Which base and which target each row uses, and which of them appear in held-out rows only.
+
+use crate::measurement::{Measurements, Split};
+use crate::mechanics::Setup;
+use crate::model::parameter::Slot;
+use crate::model::{Model, Pose};
+use crate::problem::Problem;
+
+/// Scale of a coordinate's error where no σ is declared and none estimated yet [m].
+pub(super) const UNKNOWN_SIGMA: f64 = 1e-3;
+
+/// Bases and targets of a set of measurements.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Placement {
+    /// One base per session.
+    pub bases: Vec<String>,
+    /// One target per word of the column `target`, or per session where there is none.
+    pub targets: Vec<String>,
+    base_of_row: Vec<usize>,
+    target_of_row: Vec<usize>,
+}
+
+impl Placement {
+    /// As the columns `session` and `target` say.
+    pub fn of(measurements: &Measurements) -> Self {
+        let session = &measurements.session;
+        let target = measurements.target.as_ref().unwrap_or(session);
+        Self {
+            bases: session.names.clone(),
+            targets: target.names.clone(),
+            base_of_row: session.of_row.clone(),
+            target_of_row: target.of_row.clone(),
+        }
+    }
+
+    /// Base of a row.
+    pub fn base_of(&self, row: usize) -> usize {
+        self.base_of_row[row]
+    }
+
+    /// Target of a row.
+    pub fn target_of(&self, row: usize) -> usize {
+        self.target_of_row[row]
+    }
+
+    /// 1 σ of a coordinate of some rows together, as declared [m].
+    pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
+        let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
+        let squares = rows.iter().map(|&row| measurements.sigma.as_ref().map_or(whole, |all| all[row]).powi(2));
+        if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
+    }
+
+    /// Rows as poses; `sigma` [m] is that of rows without one of their own.
+    pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
+        let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
+        let n = measurements.joints;
+        let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+        rows.iter()
+            .map(|&row| Pose {
+                setup: Setup {
+                    configuration: measurements.configuration(row),
+                    payload: at(&measurements.payload, row),
+                    hoist: at(&measurements.hoist, row),
+                    temperature: at(&measurements.temperature, row),
+                    time: measurements.time[row],
+                    elapsed: measurements.time[row] - first,
+                    approach: measurements.approach.as_ref().map(|all| &all[row * n..(row + 1) * n]),
+                },
+                base: self.base_of_row[row],
+                target: self.target_of_row[row],
+                measured: measurements.positions[row],
+                sigma: at(&measurements.sigma, row).unwrap_or(sigma),
+            })
+            .collect()
+    }
+
+    /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.
+    ///
+    /// They say nothing about the arm: they are fitted on their held-out rows, alone.
+    pub fn late(&self, model: &Model, split: &Split) -> Late {
+        let unused = |count: usize, of_row: &[usize]| {
+            let mut unused = vec![true; count];
+            split.identification.iter().for_each(|&row| unused[of_row[row]] = false);
+            unused
+        };
+        let bases = unused(self.bases.len(), &self.base_of_row);
+        let targets = unused(self.targets.len(), &self.target_of_row);
+        let parameters = model
+            .parameters
+            .iter()
+            .map(|parameter| match parameter.slot {
+                Slot::Base { base, .. } => bases[base],
+                Slot::Target { target, .. } => targets[target],
+                _ => false,
+            })
+            .collect();
+        let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];
+        Late { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
+    }
+}
+
+/// Bases and targets that appear in held-out rows only.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Late {
+    /// Whether each parameter of the model belongs to one.
+    pub parameters: Vec<bool>,
+    /// The held-out rows that use one.
+    pub rows: Vec<usize>,
+}

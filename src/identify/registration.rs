@@ -1,0 +1,86 @@
+//! Where the arm stands: a base pose from measured points, with no guess to start from.
+
+use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
+
+use crate::model::parameter::Slot;
+use crate::model::{Model, Pose};
+use crate::spatial::rotate;
+
+/// Points whose second squared spread is below this part of the first lie on a line.
+const ON_A_LINE: f64 = 1e-12;
+
+/// Sets every base that is wholly free and has no prior to the best rigid motion from the arm's own frame to the
+/// measured points of `poses`, in the full parameter vector `x`. Bases that no pose uses stay as they are.
+///
+/// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4 × 4 matrix  [Horn 1987].
+pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
+    let points = model.points(poses, x.as_slice());
+    let nominal = model.base_poses(DVector::zeros(x.len()).as_slice());
+    for (base, nominal) in nominal.iter().enumerate() {
+        let columns: Vec<(usize, usize)> = model
+            .parameters
+            .iter()
+            .enumerate()
+            .filter(|(_, parameter)| parameter.sigma.is_none() && !parameter.is_bounded())
+            .filter_map(|(k, parameter)| match parameter.slot {
+                Slot::Base { base: own, axis } if own == base => Some((axis, k)),
+                _ => None,
+            })
+            .collect();
+        let pairs = poses.iter().zip(&points).filter(|(pose, _)| pose.base == base);
+        let points: Vec<_> = pairs.filter_map(|(pose, point)| Some(((*point)?, pose.measured))).collect();
+        if columns.len() < 6 || points.is_empty() {
+            continue;
+        }
+        let (rotation, translation) = rigid_motion(&points, &nominal.rotation);
+        let rotation = rotation - nominal.rotation;
+        let translation = translation - nominal.translation;
+        for (axis, k) in columns {
+            x[k] = if axis < 3 { translation[axis] } else { rotation[axis - 3] };
+        }
+    }
+}
+
+/// The rotation vector [rad] and translation [m] that carry the first points of the pairs to the second ones best; the
+/// `nominal` rotation where the points lie on a line, about which they leave the turn open.
+fn rigid_motion(pairs: &[(Vector3<f64>, Vector3<f64>)], nominal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let n = pairs.len() as f64;
+    let (from, to) = pairs.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (p, y)| (a + p / n, b + y / n));
+    let s: Matrix3<f64> = pairs.iter().map(|(p, y)| (p - from) * (y - to).transpose()).sum();
+    let mut spread = (s.transpose() * s).symmetric_eigenvalues();
+    spread.as_mut_slice().sort_by(f64::total_cmp);
+    if spread[1] <= ON_A_LINE * spread[2] {
+        return (*nominal, to - rotate(nominal, &from));
+    }
+    let skew = Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
+    let symmetric = s + s.transpose() - Matrix3::identity() * s.trace();
+    let mut normal = Matrix4::zeros();
+    normal[(0, 0)] = s.trace();
+    normal.fixed_view_mut::<3, 1>(1, 0).copy_from(&skew);
+    normal.fixed_view_mut::<1, 3>(0, 1).copy_from(&skew.transpose());
+    normal.fixed_view_mut::<3, 3>(1, 1).copy_from(&symmetric);
+    let eigen = normal.symmetric_eigen();
+    let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+    (rotation.scaled_axis(), to - rotation * from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_motion_is_found_from_points_in_a_plane() {
+        for w in
+            [Vector3::zeros(), Vector3::new(0.0, 0.0, 3.1), Vector3::new(1.0, -2.0, 0.5), Vector3::new(2.2, 2.2, 0.0)]
+        {
+            let shift = Vector3::new(3.0, -1.0, 0.2);
+            let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.5, 1.0]].map(|[x, y]| Vector3::new(x, y, 0.3));
+            let pairs = points.map(|p| (p, rotate(&w, &p) + shift));
+            let (found, translation) = rigid_motion(&pairs, &Vector3::zeros());
+            for (p, y) in pairs {
+                assert!((rotate(&found, &p) + translation - y).norm() < 1e-12, "{w}");
+            }
+        }
+    }
+}

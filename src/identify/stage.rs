@@ -1,0 +1,222 @@
+//! One least-squares fit of some parameters to some poses.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::SolverChoice;
+use super::active::Held;
+use super::progress::{ProgressSink, Reporter};
+use crate::least_squares::solver::{
+    self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings, Settings,
+    Solution,
+};
+use crate::least_squares::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
+use crate::model::parameter::Parameter;
+use crate::model::{Model, Pose, PoseResiduals};
+
+/// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
+/// metres measured in units of their noise, and far below what any estimate's error would show.
+const COST_TOLERANCE: f64 = 1e-11;
+
+/// A stage that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// Bounds leave a parameter no value.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
+    /// Constraints make no sense.
+    #[error(transparent)]
+    Inequalities(#[from] InequalitiesError),
+    /// Bounds and constraints contradict each other.
+    #[error("no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]")]
+    Infeasible,
+    /// Priors do not fit the unknowns.
+    #[error(transparent)]
+    Rows(#[from] RowsError),
+}
+
+/// What a stage works on.
+pub(super) struct Stage<'a> {
+    pub model: &'a Model,
+    pub poses: Vec<Pose<'a>>,
+    /// Which parameters vary.
+    pub unknowns: Vec<usize>,
+    pub solver: SolverChoice,
+    /// Steps after which the solver is stopped.
+    pub max_steps: u64,
+    /// How the residual of a pose counts.
+    pub loss: Loss,
+    /// Whether constraints count that also speak of free parameters which do not vary here.
+    pub counts_fixed: bool,
+    pub progress: Option<&'a ProgressSink>,
+}
+
+/// Where a stage ended.
+pub(super) struct StageEnd {
+    /// Full parameter vector.
+    pub x: DVector<f64>,
+    pub solution: Solution,
+    pub gauge: Gauge,
+}
+
+/// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Gauge {
+    /// Rows that span them, on the unknowns.
+    pub rows: DMatrix<f64>,
+    /// Part of each unknown outside of them, 0…1.
+    pub visible: Vec<f64>,
+}
+
+impl<'a> Stage<'a> {
+    /// The parameters that vary.
+    pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
+        self.unknowns.iter().map(|&k| &self.model.parameters[k])
+    }
+
+    /// Residuals of the stage about the full parameter vector `at`.
+    pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
+        PoseResiduals::new(self.model, self.poses.clone(), self.unknowns.clone(), at.clone())
+    }
+
+    /// Triangular factor R of the whitened data at `at`, priors left out.
+    pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = self.residuals(at);
+        Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
+    }
+
+    /// The same, each pose weighted as the loss does.
+    pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = self.residuals(at);
+        Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
+    }
+
+    /// Combinations of the unknowns that are not `held` which data, priors and `active` constraints leave open at `at`.
+    pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
+        let n = self.unknowns.len();
+        if self.parameters().all(|parameter| parameter.sigma.is_some()) {
+            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
+        }
+        let data = self.data_triangle(at);
+        let priors = self.priors();
+        let seen = n + priors.nrows();
+        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
+            i if i < n => data[(i, j)],
+            i if i < seen => priors[(i - n, j)],
+            // Weighted like a measurement of each of its parameters.
+            i => active[i - seen].row[j].signum() * f64::from(active[i - seen].row[j] != 0.0) * data.column(j).norm(),
+        });
+        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
+        let found = Identifiability::of(&stacked.qr().unpack_r().select_columns(&free));
+        let mut gauge = Gauge { rows: DMatrix::zeros(found.gauge.nrows(), n), visible: vec![0.0; n] };
+        for (j, &k) in free.iter().enumerate() {
+            gauge.rows.set_column(k, &found.gauge.column(j));
+            gauge.visible[k] = found.visible[j];
+        }
+        gauge
+    }
+
+    /// Minimises from the full parameter vector `start`.
+    ///
+    /// Combinations that are blind at the start are held there. What is blind at the start may be seen at the end, or
+    /// decided by a bound or a constraint: then the fit goes on with that set free.
+    ///
+    /// # Errors
+    /// Bounds and constraints leave the parameters no values.
+    pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
+        let residuals = self.residuals(start);
+        let mut begin = residuals.reduced(start);
+        let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
+        let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
+        let bounds = Bounds::new(lower, upper)?;
+        let (_, rows) = self.constraints(start)?;
+        if self.solver == SolverChoice::Bounded {
+            begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
+        }
+        let hold = begin.clone();
+        let mut gauge = self.gauge(start, &vec![false; begin.len()], &[]);
+        let (mut iterations, mut cost_evaluations, mut linearisations) = (0, 0, 0);
+        loop {
+            let mut solution = self.solve(&residuals, begin, &hold, &gauge, (&bounds, &rows))?;
+            iterations += solution.iterations;
+            cost_evaluations += solution.cost_evaluations;
+            linearisations += solution.linearisations;
+            let x = residuals.full(&solution.x);
+            let held: Vec<bool> = solution.at_bound.iter().map(Option::is_some).collect();
+            let now = self.gauge(&x, &held, &self.held(&x)?);
+            if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
+                (solution.iterations, solution.cost_evaluations) = (iterations, cost_evaluations);
+                solution.linearisations = linearisations;
+                return Ok(StageEnd { x, solution, gauge });
+            }
+            gauge = now;
+            begin = solution.x;
+        }
+    }
+
+    /// Minimises from the unknowns `begin`, with the combinations in `gauge` held as in `hold`.
+    fn solve(
+        &self,
+        residuals: &PoseResiduals,
+        begin: DVector<f64>,
+        hold: &DVector<f64>,
+        gauge: &Gauge,
+        (bounds, rows): (&Bounds, &Inequalities),
+    ) -> Result<Solution, StageError> {
+        let priors = self.priors();
+        let none = DVector::zeros(priors.nrows());
+        let fit = Fit::new(residuals)
+            .with_loss(self.loss)
+            .with_rows(LinearRows { matrix: priors, constant: none })?
+            .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?;
+        let settings =
+            Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
+        let reporter = self.progress.map(|sink| Reporter {
+            sink: Arc::clone(sink),
+            unknowns: self.unknowns.len(),
+            poses: self.poses.len(),
+        });
+        Ok(match (self.solver, reporter) {
+            (SolverChoice::Bounded, Some(reporter)) => {
+                solver::minimise_constrained_observed(fit, begin, bounds, rows, &settings, reporter)
+            }
+            (SolverChoice::Bounded, None) => solver::minimise_constrained(fit, begin, bounds, rows, &settings),
+            (SolverChoice::GaussNewton, _) => {
+                let max_iterations = self.max_steps.min(GaussNewtonSettings::default().max_iterations);
+                let settings = GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
+                solver::minimise_gauss_newton(fit, begin, &settings)
+            }
+            (SolverChoice::PseudoInverse, reporter) => {
+                let max_iterations = self.max_steps.min(PseudoInverseSettings::default().max_iterations);
+                let settings = PseudoInverseSettings { max_iterations, ..PseudoInverseSettings::default() };
+                match reporter {
+                    Some(reporter) => solver::minimise_pseudo_inverse_observed(fit, begin, &settings, reporter),
+                    None => solver::minimise_pseudo_inverse(fit, begin, &settings),
+                }
+            }
+            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, Some(reporter)) => {
+                solver::minimise_observed(fit, begin, &settings, reporter)
+            }
+            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, None) => solver::minimise(fit, begin, &settings),
+        })
+    }
+
+    /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.
+    pub fn cost(&self, at: &DVector<f64>) -> f64 {
+        let residuals = self.residuals(at);
+        let x = residuals.reduced(at);
+        Fit::new(&residuals).with_loss(self.loss).cost(&x) + 0.5 * (self.priors() * x).norm_squared()
+    }
+
+    /// One row x / σ for each unknown with a prior.
+    fn priors(&self) -> DMatrix<f64> {
+        let sigmas: Vec<(usize, f64)> =
+            self.parameters().enumerate().filter_map(|(j, parameter)| Some((j, parameter.sigma?))).collect();
+        let mut rows = DMatrix::zeros(sigmas.len(), self.unknowns.len());
+        for (i, &(j, sigma)) in sigmas.iter().enumerate() {
+            rows[(i, j)] = sigma.recip();
+        }
+        rows
+    }
+}

@@ -1,0 +1,105 @@
+//! What the residual of a fit says about its unknowns.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::active::{Held, confine};
+use super::fitting::FitEnd;
+use super::outliers::Lengths;
+use super::stage::{Stage, StageError};
+use crate::least_squares::{Identifiability, Loss, Uncertainty};
+
+/// A χ² this improbable under the declared σ means that σ is understated.
+const IMPROBABLE: f64 = 1e-3;
+/// A part this large in blind combinations leaves an unknown without an error of its own.
+const PARTLY_BLIND: f64 = 1e-3;
+/// Correlations beyond this are reported.
+const STRONG: f64 = 0.9;
+
+/// Errors and correlations of the unknowns of a fit.
+#[derive(Debug, Clone)]
+pub(super) struct Statistics {
+    /// Standard error of each unknown.
+    pub errors: Vec<f64>,
+    /// Whether data and priors decide each unknown: no bound, and no part in a combination that neither of them sees.
+    pub known: Vec<bool>,
+    /// Part of each unknown that the data gave, 0…1.
+    pub identified: Vec<f64>,
+    /// Pairs of unknowns correlated by more than 0.9, strongest first.
+    pub correlations: Vec<(usize, usize, f64)>,
+    /// χ² over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
+    pub reduced_chi2: Option<f64>,
+    /// By how much the assumed variance was raised, ≥ 1.
+    pub noise_factor: f64,
+    /// The constraints that hold back.
+    pub constraints: Vec<Held>,
+    /// Lengths of the residuals.
+    pub lengths: Lengths,
+}
+
+impl Statistics {
+    /// Of a stage that ended at `end`.
+    ///
+    /// The model's errors count as noise: where χ² / ν is beyond chance under a declared σ, the variance is raised by it.
+    /// With a robust loss the covariance is that of the weighted Jacobian, times [`Loss::variance_factor`].
+    /// Active constraints confine it to the directions that they leave open.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn of(stage: &Stage, end: &FitEnd, noise_is_declared: bool) -> Result<Self, StageError> {
+        let triangle = stage.weighted_triangle(&end.x);
+        let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+        let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        let constraints = stage.held(&end.x)?;
+        let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
+        let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
+        let mut uncertainty = of(1.0);
+        let coordinates = 3.0 * stage.poses.len() as f64;
+        let freedom = coordinates - uncertainty.effective_parameters;
+        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, noise_is_declared);
+        let robust = stage.loss != Loss::Squares;
+        let counts = |length: f64| !robust || lengths.outlying(length).is_none();
+        let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
+        let left_out = if robust { 3.0 * lengths.outliers() as f64 } else { 0.0 };
+        let noise_factor = if noise_is_declared { raised(chi2, freedom - left_out) } else { 1.0 };
+        if robust {
+            uncertainty = of(stage.loss.variance_factor(&lengths.values, 3, freedom));
+        } else if noise_factor > 1.0 {
+            uncertainty = of(noise_factor);
+        }
+        let freedom = freedom - left_out;
+        let errors = uncertainty.standard_errors();
+        let visible = if priors.iter().all(Option::is_some) {
+            vec![1.0; errors.len()]
+        } else {
+            Identifiability::of(&stage.data_triangle(&end.x)).visible
+        };
+        let identified = (0..errors.len())
+            .map(|j| match priors[j] {
+                _ if held[j] => 0.0,
+                Some(sigma) => (1.0 - (errors[j] / sigma).powi(2)).clamp(0.0, 1.0),
+                None => visible[j],
+            })
+            .collect();
+        // What was seen at the start may have run out of sight on the way, a rigidity towards infinity for one.
+        let seen = stage.gauge(&end.x, &held, &constraints).visible;
+        let known =
+            (0..errors.len()).map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND).collect();
+        Ok(Self {
+            correlations: uncertainty.correlations_above(STRONG),
+            errors,
+            known,
+            identified,
+            reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
+            noise_factor,
+            constraints,
+            lengths,
+        })
+    }
+}
+
+/// χ² / ν where that is beyond chance, else 1.
+fn raised(chi2: f64, freedom: f64) -> f64 {
+    let beyond_chance =
+        freedom > 0.5 && ChiSquared::new(freedom).is_ok_and(|distribution| distribution.sf(chi2) < IMPROBABLE);
+    if beyond_chance { (chi2 / freedom).max(1.0) } else { 1.0 }
+}

@@ -1,0 +1,135 @@
+//! Nonlinear least squares over many small items; knows no arms.
+//!
+//! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see the m × n Jacobian:
+//! it is reduced, block by block, to the triangular factor of its QR decomposition.
+
+mod derivative;
+mod identifiability;
+mod kernel;
+mod loss;
+mod objective;
+mod singular;
+pub mod solver;
+mod triangle;
+mod uncertainty;
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
+pub use identifiability::{BlindCombination, Identifiability};
+pub use loss::Loss;
+pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
+pub(crate) use singular::orthogonalise;
+pub use triangle::Triangle;
+pub use uncertainty::Uncertainty;
+
+/// Residuals of many small items, and their derivatives.
+pub trait LeastSquares: Sync {
+    /// Number of unknowns n.
+    fn parameters(&self) -> usize;
+
+    /// Number of items (poses).
+    fn items(&self) -> usize;
+
+    /// Residuals per item (3 for a position).
+    fn rows_per_item(&self) -> usize;
+
+    /// Writes the whitened residuals of `items`, item after item; a value that is not finite marks x as out of the domain.
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]);
+
+    /// Writes the whitened residuals of `items` and their derivatives ∂r/∂x.
+    ///
+    /// `block` comes filled with zeros and has exactly the rows of `items`.
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block);
+}
+
+/// A block of rows [∂r/∂x  r], stored column after column.
+#[derive(Debug, Clone)]
+pub struct Block {
+    rows: usize,
+    parameters: usize,
+    values: Vec<f64>,
+}
+
+impl Block {
+    /// A block of zeros with `rows` rows for `parameters` unknowns.
+    pub fn zeros(rows: usize, parameters: usize) -> Self {
+        Self { rows, parameters, values: vec![0.0; rows * (parameters + 1)] }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of unknowns n.
+    pub fn parameters(&self) -> usize {
+        self.parameters
+    }
+
+    /// Sets every value to zero.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// Changes the number of rows and sets every value to zero; keeps the memory.
+    pub fn reshape(&mut self, rows: usize) {
+        self.rows = rows;
+        self.values.clear();
+        self.values.resize(rows * (self.parameters + 1), 0.0);
+    }
+
+    /// Derivative of every row with respect to unknown `j`; `j = n` is the residual itself.
+    pub fn column(&self, j: usize) -> &[f64] {
+        &self.values[j * self.rows..(j + 1) * self.rows]
+    }
+
+    /// As [`Block::column`], to write.
+    pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
+        &mut self.values[j * self.rows..(j + 1) * self.rows]
+    }
+
+    /// All columns one after another, the residual last.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+}
+
+/// What solvers minimise: ½‖r(x)‖², given by its value and its triangular linearisation.
+pub trait Objective {
+    /// Number of unknowns n.
+    fn parameters(&self) -> usize;
+
+    /// ½‖r(x)‖² (½Σρ with a robust loss), or infinity outside the domain.
+    fn cost(&self, x: &DVector<f64>) -> f64;
+
+    /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
+    fn linearise(&self, x: &DVector<f64>) -> Linearisation;
+}
+
+impl<O: Objective + ?Sized> Objective for &O {
+    fn parameters(&self) -> usize {
+        (**self).parameters()
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> f64 {
+        (**self).cost(x)
+    }
+
+    fn linearise(&self, x: &DVector<f64>) -> Linearisation {
+        (**self).linearise(x)
+    }
+}
+
+/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest; rows are weighted where there is a robust loss.
+#[derive(Debug, Clone)]
+pub struct Linearisation {
+    /// ½‖r‖², or ½Σρ.
+    pub cost: f64,
+    /// R, upper triangular, n × n.
+    pub triangle: DMatrix<f64>,
+    /// The first n entries of Qᵀr.
+    pub projected: DVector<f64>,
+}

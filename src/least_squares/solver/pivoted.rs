@@ -1,0 +1,98 @@
+//! Linear least squares of full rank by column-pivoted QR, and its damped solutions.
+
+use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
+
+use super::factor::RADIUS_SLACK;
+use crate::least_squares::Triangle;
+
+/// Newton steps allowed to the secular equation before the singular values are asked.
+const SECULAR_ITERATIONS: usize = 20;
+
+/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B.
+#[derive(Debug, Clone)]
+pub(super) struct Pivoted {
+    /// R.
+    triangle: DMatrix<f64>,
+    /// `Qᵀc`.
+    projected: DVector<f64>,
+    /// 1/S in the order of the pivots.
+    inverse_sizes: DVector<f64>,
+    permutation: PermutationSequence<Dyn>,
+    /// q at λ = 0.
+    solution: DVector<f64>,
+}
+
+impl Pivoted {
+    /// Decomposes B, or gives nothing when `|Rₙₙ| ≤ tolerance·|R₁₁|`.
+    pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f64) -> Option<Self> {
+        let n = matrix.ncols();
+        if n == 0 || matrix.nrows() < n {
+            return None;
+        }
+        let mut unit = matrix.clone();
+        let mut inverse_sizes = DVector::from_element(n, 1.0);
+        for (mut column, inverse) in unit.column_iter_mut().zip(inverse_sizes.iter_mut()) {
+            let size = column.norm();
+            if size > 0.0 {
+                column /= size;
+                *inverse = size.recip();
+            }
+        }
+        let qr = unit.col_piv_qr();
+        let triangle = qr.r();
+        let largest = triangle[(0, 0)].abs();
+        if triangle.diagonal().iter().any(|d| d.abs() <= tolerance * largest) {
+            return None;
+        }
+        let mut projected = constant.clone();
+        qr.q_tr_mul(&mut projected);
+        let projected = projected.rows(0, n).into_owned();
+        let permutation = qr.p().clone();
+        permutation.permute_rows(&mut inverse_sizes);
+        let solution = solve(&triangle, &projected, &inverse_sizes)?;
+        Some(Self { triangle, projected, inverse_sizes, permutation, solution })
+    }
+
+    /// The minimiser of ‖B q + c‖.
+    pub(super) fn solution(&self) -> DVector<f64> {
+        self.in_order(self.solution.clone())
+    }
+
+    /// The minimiser with ‖q‖ = Δ to within the slack and its λ > 0, if Newton's method settles soon.
+    ///
+    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem      [Moré 1978, eqs. 5.8 and 5.9]
+    pub(super) fn limited(&self, radius: f64) -> Option<(DVector<f64>, f64)> {
+        let mut lambda = 0.0;
+        let mut q = self.solution.clone();
+        let mut triangle = self.triangle.clone();
+        for _ in 0..SECULAR_ITERATIONS {
+            let length = q.norm();
+            if length <= (1.0 + RADIUS_SLACK) * radius {
+                return Some((self.in_order(q), lambda));
+            }
+            let mut w = q.component_mul(&self.inverse_sizes) / length;
+            if !triangle.tr_solve_upper_triangular_mut(&mut w) {
+                return None;
+            }
+            lambda += (length - radius) / radius / w.norm_squared();
+            let damped = Triangle::damped(&self.triangle, &self.projected, &(&self.inverse_sizes * lambda.sqrt()));
+            q = solve(&damped.triangle, &damped.projected, &self.inverse_sizes)?;
+            triangle = damped.triangle;
+        }
+        None
+    }
+
+    fn in_order(&self, mut q: DVector<f64>) -> DVector<f64> {
+        self.permutation.inv_permute_rows(&mut q);
+        q
+    }
+}
+
+/// −S⁻¹ R⁻¹ c.
+fn solve(triangle: &DMatrix<f64>, projected: &DVector<f64>, inverse_sizes: &DVector<f64>) -> Option<DVector<f64>> {
+    let mut q = triangle.solve_upper_triangular(projected)?;
+    for (q, inverse) in q.iter_mut().zip(inverse_sizes) {
+        *q *= -inverse;
+    }
+    q.iter().all(|v| v.is_finite()).then_some(q)
+}

@@ -1,0 +1,153 @@
+//! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor scaled.
+
+use argmin::core::observers::Observe;
+use argmin::core::{Error, KV, Problem, Solver};
+use argmin::kv;
+use nalgebra::DVector;
+
+use super::divergence::Watch;
+use super::execute::{Ends, Silent, run};
+use super::spectrum::Spectrum;
+use super::trust_region::{stopped, take_point};
+use super::{Divergence, Solution, State, Termination};
+use crate::least_squares::{Linearisation, Objective};
+
+/// When to stop, and which directions count as seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PseudoInverseSettings {
+    /// Singular values σᵢ ≤ `tolerance`·σ₁ of J are dropped; 0 keeps every one that is not zero. Default 1e-8.
+    pub tolerance: f64,
+    /// Smallest step worth another: ‖p‖ ≤ `step_tolerance` (‖x‖ + `step_tolerance`); default 1e-10.
+    pub step_tolerance: f64,
+    /// Largest number of steps; default 100.
+    pub max_iterations: u64,
+    /// When to give up; see [`Divergence`].
+    pub divergence: Divergence,
+}
+
+impl Default for PseudoInverseSettings {
+    fn default() -> Self {
+        Self { tolerance: 1e-8, step_tolerance: 1e-10, max_iterations: 100, divergence: Divergence::default() }
+    }
+}
+
+/// The pseudo-inverse iteration of the paper.
+///
+/// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁            [Chen2021, eq. 45]
+///
+/// R = U Σ Vᵀ is the n × n triangular factor of J = ∂r/∂x, in the units of the unknowns as they come: the paper scales
+/// nothing, so which directions are dropped depends on those units. Every step is taken in full.
+#[derive(Debug, Clone)]
+pub struct PseudoInverse {
+    settings: PseudoInverseSettings,
+    watch: Watch,
+    linearisation: Option<Linearisation>,
+    termination: Option<Termination>,
+}
+
+impl PseudoInverse {
+    /// The iteration with these settings.
+    pub fn new(settings: PseudoInverseSettings) -> Self {
+        Self { settings, watch: Watch::new(settings.divergence), linearisation: None, termination: None }
+    }
+
+    /// Why it stopped, once it has.
+    pub fn termination(&self) -> Option<Termination> {
+        self.termination
+    }
+
+    fn stop(&mut self, state: State, termination: Termination) -> State {
+        self.termination = Some(termination);
+        stopped(state, termination)
+    }
+
+    /// Looks at a new point; the reason to stop there, if there is one.
+    fn take_in(&mut self, linearisation: Linearisation) -> Option<Termination> {
+        let Linearisation { cost, triangle, projected } = &linearisation;
+        let termination = if self.watch.diverges(*cost) {
+            Some(Termination::Diverged)
+        } else if !triangle.iter().chain(projected.iter()).all(|value| value.is_finite()) {
+            Some(Termination::DerivativesNotFinite)
+        } else if *cost == 0.0 {
+            Some(Termination::ZeroResidual)
+        } else {
+            None
+        };
+        self.linearisation = Some(linearisation);
+        termination
+    }
+}
+
+impl Ends for PseudoInverse {
+    fn end(&self) -> Option<Termination> {
+        self.termination
+    }
+}
+
+/// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁ are dropped.
+///
+/// R and Qᵀr must be finite.
+pub fn minimum_norm_step(linearisation: &Linearisation, tolerance: f64) -> DVector<f64> {
+    let Linearisation { triangle, projected, .. } = linearisation;
+    Spectrum::new(triangle, projected, tolerance.max(0.0)).solution(0.0, projected.len())
+}
+
+impl<O: Objective> Solver<O, State> for PseudoInverse {
+    fn name(&self) -> &'static str {
+        "pseudo-inverse"
+    }
+
+    fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+        let x = take_point(&mut state)?;
+        if problem.problem.as_ref().map(Objective::parameters) != Some(x.len()) {
+            return Ok((self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch), None));
+        }
+        let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
+        let cost = linearisation.cost;
+        let termination = match self.take_in(linearisation) {
+            Some(Termination::Diverged) => Some(Termination::OutsideDomainAtStart),
+            other => other,
+        };
+        let state = state.param(x).cost(cost);
+        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
+    }
+
+    fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+        let x = take_point(&mut state)?;
+        let step = self.linearisation.take().map_or_else(
+            || DVector::zeros(x.len()),
+            |linearisation| minimum_norm_step(&linearisation, self.settings.tolerance),
+        );
+        let length = step.norm();
+        let point = &x + step;
+        let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&point)))?;
+        let cost = linearisation.cost;
+        let size = point.norm() + self.settings.step_tolerance;
+        let settled = (length <= self.settings.step_tolerance * size).then_some(Termination::Step);
+        let termination = self.take_in(linearisation).or(settled);
+        let state = state.param(point).cost(if cost.is_nan() { f64::INFINITY } else { cost });
+        let log = kv!("length" => length;);
+        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
+    }
+}
+
+/// Minimises ½‖r(x)‖² from `start` by the pseudo-inverse iteration.
+///
+/// Where it does not converge, x is the best point it has seen, which may be `start`.
+pub fn minimise_pseudo_inverse<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    settings: &PseudoInverseSettings,
+) -> Solution {
+    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, None::<Silent>)
+}
+
+/// As [`minimise_pseudo_inverse`], telling `observer` of every iteration.
+pub fn minimise_pseudo_inverse_observed<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    settings: &PseudoInverseSettings,
+    observer: impl Observe<State> + 'static,
+) -> Solution {
+    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, Some(observer))
+}

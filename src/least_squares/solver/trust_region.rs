@@ -1,0 +1,266 @@
+//! The outer loop that every solver here shares: try a step, compare with the prediction, move or shrink.
+
+use argmin::core::{ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason};
+use argmin::kv;
+use nalgebra::DVector;
+
+use super::{Settings, Termination};
+use crate::least_squares::{Linearisation, Objective};
+
+/// The part of argmin's state in use: x and ½‖r‖².
+pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
+
+/// A step is taken when ρ reaches this.
+const ACCEPT: f64 = 1e-4;
+/// The radius grows when ρ reaches this.
+const GOOD: f64 = 0.75;
+
+/// A step within the radius, as the linearised problem sees it.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// x + p.
+    pub point: DVector<f64>,
+    /// ‖D p‖.
+    pub length: f64,
+    /// −gᵀp, the reduction of ½‖r‖² to first order.
+    pub slope: f64,
+    /// ½‖r‖² − ½‖J p + r‖².
+    pub predicted: f64,
+    /// λ, zero when the radius did not matter.
+    pub damping: f64,
+}
+
+impl Step {
+    /// No step at all, which stops the solver.
+    pub(super) fn none(x: &DVector<f64>) -> Self {
+        Self { point: x.clone(), length: 0.0, slope: 0.0, predicted: 0.0, damping: 0.0 }
+    }
+}
+
+/// How a solver chooses its step from a linearisation.
+pub trait Subproblem {
+    /// Name of the solver.
+    fn name(&self) -> &'static str;
+
+    /// Moves a start to where the problem may be evaluated; false when sizes differ.
+    fn admit(&self, start: &mut DVector<f64>) -> bool;
+
+    /// Takes in the linearised problem at x; D is `scale`.
+    fn prepare(&mut self, x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings);
+
+    /// Component j of the gradient g, or zero where a constraint holds x back.
+    fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64;
+
+    /// Takes out of a gradient whose columns are divided by `scale` what constraints at x hold back.
+    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
+        let _ = scale;
+        (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
+    }
+
+    /// The best step with ‖D p‖ ≤ `radius` to within 10 %.
+    fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step;
+}
+
+/// Trust-region least squares after Moré, over any choice of step.
+///
+/// Dⱼ is the largest ‖Jⱼ‖ seen so far, so the path does not depend on the units of the unknowns. Radius and gain
+/// ratio follow MINPACK's `lmder` [Moré 1978].
+#[derive(Debug, Clone)]
+pub struct TrustRegion<S> {
+    subproblem: S,
+    settings: Settings,
+    scale: DVector<f64>,
+    radius: Option<f64>,
+    termination: Option<Termination>,
+}
+
+impl<S: Subproblem> TrustRegion<S> {
+    /// The loop around `subproblem`.
+    pub fn new(subproblem: S, settings: Settings) -> Self {
+        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, termination: None }
+    }
+
+    /// Why it stopped, once it has.
+    pub fn termination(&self) -> Option<Termination> {
+        self.termination
+    }
+
+    /// The choice of step.
+    pub fn subproblem(&self) -> &S {
+        &self.subproblem
+    }
+
+    fn stop(&mut self, state: State, termination: Termination) -> State {
+        self.termination = Some(termination);
+        stopped(state, termination)
+    }
+
+    /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is one.
+    fn take_in(&mut self, x: &DVector<f64>, linearisation: &Linearisation) -> Option<Termination> {
+        let Linearisation { cost, triangle, projected } = linearisation;
+        if !triangle.iter().chain(projected.iter()).all(|v| v.is_finite()) {
+            return Some(Termination::DerivativesNotFinite);
+        }
+        if *cost == 0.0 {
+            return Some(Termination::ZeroResidual);
+        }
+        let norms = DVector::from_iterator(x.len(), triangle.column_iter().map(|c| c.norm()));
+        if !norms.iter().all(|norm| norm.is_finite()) {
+            return Some(Termination::DerivativesNotFinite);
+        }
+        let lengths = norms.map(|norm| if norm == 0.0 { 1.0 } else { norm });
+        self.scale = match self.radius {
+            None => lengths.clone(),
+            Some(_) => self.scale.sup(&norms),
+        };
+        let residual = (2.0 * cost).sqrt();
+        let mut gradient = DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
+        self.subproblem.hold_back(x, &lengths, &mut gradient);
+        let cosine = gradient.amax() / residual;
+        if cosine <= self.settings.gradient_tolerance {
+            return Some(Termination::Gradient);
+        }
+        if cosine <= f64::EPSILON {
+            return Some(Termination::GradientPrecision);
+        }
+        self.subproblem.prepare(x, linearisation, &self.scale, &self.settings);
+        if self.radius.is_none() {
+            let length = self.scale.component_mul(x).norm();
+            let factor = self.settings.initial_radius;
+            self.radius = Some(residual.max(if length > 0.0 { factor * length } else { factor }));
+        }
+        None
+    }
+
+    /// The tests of MINPACK after a step, with relative reductions.
+    fn judge(&self, trial: &Trial, size: f64) -> Option<Termination> {
+        let settings = &self.settings;
+        if trial.damping > 0.0 && trial.ratio >= GOOD {
+            // Held back by the radius only, which is about to grow: a short step says nothing yet.
+            return None;
+        }
+        let settled = |tolerance: f64| {
+            trial.actual.abs() <= tolerance && trial.predicted <= tolerance && 0.5 * trial.ratio <= 1.0
+        };
+        if settled(settings.cost_tolerance) {
+            return Some(Termination::Cost);
+        }
+        if trial.length <= settings.step_tolerance * size {
+            return Some(if trial.cost.is_finite() { Termination::Step } else { Termination::DomainEdge });
+        }
+        if settled(f64::EPSILON) {
+            return Some(Termination::CostPrecision);
+        }
+        if self.radius.is_some_and(|radius| radius <= f64::EPSILON * size) {
+            return Some(if trial.cost.is_finite() { Termination::StepPrecision } else { Termination::DomainEdge });
+        }
+        None
+    }
+}
+
+/// A step tried: reductions relative to the cost before it.
+struct Trial {
+    cost: f64,
+    actual: f64,
+    predicted: f64,
+    slope: f64,
+    ratio: f64,
+    length: f64,
+    damping: f64,
+}
+
+impl Trial {
+    fn new(step: &Step, before: f64, after: f64) -> Self {
+        // A cost a hundred times the old one carries no information on curvature.
+        let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
+        let predicted = step.predicted / before;
+        let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
+        Self {
+            cost: after,
+            actual,
+            predicted,
+            slope: step.slope / before,
+            ratio,
+            length: step.length,
+            damping: step.damping,
+        }
+    }
+
+    fn next_radius(&self, radius: f64) -> f64 {
+        if self.ratio <= 0.25 {
+            // The minimum of the parabola through the two costs and the slope, between a tenth and a half.
+            let shrink = if self.actual >= 0.0 { 0.5 } else { 0.5 * self.slope / (self.slope - self.actual) };
+            let shrink = if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
+            shrink * radius.min(10.0 * self.length)
+        } else if self.ratio >= GOOD || self.damping == 0.0 {
+            2.0 * self.length
+        } else {
+            radius
+        }
+    }
+}
+
+/// The state of a solver that stops for a reason of its own.
+pub(super) fn stopped(state: State, termination: Termination) -> State {
+    state.terminate_with(if termination.converged() {
+        TerminationReason::SolverConverged
+    } else {
+        TerminationReason::SolverExit(termination.to_string())
+    })
+}
+
+/// x out of argmin's state.
+pub(super) fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
+    let text = "a solver needs a start".to_owned();
+    state.take_param().ok_or_else(|| ArgminError::NotInitialized { text }.into())
+}
+
+impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
+    fn name(&self) -> &str {
+        self.subproblem.name()
+    }
+
+    fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+        let mut x = take_point(&mut state)?;
+        let parameters = problem.problem.as_ref().map(Objective::parameters);
+        if parameters != Some(x.len()) || !self.subproblem.admit(&mut x) {
+            return Ok((self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch), None));
+        }
+        let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
+        let termination = if linearisation.cost.is_finite() {
+            self.take_in(&x, &linearisation)
+        } else {
+            Some(Termination::OutsideDomainAtStart)
+        };
+        let state = state.param(x).cost(linearisation.cost);
+        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
+    }
+
+    fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+        let x = take_point(&mut state)?;
+        let cost = state.get_cost();
+        let first = state.get_iter() == 0;
+        let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
+        let step = self.subproblem.step(&x, radius);
+        if first {
+            radius = radius.min(step.length);
+        }
+        let after = problem.problem("cost_count", |o| Ok(o.cost(&step.point)))?;
+        let trial = Trial::new(&step, cost, if after.is_nan() { f64::INFINITY } else { after });
+        self.radius = Some(trial.next_radius(radius));
+        let taken = trial.ratio >= ACCEPT;
+        let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
+        let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
+        let mut termination = self.judge(&trial, size);
+        let state = if taken {
+            if termination.is_none() {
+                let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
+                termination = self.take_in(&step.point, &linearisation);
+            }
+            state.param(step.point).cost(trial.cost)
+        } else {
+            state.param(x).cost(cost)
+        };
+        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
+    }
+}

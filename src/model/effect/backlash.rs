@@ -1,0 +1,39 @@
+//! `backlash`: play, Δθ = (b/2)·approach; without directions of approach the moment M_z decides.
+
+use super::conditions::NO_LOADS;
+use super::place::{commanded, slides};
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{JointField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "backlash",
+    terms: |effect, problem| match effect {
+        Effect::Backlash { joint } => {
+            let slides = slides(problem, *joint);
+            let field = if slides { JointField::SlidingPlay } else { JointField::Play };
+            let slot = Slot::Joint { joint: joint - 1, field };
+            vec![Term::constant("width", slot, 0.01)]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let candidate = |joint: usize| {
+            let effect = Effect::Backlash { joint };
+            if conditions.approach {
+                let both = conditions.both_sides.get(joint - 1).copied().unwrap_or(false);
+                Candidate::needing(effect, both, "the joint was not approached from both sides")
+            } else if slides(problem, joint) {
+                Candidate::needing(effect, false, "no directions of approach, and moments move nothing along a slide")
+            } else {
+                Candidate::needing(effect, conditions.weighs(), NO_LOADS)
+            }
+        };
+        commanded(problem).map(candidate).collect()
+    },
+    describe: |effect| match effect {
+        Effect::Backlash { joint } => format!("play in joint {joint}"),
+        _ => String::new(),
+    },
+};

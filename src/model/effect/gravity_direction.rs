@@ -1,0 +1,23 @@
+//! `gravity-direction`: gravity is turned by (r_x, r_y, 0).
+
+use super::conditions::NO_LOADS;
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{ArmField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "gravity-direction",
+    terms: |effect, _| match effect {
+        Effect::GravityDirection => vec![
+            Term::constant("about_x", Slot::Arm(ArmField::GravityX), 0.1),
+            Term::constant("about_y", Slot::Arm(ArmField::GravityY), 0.1),
+        ],
+        _ => Vec::new(),
+    },
+    candidates: |_, conditions| vec![Candidate::needing(Effect::GravityDirection, conditions.weighs(), NO_LOADS)],
+    describe: |effect| match effect {
+        Effect::GravityDirection => "the base does not stand level".to_owned(),
+        _ => String::new(),
+    },
+};

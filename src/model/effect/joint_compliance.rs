@@ -1,0 +1,27 @@
+//! `joint-compliance`: a joint declared rigid turns by Δθ = c M_z.
+
+use super::conditions::NO_LOADS;
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{JointField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "joint-compliance",
+    terms: |effect, _| match effect {
+        Effect::JointCompliance { joint } => {
+            let slot = Slot::Joint { joint: joint - 1, field: JointField::Compliance };
+            vec![Term::constant("compliance", slot, 1e-3).never_negative()]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.stiffness.is_none());
+        let effect = |(index, _)| Effect::JointCompliance { joint: index + 1 };
+        rigid.map(|joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS)).collect()
+    },
+    describe: |effect| match effect {
+        Effect::JointCompliance { joint } => format!("joint {joint} gives way about its axis"),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,30 @@
+//! `joint-lateral-compliance`: bearings tilt by (c_x M_x, c_y M_y, 0) before the joint turns.
+
+use super::conditions::NO_LOADS;
+use super::place::commanded;
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{JointField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "joint-lateral-compliance",
+    terms: |effect, _| match effect {
+        Effect::JointLateralCompliance { joint } => {
+            let slot = |field| Slot::Joint { joint: joint - 1, field };
+            vec![
+                Term::constant("about_x", slot(JointField::LateralX), 1e-3).never_negative(),
+                Term::constant("about_y", slot(JointField::LateralY), 1e-3).never_negative(),
+            ]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let effect = |joint| Effect::JointLateralCompliance { joint };
+        commanded(problem).map(|joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS)).collect()
+    },
+    describe: |effect| match effect {
+        Effect::JointLateralCompliance { joint } => format!("joint {joint} tilts across its axis"),
+        _ => String::new(),
+    },
+};

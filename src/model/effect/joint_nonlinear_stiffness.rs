@@ -1,0 +1,33 @@
+//! `joint-nonlinear-stiffness`: Δθ = c₃ M_z³ beyond the linear torsion.
+
+use super::conditions::NO_LOADS;
+use super::place::greatest_moment;
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{JointField, Slot};
+use crate::problem::Effect;
+
+/// More than any joint turns under the greatest conceivable moment [rad].
+const MOST: f64 = 0.1;
+/// Moment below which arms are not told apart [N·m].
+const LEAST_MOMENT: f64 = 10.0;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "joint-nonlinear-stiffness",
+    terms: |effect, problem| match effect {
+        Effect::JointNonlinearStiffness { joint } => {
+            let slot = Slot::Joint { joint: joint - 1, field: JointField::Cubic };
+            vec![Term::constant("cubic", slot, MOST / greatest_moment(problem, *joint).max(LEAST_MOMENT).powi(3))]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let effect = |joint| Effect::JointNonlinearStiffness { joint };
+        let candidate = |joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS);
+        (1..=problem.joints.len()).map(candidate).collect()
+    },
+    describe: |effect| match effect {
+        Effect::JointNonlinearStiffness { joint } => format!("stiffness of joint {joint} changes with its load"),
+        _ => String::new(),
+    },
+};

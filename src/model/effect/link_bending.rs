@@ -1,0 +1,30 @@
+//! `link-bending`: uniform flexibility 1/EI of a link declared rigid.
+
+use super::conditions::NO_LOADS;
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{BeamField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "link-bending",
+    terms: |effect, _| match effect {
+        Effect::LinkBending { joint } => {
+            let slot = Slot::Beam { joint: joint - 1, field: BeamField::Flexibility };
+            vec![Term::constant("flexibility", slot, 1e-2).never_negative()]
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let bends = |joint: &crate::problem::Joint| {
+            joint.beam.as_ref().is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
+        };
+        let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.a != 0.0 && !bends(joint));
+        let effect = |(index, _)| Effect::LinkBending { joint: index + 1 };
+        rigid.map(|link| Candidate::needing(effect(link), conditions.weighs(), NO_LOADS)).collect()
+    },
+    describe: |effect| match effect {
+        Effect::LinkBending { joint } => format!("the link before joint {joint} bends"),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,30 @@
+//! `link-thermal-bending`: curvature (k_y, k_z)·(T − T₀) along a beam.
+
+use super::conditions::NO_TEMPERATURE;
+use super::place::{carrier, links};
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{BeamField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "link-thermal-bending",
+    terms: |effect, problem| match effect {
+        Effect::LinkThermalBending { link } => {
+            let slots = |joint| {
+                [("about_y", BeamField::WarmingY), ("about_z", BeamField::WarmingZ)]
+                    .map(|(name, field)| Term::constant(name, Slot::Beam { joint, field }, 1e-3))
+            };
+            carrier(problem, link).map_or_else(Vec::new, |joint| slots(joint).to_vec())
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let effect = |link| Effect::LinkThermalBending { link };
+        links(problem).map(|link| Candidate::needing(effect(link), conditions.temperature, NO_TEMPERATURE)).collect()
+    },
+    describe: |effect| match effect {
+        Effect::LinkThermalBending { link } => format!("link {link} bows with temperature"),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,27 @@
+//! `link-thermal-expansion`: strain α (T − T₀) of a beam.
+
+use super::conditions::NO_TEMPERATURE;
+use super::place::{carrier, links};
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{BeamField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "link-thermal-expansion",
+    terms: |effect, problem| match effect {
+        Effect::LinkThermalExpansion { link } => {
+            let term = |joint| Term::constant("strain", Slot::Beam { joint, field: BeamField::Expansion }, 1e-3);
+            carrier(problem, link).map(term).into_iter().collect()
+        }
+        _ => Vec::new(),
+    },
+    candidates: |problem, conditions| {
+        let effect = |link| Effect::LinkThermalExpansion { link };
+        links(problem).map(|link| Candidate::needing(effect(link), conditions.temperature, NO_TEMPERATURE)).collect()
+    },
+    describe: |effect| match effect {
+        Effect::LinkThermalExpansion { link } => format!("link {link} grows with temperature"),
+        _ => String::new(),
+    },
+};

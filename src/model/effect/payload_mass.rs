@@ -1,0 +1,25 @@
+//! `payload-mass`: the payload is heavier by m whenever one is carried.
+
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{ArmField, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "payload-mass",
+    terms: |effect, _| match effect {
+        Effect::PayloadMass => vec![Term::constant("mass", Slot::Arm(ArmField::Payload), 2.0)],
+        _ => Vec::new(),
+    },
+    candidates: |_, conditions| {
+        vec![Candidate::needing(
+            Effect::PayloadMass,
+            conditions.payload && conditions.weighs(),
+            "no payload is carried",
+        )]
+    },
+    describe: |effect| match effect {
+        Effect::PayloadMass => "payloads are heavier than declared".to_owned(),
+        _ => String::new(),
+    },
+};

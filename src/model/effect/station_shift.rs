@@ -1,0 +1,25 @@
+//! `station-shift`: measured positions are moved by d from a time on.
+
+use super::{Candidate, Family, Term};
+use crate::model::parameter::{Driver, Slot};
+use crate::problem::Effect;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "station-shift",
+    terms: |effect, _| match effect {
+        Effect::StationShift { at_time } => ["x", "y", "z"]
+            .into_iter()
+            .enumerate()
+            .map(|(axis, name)| Term::driven(name, Slot::Shift { axis }, Driver::Since(*at_time), 5e-3))
+            .collect(),
+        _ => Vec::new(),
+    },
+    candidates: |_, conditions| {
+        conditions.times.iter().map(|&at_time| Candidate::of(Effect::StationShift { at_time })).collect()
+    },
+    describe: |effect| match effect {
+        Effect::StationShift { at_time } => format!("the measuring station moved at {at_time} s"),
+        _ => String::new(),
+    },
+};

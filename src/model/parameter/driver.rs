@@ -1,0 +1,155 @@
+//! What a parameter is multiplied by, pose by pose.
+
+use crate::mechanics::Setup;
+
+/// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the observation.
+///
+/// Joints are counted from 0; configurations are those commanded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Driver {
+    /// 1: the parameter acts the same in every pose.
+    Constant,
+    /// 1, for what is added to a parameter that acts at the same place.
+    Unit,
+    /// q of a joint that turns [rad].
+    Command(usize),
+    /// q of a joint that slides [m].
+    Travel(usize),
+    /// sin kq.
+    Sine(usize, u32),
+    /// cos kq.
+    Cosine(usize, u32),
+    /// Temperature above the reference [K].
+    Warming {
+        /// T₀ [°C].
+        reference: f64,
+    },
+    /// Time since the first pose [s].
+    Elapsed,
+    /// 1 from a time on [s], 0 before.
+    Since(f64),
+    /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
+    Spline {
+        /// The quantity.
+        of: Quantity,
+        /// Where it begins, in the quantity's unit.
+        begin: f64,
+        /// Length of an interval.
+        step: f64,
+    },
+    /// exp(−u²/2) with u = (quantity − centre) / width.
+    Bump {
+        /// The quantity.
+        of: Quantity,
+        /// Where it is highest, in the quantity's unit.
+        centre: f64,
+        /// Its width, in the quantity's unit.
+        width: f64,
+    },
+    /// tanh u with u = (quantity − centre) / width.
+    Step {
+        /// The quantity.
+        of: Quantity,
+        /// Where it is steepest, in the quantity's unit.
+        centre: f64,
+        /// Its width, in the quantity's unit.
+        width: f64,
+    },
+}
+
+/// A quantity that is known of every pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Quantity {
+    /// q of a joint [rad] or [m], joints counted from 0.
+    Command(usize),
+    /// Temperature [°C].
+    Temperature,
+    /// Time since the first pose [s].
+    Elapsed,
+    /// Payload [kg].
+    Payload,
+    /// Hoist force [N].
+    Hoist,
+}
+
+impl Quantity {
+    /// Its value in a pose; 0 where nobody knows.
+    pub fn value(self, setup: &Setup) -> f64 {
+        match self {
+            Self::Command(joint) => setup.configuration[joint],
+            Self::Temperature => setup.temperature.unwrap_or(0.0),
+            Self::Elapsed => setup.elapsed,
+            Self::Payload => setup.payload.unwrap_or(0.0),
+            Self::Hoist => setup.hoist.unwrap_or(0.0),
+        }
+    }
+}
+
+impl Driver {
+    /// Its value in a pose.
+    pub fn value(self, setup: &Setup) -> f64 {
+        match self {
+            Self::Constant | Self::Unit => 1.0,
+            Self::Command(joint) | Self::Travel(joint) => setup.configuration[joint],
+            Self::Sine(joint, order) => (f64::from(order) * setup.configuration[joint]).sin(),
+            Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
+            Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
+            Self::Elapsed => setup.elapsed,
+            Self::Since(time) => f64::from(setup.time >= time),
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
+        }
+    }
+
+    /// The value of a function of one quantity at a value of that quantity; 0 for other drivers.
+    pub fn at(self, quantity: f64) -> f64 {
+        match self {
+            Self::Spline { begin, step, .. } => cubic((quantity - begin) / step),
+            Self::Bump { centre, width, .. } => (-0.5 * ((quantity - centre) / width).powi(2)).exp(),
+            Self::Step { centre, width, .. } => ((quantity - centre) / width).tanh(),
+            _ => 0.0,
+        }
+    }
+
+    /// Whether it depends on what the joints are told.
+    pub fn follows_commands(self) -> bool {
+        match self {
+            Self::Command(_) | Self::Travel(_) | Self::Sine(..) | Self::Cosine(..) => true,
+            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
+                matches!(of, Quantity::Command(_))
+            }
+            Self::Constant | Self::Unit | Self::Warming { .. } | Self::Elapsed | Self::Since(_) => false,
+        }
+    }
+
+    /// Whether the parameter acts the same in every pose.
+    pub fn is_constant(self) -> bool {
+        self == Self::Constant
+    }
+}
+
+/// The uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
+fn cubic(u: f64) -> f64 {
+    let v = 2.0 - (u - 2.0).abs();
+    match v {
+        v if v <= 0.0 => 0.0,
+        v if v <= 1.0 => v * v * v / 6.0,
+        v => {
+            let w = 2.0 - v;
+            (4.0 - 6.0 * w * w + 3.0 * w * w * w) / 6.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn splines_add_up_to_one() {
+        for k in 0..40 {
+            let u = 0.025 * f64::from(k);
+            let sum: f64 = (0..4).map(|shift| cubic(u + f64::from(shift))).sum();
+            assert!((sum - 1.0).abs() < 1e-14, "{u}: {sum}");
+        }
+    }
+}

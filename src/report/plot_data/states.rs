@@ -1,0 +1,102 @@
+//! States of the arm on its way from nominal to best, and their errors pose by pose.
+
+use nalgebra::{DVector, Vector3};
+
+use super::model_of;
+use crate::identify::{Identification, IdentifyError, Options, Placement, identify_model};
+use crate::measurement::{Measurements, Split};
+use crate::model::{Ablation, Model, PoseResiduals};
+use crate::problem::Problem;
+
+/// What has been done for the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stand {
+    /// Nothing but to find where base and target are, where these are free.
+    Registered,
+    /// Geometry identified, elasticity left out of the model.
+    GeometryOnly,
+    /// Geometry and elasticity identified.
+    Elastic,
+    /// Identified, where there is nothing to say on elasticity.
+    Identified,
+    /// Identified with the effects that the loop found.
+    Closed,
+}
+
+/// The errors of one state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// Which.
+    pub stand: Stand,
+    /// Errors measured − predicted of the held-out poses, measuring frame [m].
+    pub errors: Vec<Vector3<f64>>,
+}
+
+/// An arm that predicts.
+#[derive(Debug, Clone)]
+pub(super) struct Arm {
+    pub model: Model,
+    /// Full parameter vector.
+    pub x: DVector<f64>,
+}
+
+impl Arm {
+    /// As identified.
+    pub fn of(problem: &Problem, sight: &Sight, found: &Identification) -> Result<Self, IdentifyError> {
+        Ok(Self { model: model_of(problem, &sight.placement)?, x: found.x.clone() })
+    }
+}
+
+/// The measurements that a picture is made from.
+pub(super) struct Sight<'a> {
+    pub measurements: &'a Measurements,
+    pub split: &'a Split,
+    pub placement: Placement,
+}
+
+impl<'a> Sight<'a> {
+    pub fn new(measurements: &'a Measurements, split: &'a Split) -> Self {
+        Self { measurements, split, placement: Placement::of(measurements) }
+    }
+
+    /// Residuals of some rows, measuring frame [m].
+    pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
+        let poses = self.placement.poses(self.measurements, rows, 1.0);
+        PoseResiduals::new(&arm.model, poses, Vec::new(), arm.x.clone()).position_errors(&DVector::zeros(0))
+    }
+
+    /// Errors of an arm on the held-out poses.
+    pub fn state(&self, stand: Stand, arm: &Arm) -> State {
+        State { stand, errors: self.errors(arm, &self.split.held_out) }
+    }
+
+    /// The nominal arm, with bases and targets fitted where they are free.
+    pub fn nominal(&self, problem: &Problem, model: &Model) -> Result<State, IdentifyError> {
+        let mut model = model.clone();
+        model.parameters.retain(|parameter| parameter.slot.is_placement());
+        model.constraints.clear();
+        // As an identification does before it applies any loss.
+        let plain = Problem { robust: None, ..problem.clone() };
+        let x = if model.parameters.is_empty() { DVector::zeros(0) } else { self.fitted(&plain, &model)? };
+        Ok(self.state(Stand::Registered, &Arm { model, x }))
+    }
+
+    /// Geometry alone, where there is elasticity to leave out.
+    pub fn rigid(&self, problem: &Problem, model: &Model) -> Result<Option<State>, IdentifyError> {
+        if !is_elastic(model) {
+            return Ok(None);
+        }
+        let model = model.ablated(Ablation::Rigid);
+        let x = self.fitted(problem, &model)?;
+        Ok(Some(self.state(Stand::GeometryOnly, &Arm { model, x })))
+    }
+
+    fn fitted(&self, problem: &Problem, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+        Ok(identify_model(model, problem, self.measurements, self.split, &Options::default())?.x)
+    }
+}
+
+/// Whether stiffnesses or rigidities are free.
+pub(super) fn is_elastic(model: &Model) -> bool {
+    model.parameters.iter().any(|parameter| parameter.slot.is_elastic())
+}

@@ -1,0 +1,113 @@
+//! The virtual test rig: positions of an arm from many short rigid segments and lumped springs.
+//!
+//! The rig shares frames (`spatial`) and the declared arm (`problem`) with the rest of the program and no physics: it
+//! is what the model is tested against. Every beam is cut into segments, each of three rigid parts and two springs that
+//! stretch, bend about y and z, and twist; joints have torsion springs. Loads act on the deformed arm, which is brought
+//! to static equilibrium; the error falls at least with the square of the number of segments.
+//!
+//! A [`Truth`] (`TRUTH.toml`, see `docs/truth.md`) says how the true arm differs from the declared one, and
+//! [`simulate`] measures it in poses drawn at random.
+
+mod build;
+mod chain;
+mod command;
+mod draw;
+mod effect;
+mod equilibrium;
+mod link;
+mod output;
+mod parameters;
+mod ranges;
+mod read;
+mod strengths;
+mod truth;
+
+use nalgebra::Vector3;
+
+use crate::problem::{Effect, Problem};
+use crate::spatial::Frame;
+use equilibrium::AtRest;
+
+pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate};
+pub use effect::{Cause, Shape, TrueEffect, ValueCount};
+pub use parameters::{ParameterKind, TrueParameter};
+pub use truth::{Deviation, HeldOutRows, PoseRanges, RandomRule, Truth};
+
+/// Segments per beam where nobody asks for another number.
+pub const SEGMENTS: usize = 16;
+
+/// The true arm on its test bench.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    arm: Problem,
+    effects: Vec<TrueEffect>,
+    segments: usize,
+}
+
+/// What the controller and the test bench set for one pose.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Conditions {
+    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
+    pub configuration: Vec<f64>,
+    /// Payload [kg]; `None`: as the problem declares.
+    pub payload: Option<f64>,
+    /// Hoist force [N]; `None`: as the problem declares.
+    pub hoist: Option<f64>,
+    /// Temperature [°C]; `None`: the reference.
+    pub temperature: Option<f64>,
+    /// Time [s].
+    pub time: f64,
+    /// Time of the first pose [s].
+    pub first_time: f64,
+    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; empty where nobody knows.
+    pub approach: Vec<f64>,
+}
+
+/// A pose in which the arm does not come to rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the arm does not come to rest: too soft for its loads")]
+pub struct NoRest;
+
+impl Rig {
+    /// An arm with its true parameters and the effects at work; its base, tool, gravity and T₀ are those of `arm`.
+    pub fn new(arm: Problem, effects: Vec<TrueEffect>) -> Self {
+        Self { arm, effects, segments: SEGMENTS }
+    }
+
+    /// Cuts every beam into that many segments, at least one.
+    #[must_use]
+    pub fn with_segments(mut self, segments: usize) -> Self {
+        self.segments = segments.max(1);
+        self
+    }
+
+    /// What the tracker reads for the target in static equilibrium, without noise, measuring frame [m].
+    ///
+    /// # Errors
+    /// The arm is too soft for its loads.
+    pub fn position(&self, conditions: &Conditions) -> Result<Vector3<f64>, NoRest> {
+        let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
+        let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
+        let seen = base.point(&rest.end.point(&self.arm.tool.target));
+        if seen.iter().all(|x| x.is_finite()) { Ok(self.track(seen, conditions)) } else { Err(NoRest) }
+    }
+
+    /// What the tracker makes of a position [m].
+    fn track(&self, seen: Vector3<f64>, conditions: &Conditions) -> Vector3<f64> {
+        let mut scale = 1.0;
+        let mut moved = Vector3::zeros();
+        for part in self.effects.iter().filter_map(TrueEffect::parts) {
+            match part {
+                (Effect::TrackerScale, [error]) => scale += error,
+                (Effect::TrackerDrift, [x, y, z]) => {
+                    moved += Vector3::new(*x, *y, *z) * (conditions.time - conditions.first_time);
+                }
+                (Effect::StationShift { at_time }, [x, y, z]) if conditions.time >= *at_time => {
+                    moved += Vector3::new(*x, *y, *z);
+                }
+                _ => {}
+            }
+        }
+        seen * scale + moved
+    }
+}

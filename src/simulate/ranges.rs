@@ -1,0 +1,95 @@
+//! The section `[poses]`.
+
+use super::truth::{HeldOutRows, PoseRanges};
+use crate::error::{InputError, InputErrorKind};
+use crate::problem::item::Item;
+use crate::problem::section::Section;
+use crate::problem::{Joint, JointKind};
+use crate::quantity::suffix::{ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
+
+/// Part of the rows that is held out where the file says nothing.
+const HELD_OUT: f64 = 0.3;
+/// Seconds between poses where the file says nothing.
+const TIME_STEP: f64 = 60.0;
+
+pub(super) fn read(mut section: Section<'_, '_>, joints: &[Joint]) -> Result<PoseRanges, InputError> {
+    let joints = joints.iter().enumerate();
+    let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.kind));
+    let joints = joints.collect::<Result<_, _>>()?;
+    let payloads = payloads(&mut section)?;
+    let hoist = range(&mut section, "hoist", &FORCE)?;
+    let temperature = range(&mut section, "temperature", &TEMPERATURE)?;
+    let time_step = time_step(&mut section)?;
+    let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
+    let held_out = held_out(&mut section)?;
+    section.finish()?;
+    Ok(PoseRanges { joints, payloads, hoist, temperature, time_step, approach, held_out })
+}
+
+fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {
+    let (base, kind) = (
+        format!("q{number}"),
+        match kind {
+            JointKind::Revolute => &ANGLE,
+            JointKind::Prismatic => &LENGTH,
+            JointKind::Fixed => return Ok((0.0, 0.0)),
+        },
+    );
+    let missing = |section: &Section<'_, '_>| section.missing(&base, format!("{} = [from, to]", kind.spelled(&base)));
+    range(section, &base, kind)?.ok_or_else(|| missing(section))
+}
+
+/// `base_unit = [from, to]` [SI].
+fn range(section: &mut Section<'_, '_>, base: &str, kind: &Kind) -> Result<Option<(f64, f64)>, InputError> {
+    let Some((item, unit)) = section.quantity(base, kind)? else { return Ok(None) };
+    let (from, to) = pair(&item)?;
+    Ok(Some(((unit.to_si)(from), (unit.to_si)(to))))
+}
+
+fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
+    if let Ok(value) = item.number() {
+        return Err(item.error(InputErrorKind::OneNumber { value }));
+    }
+    let numbers = item.list("a list of 2 numbers, from and to")?;
+    let numbers = numbers.iter().map(Item::number).collect::<Result<Vec<_>, _>>()?;
+    match *numbers.as_slice() {
+        [from, to] if from > to => {
+            Err(item.error(InputErrorKind::LimitsCross { lower: from.to_string(), upper: to.to_string() }))
+        }
+        [from, to] => Ok((from, to)),
+        _ => Err(item.error(InputErrorKind::NotARange { found: numbers.len() })),
+    }
+}
+
+fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
+    let Some((item, _)) = section.quantity("payload", &MASS)? else { return Ok(Vec::new()) };
+    let choices = item.list("a list of masses to choose from")?;
+    if choices.is_empty() {
+        return Err(item.error(InputErrorKind::Empty));
+    }
+    let mass = |item: &Item<'_, '_>| match item.number()? {
+        value if value < 0.0 => Err(item.error(InputErrorKind::Negative { value })),
+        mass => Ok(mass),
+    };
+    choices.iter().map(mass).collect()
+}
+
+/// A number, or a range of them; time does not run backwards.
+fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
+    let Some((item, _)) = section.quantity("time_step", &TIME)? else { return Ok((TIME_STEP, TIME_STEP)) };
+    let (from, to) = item.number().map(|step| (step, step)).or_else(|_| pair(&item))?;
+    if from < 0.0 { Err(item.error(InputErrorKind::Negative { value: from })) } else { Ok((from, to)) }
+}
+
+fn held_out(section: &mut Section<'_, '_>) -> Result<HeldOutRows, InputError> {
+    let (share, kept) = (section.get("held_out"), section.get("identification"));
+    match (share, kept) {
+        (Some(_), Some(kept)) => Err(kept.error(InputErrorKind::GivenTwice { first: "held_out".to_owned() })),
+        (Some(item), None) => match item.number()? {
+            share if (0.0..1.0).contains(&share) => Ok(HeldOutRows::Share(share)),
+            value => Err(item.error(InputErrorKind::NotAFraction { value })),
+        },
+        (None, Some(item)) => Ok(HeldOutRows::AllBut(usize::try_from(item.whole(1)?).unwrap_or(usize::MAX))),
+        (None, None) => Ok(HeldOutRows::Share(HELD_OUT)),
+    }
+}

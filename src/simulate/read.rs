@@ -1,0 +1,127 @@
+//! From the text of `TRUTH.toml` to a [`Truth`].
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::SEGMENTS;
+use super::parameters::{self, TrueParameter};
+use super::truth::{Deviation, RandomRule, Truth};
+use super::{ranges, strengths};
+use crate::error::{InputError, InputErrorKind};
+use crate::problem::item::{Document, Item};
+use crate::problem::pattern::matches;
+use crate::problem::section::Section;
+use crate::problem::{HeldOut, Problem};
+use crate::quantity::suffix::{ANGLE, Kind, LENGTH, RELATIVE};
+
+pub(super) fn file(path: &Path, problem: &Problem) -> Result<Truth, InputError> {
+    let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
+    truth(&Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?, problem)
+}
+
+pub(super) fn text(text: &str, file: &Path, problem: &Problem) -> Result<Truth, InputError> {
+    truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
+}
+
+fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
+    let table = document.table()?;
+    let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
+    let noise_sigma = root.section("noise")?.map_or(Ok(0.0), noise)?;
+    let truth = sections(&mut root, problem)?;
+    root.finish()?;
+    if let Some(HeldOut::Session(session)) = &problem.data.held_out {
+        let location = problem.data.held_out_location.clone();
+        return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
+    }
+    Ok(Truth { noise_sigma, ..truth })
+}
+
+/// The sections that say what is true, without noise.
+pub(super) fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
+    let known = parameters::nominal(problem);
+    let parameters = match root.section("parameters")? {
+        Some(section) => section.entries().iter().map(|(name, item)| deviation(name, item, &known)).collect(),
+        None => Ok(Vec::new()),
+    }?;
+    let random = match root.section("random")? {
+        Some(section) => section.entries().iter().map(|(pattern, item)| random(pattern, item, &known)).collect(),
+        None => Ok(Vec::new()),
+    }?;
+    let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
+    let section = root.section("poses")?.ok_or_else(|| root.missing("poses", "[poses], the ranges of the joints"))?;
+    let poses = ranges::read(section, &problem.joints)?;
+    let effects = strengths::read(root, problem, &poses)?;
+    Ok(Truth { parameters, random, effects, noise_sigma: 0.0, poses, segments })
+}
+
+fn noise(mut section: Section<'_, '_>) -> Result<f64, InputError> {
+    let sigma = section.not_negative("position_sigma", &LENGTH)?;
+    section.finish()?;
+    sigma.ok_or_else(|| section.missing("position_sigma_mm", LENGTH.spelled("position_sigma")))
+}
+
+fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
+    let segments = section.get("segments").map_or(Ok(SEGMENTS), |item| item.small().map(usize::from))?;
+    section.finish()?;
+    Ok(segments)
+}
+
+/// `"joint2.stiffness" = { relative = 0.83 }`.
+fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result<Deviation, InputError> {
+    let mut section = named(name, item)?;
+    let Some(parameter) = known.iter().find(|parameter| parameter.name == name) else {
+        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+        return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
+    };
+    let units = parameter.kind.units().units;
+    let given: Vec<_> = units.iter().filter_map(|unit| section.get(unit.suffix).map(|item| (item, unit))).collect();
+    section.finish()?;
+    let value = match given.as_slice() {
+        [] => {
+            let keys: Vec<_> = units.iter().map(|unit| format!("{} = …", unit.suffix)).collect();
+            return Err(section.missing(units[0].suffix, keys.join(" or ")));
+        }
+        [(item, unit)] => (unit.to_si)(item.number()?),
+        [(_, first), (item, _), ..] => {
+            return Err(item.error(InputErrorKind::GivenTwice { first: first.suffix.to_owned() }));
+        }
+    };
+    if parameter.kind.is_relative() && value <= 0.0 {
+        return Err(item.error(InputErrorKind::NotPositive { value }));
+    }
+    Ok(Deviation { name: name.to_owned(), value })
+}
+
+/// `"joint*.alpha" = { sigma_deg = 0.3 }`.
+fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result<RandomRule, InputError> {
+    let mut section = named(pattern, item)?;
+    let mut sigma = |kind: &Kind| match section.pick("sigma", kind)? {
+        Some((item, unit)) => match item.number()? {
+            value if value < 0.0 => Err(item.error(InputErrorKind::Negative { value })),
+            value => Ok(Some((unit.to_si)(value))),
+        },
+        None => Ok(None),
+    };
+    let (angle, length, relative) = (sigma(&ANGLE)?, sigma(&LENGTH)?, sigma(&RELATIVE)?);
+    section.finish()?;
+    let matched: Vec<_> = known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
+    if matched.is_empty() {
+        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+        return Err(item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known }));
+    }
+    let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
+    if matched.iter().all(|parameter| rule.sigma(parameter.kind).is_none()) {
+        let write = matched[0].kind.units().spelled("sigma");
+        return Err(section.missing("sigma", write));
+    }
+    Ok(rule)
+}
+
+/// The table of a name; `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
+fn named<'a, 'i>(name: &str, item: &Item<'a, 'i>) -> Result<Section<'a, 'i>, InputError> {
+    let section = item.section()?;
+    match section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {
+        Some((inner, _)) => Err(item.error(InputErrorKind::UnquotedName { name: format!("{name}.{inner}") })),
+        None => Ok(section),
+    }
+}
