@@ -3,9 +3,9 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
-use super::simulate::{Row, Simulation};
 use crate::problem::{Effect, Joint, JointKind};
 
 #[derive(Serialize)]
