@@ -210,7 +210,7 @@ fn checks_are_of_what_a_constraint_leaves() {
     let split = Split::new(&problem, &measurements).unwrap();
     let trace = trace(&problem, &measurements, &split, &Options::default()).unwrap();
     assert_eq!(trace.fit.active_constraints.len(), 1);
-    let check = trace.findings.checks.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
+    let check = trace.findings.tests.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
     let (checked, fitted) = (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());
     assert!(check.failed() && fitted > 100.0, "{fitted}");
     assert!((checked / fitted - 1.0).abs() < 0.1, "{checked} of {fitted}");

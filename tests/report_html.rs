@@ -124,8 +124,8 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     let page = report::identification_page(&problem, &found, &shown);
     check(&page);
     // Every check with its verdict, on the page and in Markdown.
-    assert!(shown.findings.checks.len() > 5);
-    for check in &shown.findings.checks {
+    assert!(shown.findings.tests.len() > 5);
+    for check in &shown.findings.tests {
         assert!(page.html.contains(&check.to_string().replace('&', "&amp;")), "{check}");
     }
     let told = report::identification_markdown(&problem, &found, &shown.findings);

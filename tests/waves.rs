@@ -9,7 +9,7 @@ use std::path::Path;
 
 use common::arms::parse;
 use common::made::{normal, predicted};
-use flexcal::diagnose::{WAVES, close};
+use flexcal::diagnose::{HARMONICS, close};
 use flexcal::identify::{Identification, Options};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::monte_carlo::table;
@@ -83,9 +83,9 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     let split = Split { identification, held_out };
 
     let closure = close(&problem, &measured, &split, &Options::default()).unwrap();
-    let sigma = closure.wave_sigma.unwrap();
+    let sigma = closure.harmonic_sigma.unwrap();
     let rule = closure.closed.parameters.last().unwrap();
-    assert_eq!(rule.pattern, WAVES);
+    assert_eq!(rule.pattern, HARMONICS);
     assert!(matches!(&rule.freedom, Freedom::Free { sigma: prior, .. } if prior.angle == Some(sigma)));
     let waves: Vec<&Vec<u32>> = closure.closed.effects.iter().filter_map(orders).collect();
     println!("σ {:.5}°, orders {waves:?}", sigma.to_degrees());

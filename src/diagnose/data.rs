@@ -6,7 +6,8 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::residual_tests::Driver;
+use super::covariate::Covariate;
+use super::residual_tests::CovariateValues;
 use crate::measurement::{Measurements, Split};
 use crate::model::effect::Conditions;
 use crate::model::parameter::Quantity;
@@ -131,33 +132,33 @@ impl<'a> Data<'a> {
     }
 
     /// Everything that the residual may depend on, one value per identification row.
-    pub fn drivers(&self, problem: &Problem) -> Vec<Driver> {
+    pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
         let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
-        let joint = |(index, _): (usize, _)| Driver {
-            name: format!("q{}", index + 1),
+        let joint = |(index, _): (usize, _)| CovariateValues {
+            covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),
         };
-        let mut drivers: Vec<Driver> = moving.map(joint).collect();
+        let mut covariates: Vec<CovariateValues> = moving.map(joint).collect();
         let columns = [
-            ("temperature", &measurements.temperature),
-            ("payload", &measurements.payload),
-            ("hoist", &measurements.hoist),
+            (Covariate::Temperature, &measurements.temperature),
+            (Covariate::Payload, &measurements.payload),
+            (Covariate::Hoist, &measurements.hoist),
         ];
-        for (name, column) in columns {
+        for (covariate, column) in columns {
             if let Some(column) = column {
-                drivers.push(Driver { name: name.to_owned(), values: self.pick(column) });
+                covariates.push(CovariateValues { covariate, values: self.pick(column) });
             }
         }
-        drivers.push(Driver { name: "time".to_owned(), values: self.time() });
+        covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
         if let Some(approach) = &measurements.approach {
             let n = measurements.joints;
-            drivers.extend((0..n).map(|joint| Driver {
-                name: format!("approach{}", joint + 1),
+            covariates.extend((0..n).map(|joint| CovariateValues {
+                covariate: Covariate::Approach(joint),
                 values: self.rows().iter().map(|&row| approach[row * n + joint]).collect(),
             }));
         }
-        drivers
+        covariates
     }
 }
 

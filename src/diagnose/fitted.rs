@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
-use super::generic::Generic;
 use super::neighbourhood::{Library, Linear, open};
+use super::smooth_term::SmoothTerm;
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
 use crate::model::effect;
 use crate::model::parameter::Slot;
@@ -89,9 +89,9 @@ impl Fitted {
         residuals.position_errors(&DVector::zeros(0))
     }
 
-    /// The model about the fit at the identification rows, with every place where `effects` enter and those of `generics`.
-    pub fn library<'a>(&'a self, data: &Data<'a>, effects: &[Effect], generics: &[Generic]) -> Library<'a> {
-        self.library_of(data, data.rows(), effects, generics)
+    /// The model about the fit at the identification rows, with every place where `effects` enter and those of `smooth_terms`.
+    pub fn library<'a>(&'a self, data: &Data<'a>, effects: &[Effect], smooth_terms: &[SmoothTerm]) -> Library<'a> {
+        self.library_of(data, data.rows(), effects, smooth_terms)
     }
 
     /// The same at other rows.
@@ -100,12 +100,12 @@ impl Fitted {
         data: &Data<'a>,
         rows: &[usize],
         effects: &[Effect],
-        generics: &[Generic],
+        smooth_terms: &[SmoothTerm],
     ) -> Library<'a> {
         let mut places: Vec<Slot> = Vec::new();
-        for generic in generics {
-            if !places.contains(&generic.slot) {
-                places.push(generic.slot);
+        for smooth_term in smooth_terms {
+            if !places.contains(&smooth_term.slot) {
+                places.push(smooth_term.slot);
             }
         }
         let mut poses = self.poses(data, rows);
@@ -117,8 +117,8 @@ impl Fitted {
         Library::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, &places))
     }
 
-    /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it and `generics` put in.
-    pub fn linear(&self, library: &Library, without: &[usize], generics: &[Generic]) -> Linear {
+    /// The fit in its linear neighbourhood, with the parameters numbered `without` taken out of it and `smooth_terms` put in.
+    pub fn linear(&self, library: &Library, without: &[usize], smooth_terms: &[SmoothTerm]) -> Linear {
         let columns = library.fitted();
         let n = self.unknowns.len();
         let kept: Vec<usize> = (0..n).filter(|&j| !without.contains(&self.unknowns[j])).collect();
@@ -136,8 +136,8 @@ impl Fitted {
         let closed = self.closed.select_columns(&kept).resize_horizontally(x.len(), 0.0);
         let places: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
         let mut linear = Linear::new(&columns.select_columns(&places), &residual, &x, &priors, &closed);
-        for generic in generics {
-            linear.add(&generic.columns(library));
+        for smooth_term in smooth_terms {
+            linear.add(&smooth_term.columns(library));
         }
         linear
     }
@@ -165,7 +165,12 @@ impl Fitted {
     /// they take off, in the linear neighbourhood.
     ///
     /// The effect's columns with all others projected out are [J; Λ^½] N⁻¹ₑ ([N⁻¹]ₑₑ)⁻¹.
-    pub fn given_by(&self, library: &Library, (normal, generics): (&Normal, &[Generic]), effect: &Effect) -> Given {
+    pub fn given_by(
+        &self,
+        library: &Library,
+        (normal, smooth_terms): (&Normal, &[SmoothTerm]),
+        effect: &Effect,
+    ) -> Given {
         let places: Vec<usize> = self.places_of(&self.parameters_of(effect));
         let x = DVector::from_iterator(
             places.len(),
@@ -174,7 +179,7 @@ impl Fitted {
         let own = normal.inverse.select_columns(&places);
         let priors: Vec<(usize, f64)> =
             normal.priors.iter().enumerate().filter_map(|(j, sigma)| Some((j, (*sigma)?))).collect();
-        let data = with_generics(library, generics) * &own;
+        let data = with_smooth_terms(library, smooth_terms) * &own;
         let mut columns = DMatrix::zeros(data.nrows() + priors.len(), places.len());
         columns.rows_mut(0, data.nrows()).copy_from(&data);
         for (row, (j, sigma)) in priors.into_iter().enumerate() {
@@ -189,11 +194,11 @@ impl Fitted {
         Given { directions, part }
     }
 
-    /// N = JᵀJ + Λ of the fit, with `generics` put in, and the step to where they belong.
-    pub fn normal(&self, library: &Library, generics: &[Generic]) -> Normal {
+    /// N = JᵀJ + Λ of the fit, with `smooth_terms` put in, and the step to where they belong.
+    pub fn normal(&self, library: &Library, smooth_terms: &[SmoothTerm]) -> Normal {
         let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
         let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
-        let columns = with_generics(library, generics);
+        let columns = with_smooth_terms(library, smooth_terms);
         let mut pull = columns.tr_mul(library.residual());
         for (j, &k) in self.unknowns.iter().enumerate() {
             if let Some(sigma) = self.model.parameters[k].sigma {
@@ -219,11 +224,11 @@ impl Fitted {
     }
 }
 
-/// Fitted columns, then those of `generics`, shape = (3 N, …).
-pub(super) fn with_generics(library: &Library, generics: &[Generic]) -> DMatrix<f64> {
+/// Fitted columns, then those of `smooth_terms`, shape = (3 N, …).
+pub(super) fn with_smooth_terms(library: &Library, smooth_terms: &[SmoothTerm]) -> DMatrix<f64> {
     let mut columns = library.fitted();
-    for generic in generics {
-        let more = generic.columns(library);
+    for smooth_term in smooth_terms {
+        let more = smooth_term.columns(library);
         let first = columns.ncols();
         columns = columns.resize_horizontally(first + more.ncols(), 0.0);
         columns.columns_mut(first, more.ncols()).copy_from(&more);

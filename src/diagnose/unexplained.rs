@@ -1,16 +1,18 @@
 //! Structure that no effect of the catalogue explains: where it is, what it depends on, and what a smooth correction gains.
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
+use super::covariate::{Covariate, Place};
 use super::data::Data;
-use super::fitted::{Fitted, with_generics};
-use super::generic::Generic;
-use super::neighbourhood::{Gain, Linear, tries};
+use super::fitted::{Fitted, with_smooth_terms};
+use super::neighbourhood::{Gain, Library, Linear, tries};
 use super::residual_tests::Findings;
+use super::smooth_term::SmoothTerm;
 use crate::identify::ErrorSummary;
+use crate::model::Pose;
 use crate::model::effect;
-use crate::model::parameter::{JointField, Quantity, Slot};
+use crate::model::parameter::{JointField, Quantity, Slot, Unit};
 use crate::problem::Effect;
 
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
@@ -28,10 +30,10 @@ const REFINED: usize = 4;
 /// Structure that is left.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
-    /// `joint 2`, `link before joint 3`, or `nowhere in particular`.
-    pub place: String,
-    /// `q2`, `temperature`, …: what it depends on.
-    pub depends_on: Vec<String>,
+    /// Where it is.
+    pub place: Place,
+    /// What it depends on.
+    pub depends_on: Vec<Covariate>,
     /// Probability that it is chance, corrected for the places and quantities tried.
     pub p_value: f64,
     /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out.
@@ -41,6 +43,12 @@ pub struct Unexplained {
 /// A smooth correction of one place's error as a function of one quantity.
 #[derive(Debug, Clone)]
 pub struct Correction {
+    /// What it is a function of.
+    pub covariate: Covariate,
+    /// Coordinate of the arm that it is added to.
+    pub slot: Slot,
+    /// Unit of that coordinate: an angle or a length.
+    pub unit: Unit,
     /// Range of the quantity that the identification poses cover, in its unit: nothing is corrected beyond it.
     pub range: (f64, f64),
     /// Held-out poses beyond it, which stay uncorrected.
@@ -51,11 +59,28 @@ pub struct Correction {
     pub held_out: ErrorSummary,
     /// The quantity and the correction of the place there [rad] or [m].
     pub curve: Vec<(f64, f64)>,
+    /// Partial residuals of the identification poses, in the order of the rows.
+    pub points: Vec<PartialResidual>,
 }
 
-/// A generic with its gain.
+/// What one pose alone says about a coordinate: the correction there and what the corrected fit leaves along the lever.
+///
+/// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r once everything is fitted anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartialResidual {
+    /// Row of the measurements, counted from 0.
+    pub row: usize,
+    /// Value of the covariate, in its unit.
+    pub covariate: f64,
+    /// Of the coordinate [rad] or [m].
+    pub value: f64,
+    /// |l| [m/rad] or [m/m]: poses where it is small say little.
+    pub lever: f64,
+}
+
+/// A smooth term with its gain.
 pub(super) struct Tried {
-    pub generic: Generic,
+    pub smooth_term: SmoothTerm,
     pub gain: Gain,
     /// The criterion with 2 ln(places and quantities tried).
     pub criterion: f64,
@@ -63,42 +88,43 @@ pub(super) struct Tried {
     pub corrected: f64,
 }
 
-/// The best of some generics against a fit.
+/// The best of some smooth terms against a fit.
 pub(super) fn best(
     linear: &Linear,
-    library: &super::neighbourhood::Library,
-    generics: &[Generic],
-    wanted: impl Fn(&Generic) -> bool,
+    library: &Library,
+    smooth_terms: &[SmoothTerm],
+    wanted: impl Fn(&SmoothTerm) -> bool,
 ) -> Option<Tried> {
     // Half of the chance for splines, half for single bumps and steps; an equal part for each place and quantity.
     let mut places: Vec<(Slot, Quantity)> = Vec::new();
-    for generic in generics {
-        if !places.contains(&(generic.slot, generic.of)) {
-            places.push((generic.slot, generic.of));
+    for smooth_term in smooth_terms {
+        if !places.contains(&(smooth_term.slot, smooth_term.of)) {
+            places.push((smooth_term.slot, smooth_term.of));
         }
     }
-    let score = |generic: &Generic| linear.score(&generic.columns(library));
-    let tried = |generic: Generic| {
-        let gain = linear.sums().gain(&score(&generic))?;
-        let (squares, freedom) = (gain.squares, gain.freedom + generic.fitted);
+    let score = |smooth_term: &SmoothTerm| linear.score(&smooth_term.columns(library));
+    let tried = |smooth_term: SmoothTerm| {
+        let gain = linear.sums().gain(&score(&smooth_term))?;
+        let (squares, freedom) = (gain.squares, gain.freedom + smooth_term.fitted);
         let gain = linear.sums().gain_of(squares, freedom)?;
-        let count = 2.0 * (places.len() * generic.tries) as f64;
+        let count = 2.0 * (places.len() * smooth_term.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
-        Some(Tried { generic, gain, criterion, corrected })
+        Some(Tried { smooth_term, gain, criterion, corrected })
     };
     // Splines everywhere; single bumps and steps where splines find most.
-    let wanted: Vec<&Generic> = generics.iter().filter(|generic| wanted(generic)).collect();
-    let (single, splines): (Vec<&Generic>, Vec<&Generic>) = wanted.iter().partition(|g| g.functions.len() == 1);
-    let mut all: Vec<Tried> = splines.into_par_iter().filter_map(|generic| tried(generic.clone())).collect();
+    let wanted: Vec<&SmoothTerm> = smooth_terms.iter().filter(|smooth_term| wanted(smooth_term)).collect();
+    let (single, splines): (Vec<&SmoothTerm>, Vec<&SmoothTerm>) = wanted.iter().partition(|g| g.functions.len() == 1);
+    let mut all: Vec<Tried> = splines.into_par_iter().filter_map(|smooth_term| tried(smooth_term.clone())).collect();
     all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
-    let near: Vec<(Slot, Quantity)> = all.iter().take(PROMISING).map(|t| (t.generic.slot, t.generic.of)).collect();
-    let promising = |generic: &&&Generic| near.is_empty() || near.contains(&(generic.slot, generic.of));
-    let single: Vec<&Generic> = single.iter().filter(promising).copied().collect();
-    all.extend(single.into_par_iter().filter_map(|generic| tried(generic.clone())).collect::<Vec<_>>());
+    let near: Vec<(Slot, Quantity)> =
+        all.iter().take(PROMISING).map(|t| (t.smooth_term.slot, t.smooth_term.of)).collect();
+    let promising = |smooth_term: &&&SmoothTerm| near.is_empty() || near.contains(&(smooth_term.slot, smooth_term.of));
+    let single: Vec<&SmoothTerm> = single.iter().filter(promising).copied().collect();
+    all.extend(single.into_par_iter().filter_map(|smooth_term| tried(smooth_term.clone())).collect::<Vec<_>>());
     all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
-    let shapes: Vec<Generic> =
-        all.iter().map(|tried| &tried.generic).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
-    let squares = |generic: &Generic| linear.sums().gain(&score(generic)).map_or(0.0, |gain| gain.squares);
+    let shapes: Vec<SmoothTerm> =
+        all.iter().map(|tried| &tried.smooth_term).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
+    let squares = |smooth_term: &SmoothTerm| linear.sums().gain(&score(smooth_term)).map_or(0.0, |gain| gain.squares);
     all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
     all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
@@ -110,9 +136,9 @@ pub(super) fn withdraw(
     data: &Data,
     added: &[Effect],
     candidates: &[Effect],
-) -> Option<(Generic, Vec<Effect>)> {
-    let generics = Generic::all(&fitted.problem, data);
-    let library = fitted.library(data, &[], &generics);
+) -> Option<(SmoothTerm, Vec<Effect>)> {
+    let smooth_terms = SmoothTerm::all(&fitted.problem, data);
+    let library = fitted.library(data, &[], &smooth_terms);
     let everything: Vec<Effect> =
         candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
     let (all_tries, families) = tries(&everything);
@@ -135,15 +161,15 @@ pub(super) fn withdraw(
         let linear = fitted.linear(&library, &parameters, &[]);
         let explained = linear.sums().gain(&linear.score(&fitted.columns(&library, &parameters)));
         let explained = explained.map_or(0.0, |gain| gain.criterion + own.iter().map(search).sum::<f64>());
-        let here = |generic: &Generic| {
-            let coordinate = matches!(generic.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }
+        let here = |smooth_term: &SmoothTerm| {
+            let coordinate = matches!(smooth_term.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }
                 if own + 1 == joint);
-            coordinate && generic.of == Quantity::Command(from - 1)
+            coordinate && smooth_term.of == Quantity::Command(from - 1)
         };
-        if let Some(tried) = best(&linear, &library, &generics, here)
+        if let Some(tried) = best(&linear, &library, &smooth_terms, here)
             && tried.criterion + BETTER < explained
         {
-            return Some((tried.generic, rest));
+            return Some((tried.smooth_term, rest));
         }
     }
     None
@@ -159,46 +185,42 @@ fn function_of(effect: &Effect) -> Option<(usize, usize)> {
 }
 
 /// The strongest structure that is left, if it is beyond chance.
-pub(super) fn strongest(fitted: &Fitted, data: &Data, level: f64) -> Option<Generic> {
-    let generics = Generic::all(&fitted.problem, data);
-    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &generics);
-    let tried = best(&fitted.linear(&library, &[], &[]), &library, &generics, |_| true)?;
-    (tried.corrected < level && tried.criterion < 0.0).then_some(tried.generic)
+pub(super) fn strongest(fitted: &Fitted, data: &Data, level: f64) -> Option<SmoothTerm> {
+    let smooth_terms = SmoothTerm::all(&fitted.problem, data);
+    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &smooth_terms);
+    let tried = best(&fitted.linear(&library, &[], &[]), &library, &smooth_terms, |_| true)?;
+    (tried.corrected < level && tried.criterion < 0.0).then_some(tried.smooth_term)
 }
 
-/// What is known of structure at a generic, or of the strongest one where `known` is none; `level` is that of chance.
-pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&Generic>, level: f64) -> Option<Unexplained> {
-    let generics = Generic::all(&fitted.problem, data);
-    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &generics);
+/// What is known of structure at a smooth term, or of the strongest one where `known` is none; `level` is that of chance.
+pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&SmoothTerm>, level: f64) -> Option<Unexplained> {
+    let smooth_terms = SmoothTerm::all(&fitted.problem, data);
+    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &smooth_terms);
     let linear = fitted.linear(&library, &[], &[]);
     let tried = match known {
-        None => best(&linear, &library, &generics, |_| true),
-        Some(known) => {
-            best(&linear, &library, &generics, |generic| generic.slot == known.slot && generic.of == known.of)
-        }
+        None => best(&linear, &library, &smooth_terms, |_| true),
+        Some(known) => best(&linear, &library, &smooth_terms, |smooth_term| {
+            smooth_term.slot == known.slot && smooth_term.of == known.of
+        }),
     }?;
     if tried.corrected >= level || tried.criterion >= 0.0 {
         return None;
     }
-    let Tried { generic, corrected, gain, .. } = tried;
+    let Tried { smooth_term, corrected, gain, .. } = tried;
     debug_assert!(gain.freedom > 0);
-    let library = fitted.library(data, &[], std::slice::from_ref(&generic));
+    let library = fitted.library(data, &[], std::slice::from_ref(&smooth_term));
     let linear = fitted.linear(&library, &[], &[]);
     let mut with = linear.clone();
-    with.add(&generic.columns(&library));
+    with.add(&smooth_term.columns(&library));
     let coordinates = linear.rows() as f64;
     let rms = |squares: f64| (3.0 * squares / coordinates).sqrt() * fitted.sigma;
     let validated = linear.cross_validate(&data.block).zip(with.cross_validate(&data.block));
     let correction = validated
         .map(|(without, with)| (rms(without), rms(with)))
         .filter(|(without, with)| *with < WORTHWHILE * without)
-        .map(|validated| correct(fitted, data, &generic, validated));
-    let depends_on = match generic.of {
-        // Without a column for it, the order of the rows stands for time.
-        Quantity::Elapsed if !data.measurements.time_measured => "row".to_owned(),
-        _ => generic.depends_on(),
-    };
-    Some(Unexplained { place: generic.place(), depends_on: vec![depends_on], p_value: corrected, correction })
+        .map(|validated| correct(fitted, data, &smooth_term, validated));
+    let depends_on = vec![Covariate::of(smooth_term.of, data.measurements.time_measured)];
+    Some(Unexplained { place: smooth_term.place(), depends_on, p_value: corrected, correction })
 }
 
 /// Structure that the checks see and no place or quantity shows.
@@ -208,38 +230,60 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     }
     let strongest = findings.strongest()?;
     Some(Unexplained {
-        place: "nowhere in particular".to_owned(),
-        depends_on: strongest.about().map(str::to_owned).into_iter().collect(),
+        place: Place::Nowhere,
+        depends_on: strongest.about().into_iter().collect(),
         p_value: strongest.outcome.as_ref().map_or(1.0, |outcome| outcome.p_value),
         correction: None,
     })
 }
 
 /// Fits the correction together with all parameters, in the linear neighbourhood, and applies it to the held-out poses.
-fn correct(fitted: &Fitted, data: &Data, generic: &Generic, cross_validated: (f64, f64)) -> Correction {
-    let generics = std::slice::from_ref(generic);
-    let library = fitted.library(data, &[], generics);
-    let step = fitted.normal(&library, generics).step;
-    let held_out = fitted.library_of(data, &data.split.held_out, &[], generics);
-    let change = with_generics(&held_out, generics) * &step;
+fn correct(fitted: &Fitted, data: &Data, smooth_term: &SmoothTerm, cross_validated: (f64, f64)) -> Correction {
+    let smooth_terms = std::slice::from_ref(smooth_term);
+    let library = fitted.library(data, &[], smooth_terms);
+    let step = fitted.normal(&library, smooth_terms).step;
+    let coefficients = step.rows(step.len() - smooth_term.functions.len(), smooth_term.functions.len());
+    let held_out = fitted.library_of(data, &data.split.held_out, &[], smooth_terms);
+    let change = with_smooth_terms(&held_out, smooth_terms) * &step;
     let mut errors = fitted.errors(data, &data.split.held_out);
     let mut beyond = 0;
     for (k, (pose, error)) in held_out.poses().iter().zip(&mut errors).enumerate() {
-        if generic.reaches(&pose.setup) {
+        if smooth_term.reaches(&pose.setup) {
             *error += Vector3::from_fn(|axis, _| change[3 * k + axis]) * pose.sigma;
         } else {
             beyond += 1;
         }
     }
-    let count = generic.functions.len();
-    let functions = step.rows(step.len() - count, count);
     Correction {
-        range: generic.range,
+        covariate: Covariate::of(smooth_term.of, data.measurements.time_measured),
+        slot: smooth_term.slot,
+        unit: smooth_term.slot.unit(),
+        range: smooth_term.range,
         beyond,
         cross_validated,
         held_out: ErrorSummary::of(&errors),
-        curve: generic.curve(functions.as_slice()),
+        curve: smooth_term.curve(coefficients.as_slice()),
+        points: partial_residuals(data, &library, smooth_term, (&step, coefficients.as_slice())),
     }
+}
+
+/// The partial residual of every identification pose, after the `step` of all parameters, the term's own coefficients last.
+fn partial_residuals(
+    data: &Data,
+    library: &Library,
+    smooth_term: &SmoothTerm,
+    (step, coefficients): (&DVector<f64>, &[f64]),
+) -> Vec<PartialResidual> {
+    let Some(column) = library.place(smooth_term.slot) else { return Vec::new() };
+    let left = library.residual() + with_smooth_terms(library, std::slice::from_ref(smooth_term)) * step;
+    let point = |(k, pose): (usize, &Pose)| {
+        // Both are in σ; r = measured − predicted, so that the lever is −∂r/∂(coordinate).
+        let (lever, left) = (-column.fixed_rows::<3>(3 * k), left.fixed_rows::<3>(3 * k));
+        let covariate = smooth_term.of.value(&pose.setup);
+        let value = smooth_term.at(coefficients, covariate) + lever.dot(&left) / lever.norm_squared();
+        PartialResidual { row: data.rows()[k], covariate, value, lever: lever.norm() * pose.sigma }
+    };
+    library.poses().iter().enumerate().map(point).collect()
 }
 
 /// Name of an effect with its place, for people.

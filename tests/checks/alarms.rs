@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::diagnose::{Check, Driver, Findings};
+use flexcal::diagnose::{Covariate, CovariateValues, Findings, ResidualTest};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::linear::{Linear, at_most, driven, heavy_tails, noise_only, normal, un
 struct Rates {
     structured: usize,
     failed: usize,
-    /// Name and driver, p-values.
+    /// Name and covariate, p-values.
     p_values: Vec<(String, Vec<f64>)>,
 }
 
@@ -27,13 +27,16 @@ impl Rates {
             })
             .collect();
         let mut p_values: Vec<(String, Vec<f64>)> = Vec::new();
-        for (k, check) in all[0].checks.iter().enumerate() {
-            let values = all.iter().filter_map(|f| f.checks[k].outcome.as_ref().ok()).map(|outcome| outcome.p_value);
-            p_values.push((format!("{} {}", check.name(), check.about().unwrap_or("")), values.collect()));
+        for (k, check) in all[0].tests.iter().enumerate() {
+            let values = all.iter().filter_map(|f| f.tests[k].outcome.as_ref().ok()).map(|outcome| outcome.p_value);
+            p_values.push((
+                format!("{} {}", check.name(), check.about().map_or_else(String::new, |of| of.to_string())),
+                values.collect(),
+            ));
         }
         Self {
             structured: all.iter().filter(|findings| findings.is_structured()).count(),
-            failed: all.iter().filter(|findings| findings.checks.iter().any(Check::failed)).count(),
+            failed: all.iter().filter(|findings| findings.tests.iter().any(ResidualTest::failed)).count(),
             p_values,
         }
     }
@@ -101,16 +104,20 @@ fn rates_and_times() {
     for (poses, unknowns, size) in [(28, 32, 3.0), (28, 32, 6.0), (28, 20, 3.0), (60, 20, 1.0), (200, 32, 0.5)] {
         let all: Vec<Findings> = (0..200).into_par_iter().map(|seed| driven(poses, unknowns, size, seed)).collect();
         let structured = all.iter().filter(|findings| findings.is_structured()).count();
-        let on_q2 = all.iter().filter_map(Findings::strongest).filter(|check| check.about() == Some("q2")).count();
+        let on_q2 = all
+            .iter()
+            .filter_map(Findings::strongest)
+            .filter(|check| check.about() == Some(Covariate::Command(1)))
+            .count();
         println!(
             "{poses} poses, {unknowns} unknowns, {size} σ of q2: structure {structured}, strongest on q2 {on_q2} of 200"
         );
     }
     for (poses, unknowns) in [(28, 32), (200, 32), (6500, 60)] {
         let mut linear = Linear::new(poses, unknowns, None, 5);
-        for k in linear.drivers.len()..20 {
+        for k in linear.covariates.len()..20 {
             let values = (0..poses).map(|_| normal(&mut linear.random)).collect();
-            linear.drivers.push(Driver { name: format!("torque{k}"), values });
+            linear.covariates.push(CovariateValues { covariate: Covariate::Approach(k), values });
         }
         let noise = linear.noise();
         let residual = linear.leaves(noise);
@@ -120,7 +127,7 @@ fn rates_and_times() {
             let findings = pool.install(|| linear.check(&residual));
             println!(
                 "{poses} poses, {unknowns} unknowns, {} checks, {threads} threads: {:?}",
-                findings.checks.len(),
+                findings.tests.len(),
                 start.elapsed()
             );
         }

@@ -1,6 +1,6 @@
 //! What cannot be tested says why, odd inputs are taken, and threads change nothing.
 
-use flexcal::diagnose::{Driver, Findings, Sequence, Test, Untestable};
+use flexcal::diagnose::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 
@@ -24,27 +24,27 @@ fn threads_change_nothing() {
 fn what_cannot_be_tested_says_why() {
     let untestable = |findings: &Findings, why: Untestable| {
         assert!(!findings.is_testable() && !findings.is_structured());
-        assert!(findings.checks.iter().all(|check| check.outcome == Err(why.clone())));
+        assert!(findings.tests.iter().all(|check| check.outcome == Err(why.clone())));
     };
     let mut linear = Linear::new(28, 20, None, 11);
     let noise = linear.noise();
     let residual = linear.leaves(noise);
-    let driver = |name: &str, values: Vec<f64>| Driver { name: name.to_owned(), values };
-    linear.drivers = vec![
-        driver("hoist", vec![62.0; 28]),
-        driver("temperature", vec![f64::NAN; 28]),
-        driver("torque1", vec![1.0; 3]),
+    let covariate = |covariate: Covariate, values: Vec<f64>| CovariateValues { covariate, values };
+    linear.covariates = vec![
+        covariate(Covariate::Hoist, vec![62.0; 28]),
+        covariate(Covariate::Temperature, vec![f64::NAN; 28]),
+        covariate(Covariate::Approach(0), vec![1.0; 3]),
     ];
     linear.sigma_is_declared = false;
     let findings = linear.check(&residual);
     let why = |test: Test| find(&findings, &test).outcome.clone().unwrap_err();
-    let on = |driver: &str| Test::Dependence { driver: driver.to_owned() };
-    assert_eq!(why(on("hoist")), Untestable::Constant);
-    assert_eq!(why(on("temperature")), Untestable::NotFinite);
-    assert_eq!(why(on("torque1")), Untestable::SizeMismatch);
+    let on = |covariate: Covariate| Test::Dependence { covariate };
+    assert_eq!(why(on(Covariate::Hoist)), Untestable::Constant);
+    assert_eq!(why(on(Covariate::Temperature)), Untestable::NotFinite);
+    assert_eq!(why(on(Covariate::Approach(0))), Untestable::SizeMismatch);
     assert_eq!(why(Test::ReducedChiSquared), Untestable::NoSigma);
     assert_eq!(why(Test::LackOfFit), Untestable::NoRepeats);
-    let sentence = find(&findings, &on("hoist")).to_string();
+    let sentence = find(&findings, &on(Covariate::Hoist)).to_string();
     assert_eq!(sentence, "dependence on hoist not tested: it is the same at every pose");
 
     untestable(&linear.check(&(&residual * f64::NAN)), Untestable::NotFinite);
@@ -65,7 +65,7 @@ fn odd_inputs_are_taken() {
         let residual = linear.leaves(noise);
         let zero = residual.map(|_| 0.0);
         for residual in [residual, zero] {
-            for check in linear.check(&residual).checks {
+            for check in linear.check(&residual).tests {
                 if let Ok(outcome) = &check.outcome {
                     let numbers = [outcome.statistic, outcome.p_value, outcome.bounds.0, outcome.bounds.1];
                     assert!(numbers.iter().all(|number| number.is_finite()), "{check}: {outcome:?}");

@@ -1,6 +1,6 @@
 //! Linear fits with known structure in what they leave.
 
-use flexcal::diagnose::{Check, Driver, Findings, Remainder, Test, check};
+use flexcal::diagnose::{Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub struct Linear {
     /// 1 σ of each unknown's prior.
     pub prior: Option<f64>,
     pub fitted: DMatrix<f64>,
-    pub drivers: Vec<Driver>,
+    pub covariates: Vec<CovariateValues>,
     pub time: Vec<f64>,
     pub session: Vec<usize>,
     pub setup: Vec<usize>,
@@ -24,7 +24,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Columns smooth in the drivers, rows of some poses many times larger than those of others.
+    /// Columns smooth in the covariates, rows of some poses many times larger than those of others.
     pub fn new(poses: usize, unknowns: usize, prior: Option<f64>, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let joints = 6;
@@ -43,15 +43,18 @@ impl Linear {
             }
         }
         let fitted = factor(&jacobian, prior);
-        let mut drivers: Vec<Driver> =
-            angles.into_iter().enumerate().map(|(k, values)| Driver { name: format!("q{}", k + 1), values }).collect();
+        let mut covariates: Vec<CovariateValues> = angles
+            .into_iter()
+            .enumerate()
+            .map(|(k, values)| CovariateValues { covariate: Covariate::Command(k), values })
+            .collect();
         let payload = (0..poses).map(|_| f64::from(random.random_range(0..3_u8))).collect();
-        drivers.push(Driver { name: "payload".to_owned(), values: payload });
-        drivers.push(Driver { name: "torque2".to_owned(), values: reach });
+        covariates.push(CovariateValues { covariate: Covariate::Payload, values: payload });
+        covariates.push(CovariateValues { covariate: Covariate::Approach(1), values: reach });
         let time: Vec<f64> = (0..poses).map(|pose| pose as f64).collect();
-        drivers.push(Driver { name: "time".to_owned(), values: time.clone() });
+        covariates.push(CovariateValues { covariate: Covariate::Time, values: time.clone() });
         let (session, setup) = (vec![0; poses], (0..poses).collect());
-        Self { jacobian, prior, fitted, drivers, time, session, setup, sigma_is_declared: true, random }
+        Self { jacobian, prior, fitted, covariates, time, session, setup, sigma_is_declared: true, random }
     }
 
     pub fn poses(&self) -> usize {
@@ -74,23 +77,23 @@ impl Linear {
     }
 
     pub fn check(&self, residual: &DVector<f64>) -> Findings {
-        check(&self.remainder(residual), 7)
+        test_residual(&self.fit(residual), 7)
     }
 
-    pub fn remainder<'a>(&'a self, residual: &'a DVector<f64>) -> Remainder<'a> {
-        Remainder {
+    pub fn fit<'a>(&'a self, residual: &'a DVector<f64>) -> FitResidual<'a> {
+        FitResidual {
             residual,
             fitted: &self.fitted,
             sigma_is_declared: self.sigma_is_declared,
             time: &self.time,
             session: &self.session,
             setup: &self.setup,
-            drivers: &self.drivers,
+            covariates: &self.covariates,
         }
     }
 
-    pub fn driver(&self, name: &str) -> &[f64] {
-        &self.drivers.iter().find(|driver| driver.name == name).unwrap().values
+    pub fn covariate(&self, of: Covariate) -> &[f64] {
+        &self.covariates.iter().find(|known| known.covariate == of).unwrap().values
     }
 
     /// Adds a displacement as a function of the pose.
@@ -148,23 +151,23 @@ pub fn uneven(seed: u64) -> (Linear, DVector<f64>) {
     (linear, residual)
 }
 
-/// A smooth function of one driver, `size` σ of noise large.
+/// A smooth function of one covariate, `size` σ of noise large.
 pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
     let mut linear = Linear::new(poses, unknowns, None, 4000 + seed);
     linear.sigma_is_declared = false;
     let mut data = linear.noise();
-    let driver = linear.driver("q2").to_vec();
-    Linear::displace(&mut data, |pose| size * (2.0 * driver[pose]).sin() * Vector3::new(1.0, 0.5, -1.0));
+    let covariate = linear.covariate(Covariate::Command(1)).to_vec();
+    Linear::displace(&mut data, |pose| size * (2.0 * covariate[pose]).sin() * Vector3::new(1.0, 0.5, -1.0));
     let residual = linear.leaves(data);
     linear.check(&residual)
 }
 
-pub fn find<'a>(findings: &'a Findings, test: &Test) -> &'a Check {
-    findings.checks.iter().find(|check| check.test == *test).unwrap()
+pub fn find<'a>(findings: &'a Findings, test: &Test) -> &'a ResidualTest {
+    findings.tests.iter().find(|check| check.test == *test).unwrap()
 }
 
-pub fn outliers(findings: &Findings) -> &Check {
-    findings.checks.iter().find(|check| check.name() == "outliers").unwrap()
+pub fn outliers(findings: &Findings) -> &ResidualTest {
+    findings.tests.iter().find(|check| check.name() == "outliers").unwrap()
 }
 
 /// How many of `problems` may have what happens with probability `rate`: exceeded once in some 10 000 tests.

@@ -32,8 +32,7 @@ fn left_out_poses_leave_no_trace() {
     let mut linear = Linear::new(60, 20, Some(0.5), 9);
     let mut data = linear.noise();
     let p_values = |findings: &Findings| -> Vec<f64> {
-        let rest =
-            findings.checks.iter().filter(|check| !matches!(check.test, Test::Outliers { .. } | Test::Normality));
+        let rest = findings.tests.iter().filter(|check| !matches!(check.test, Test::Outliers { .. } | Test::Normality));
         rest.filter_map(|check| check.outcome.as_ref().ok()).map(|outcome| outcome.p_value).collect()
     };
     let at = |size: f64, data: &mut DVector<f64>| {

@@ -1,6 +1,6 @@
 //! Structure in what a fit leaves is found and named.
 
-use flexcal::diagnose::{Check, Findings, Sequence, Test};
+use flexcal::diagnose::{Covariate, Findings, ResidualTest, Sequence, Test};
 use nalgebra::Vector3;
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -9,14 +9,14 @@ use super::linear::{Linear, at_most, count, driven, factor, find, normal};
 
 #[test]
 fn a_driver_is_found_and_named() {
-    let on_q2 = Test::Dependence { driver: "q2".to_owned() };
+    let on_q2 = Test::Dependence { covariate: Covariate::Command(1) };
     let named = count(30, |seed| driven(60, 20, 1.5, seed).strongest().is_some_and(|check| check.test == on_q2));
     println!("q2 is named in {named} of 30");
     assert!(named >= 25);
     let findings = driven(60, 20, 3.0, 1);
     let found = findings.strongest().unwrap();
     println!("{found}");
-    assert_eq!((found.about(), found.name()), (Some("q2"), "dependence"));
+    assert_eq!((found.about(), found.name()), (Some(Covariate::Command(1)), "dependence"));
     assert!(found.to_string().starts_with("residuals depend on q2 (distance correlation 0."));
     let outcome = found.outcome.as_ref().unwrap();
     assert!(outcome.statistic > outcome.bounds.1 && outcome.statistic < 1.0);
@@ -62,7 +62,7 @@ fn noise_that_follows_itself_is_found_in_its_order() {
         if shuffled {
             assert!(failing(&by_rows) <= 2);
         } else {
-            assert!(all[0].checks.iter().all(|check| check.test != by_rows), "one order, one check");
+            assert!(all[0].tests.iter().all(|check| check.test != by_rows), "one order, one check");
         }
     }
 }
@@ -77,13 +77,13 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
     let check = understated.strongest().unwrap();
     println!("{check}");
     assert_eq!(check.test, Test::ReducedChiSquared);
-    assert_eq!(understated.checks.iter().filter(|check| check.failed()).count(), 1);
+    assert_eq!(understated.tests.iter().filter(|check| check.failed()).count(), 1);
     assert!(!overstated.is_structured());
     let small = find(&overstated, &Test::ReducedChiSquared);
     println!("{small}");
     assert!(small.to_string().contains("overstated"));
     let statistics = |findings: &Findings| -> Vec<(f64, f64)> {
-        let rest = findings.checks.iter().filter(|check| check.test != Test::ReducedChiSquared);
+        let rest = findings.tests.iter().filter(|check| check.test != Test::ReducedChiSquared);
         rest.filter_map(|check| check.outcome.as_ref().ok()).map(|o| (o.statistic, o.p_value)).collect()
     };
     for other in [&understated, &overstated] {
@@ -112,7 +112,7 @@ fn repeats_show_a_lack_of_fit_without_sigma() {
         let findings = linear.check(&residual);
         find(&findings, &Test::LackOfFit).clone()
     };
-    let p_value = |check: &Check| check.outcome.as_ref().unwrap().p_value;
+    let p_value = |check: &ResidualTest| check.outcome.as_ref().unwrap().p_value;
     let alarms = count(300, |seed| p_value(&repeated(seed, 0.0)) <= 0.05);
     assert!((5..=at_most(300, 0.05)).contains(&alarms), "{alarms} of 300");
     let check = repeated(1, 2.0);

@@ -1,6 +1,6 @@
 //! One set through the loop, and what the loop makes of it beside the truth.
 
-use flexcal::diagnose::{Closure, Verdict, close};
+use flexcal::diagnose::{ClosedLoop, Covariate, Verdict, close};
 use flexcal::identify::{Identification, Options, identify};
 use flexcal::model::effect;
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
@@ -28,7 +28,7 @@ pub enum Place {
 
 /// A set after the loop.
 pub struct Judged {
-    pub closure: Closure,
+    pub closure: ClosedLoop,
     /// One per true effect.
     pub places: Vec<Place>,
     /// Whether the first effect found is the true one.
@@ -80,14 +80,14 @@ impl Judged {
         let names = |effects: &mut dyn Iterator<Item = &Effect>| effects.map(named).collect::<Vec<_>>().join(" + ");
         let closure = &self.closure;
         let cause = closure.unexplained.as_ref().map_or_else(String::new, |left| {
-            format!("{} {} p {:.1e}", left.place, left.depends_on.join(" "), left.p_value)
+            format!("{} {} p {:.1e}", left.place, words(&left.depends_on), left.p_value)
         });
         let failed: Vec<String> = closure
             .findings
-            .checks
+            .tests
             .iter()
             .filter(|check| check.failed())
-            .map(|check| format!("{} {}", check.name(), check.about().unwrap_or_default()))
+            .map(|check| format!("{} {}", check.name(), words(check.about().as_slice())))
             .collect();
         let p: Vec<String> = self.chance.iter().map(|p| format!("{p:.1e}")).collect();
         let best_p = closure.before.ranking.iter().map(|ranked| ranked.p_value).fold(1.0, f64::min);
@@ -179,4 +179,9 @@ pub fn named(effect: &Effect) -> String {
 pub fn name(lacking: &[Lacking]) -> String {
     let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
     lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
+}
+
+/// Covariates by name, with spaces between.
+pub fn words(covariates: &[Covariate]) -> String {
+    covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }

@@ -1,11 +1,11 @@
 //! What no catalogue holds: a bump or a step of one joint's coordinate.
 
-use flexcal::diagnose::{Closure, close};
+use flexcal::diagnose::{ClosedLoop, close};
 use flexcal::identify::Options;
 use flexcal::simulate::Shape;
 
 use crate::bench::{NOISE, Size, lunar, measured, outside};
-use crate::judged::named;
+use crate::judged::{named, words};
 
 /// A bump or step: joint, shape; height, centre and width in degrees.
 pub type Outside = (usize, Shape, [f64; 3]);
@@ -30,7 +30,7 @@ pub const KINDS: [Outside; 14] = [
 
 /// A set with one of them after the loop.
 pub struct Left {
-    pub closure: Closure,
+    pub closure: ClosedLoop,
     /// Whether it is located at the right joint, as a function of the right command.
     pub located: bool,
     /// Held-out rms over that of the noise: before, and with the correction.
@@ -43,8 +43,9 @@ impl Left {
         let set = measured(&[outside(joint, shape, values)], size, seed);
         let closure = close(&lunar(), &set.measurements, &set.split, &Options::default()).unwrap();
         let left = closure.unexplained.as_ref();
-        let located =
-            left.is_some_and(|left| left.place == format!("joint {joint}") && left.depends_on == [format!("q{joint}")]);
+        let located = left.is_some_and(|left| {
+            left.place.to_string() == format!("joint {joint}") && words(&left.depends_on) == format!("q{joint}")
+        });
         let correction = left.and_then(|left| left.correction.as_ref());
         Self {
             located,
@@ -58,7 +59,7 @@ impl Left {
     pub fn line(&self, (joint, shape, values): Outside, size: Size, seed: u64) -> String {
         let left = self.closure.unexplained.as_ref();
         let place = left.map_or_else(String::new, |left| {
-            format!("{} {} p {:.1e}", left.place, left.depends_on.join(" "), left.p_value)
+            format!("{} {} p {:.1e}", left.place, words(&left.depends_on), left.p_value)
         });
         let effects: Vec<String> = self.closure.effects.iter().map(|found| named(&found.effect)).collect();
         format!(

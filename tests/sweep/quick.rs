@@ -1,6 +1,6 @@
 //! A representative part of the sweep, and the cases of `tests/cases`.
 
-use flexcal::diagnose::{Verdict, close};
+use flexcal::diagnose::{Covariate, Verdict, close};
 use flexcal::identify::{Options, identify};
 use flexcal::measurement::Split;
 use flexcal::problem::{Effect, EffectDeclaration};
@@ -125,7 +125,7 @@ fn a_case_of_what_no_catalogue_holds() {
     let split = Split::new(&problem, &measurements).unwrap();
     let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
     let left = closure.unexplained.unwrap();
-    assert_eq!((left.place.as_str(), left.depends_on), ("joint 2", vec!["q2".to_owned()]));
+    assert_eq!((left.place.to_string().as_str(), left.depends_on), ("joint 2", vec![Covariate::Command(1)]));
     let (before, after) = (closure.before.fit.fitted.held_out, left.correction.unwrap().held_out);
     println!("g-not-in-catalogue: {:.4} mm, corrected {:.4} mm", before.rms.norm * 1e3, after.rms.norm * 1e3);
     assert!(2.0 * after.rms.norm < before.rms.norm);

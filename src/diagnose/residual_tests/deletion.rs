@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
-use super::Remainder;
+use super::FitResidual;
 use super::leverage::Leverage;
 
 /// Poses are not left out where they alone decide a direction: less than this part of it is left to the others.
@@ -21,8 +21,8 @@ pub(super) struct Kept {
 
 impl Kept {
     /// All poses.
-    pub fn all(remainder: &Remainder, leverage: Leverage) -> Self {
-        let residual = remainder.residual.clone();
+    pub fn all(fit: &FitResidual, leverage: Leverage) -> Self {
+        let residual = fit.residual.clone();
         Self { poses: (0..residual.len() / 3).collect(), residual, leverage }
     }
 
@@ -30,19 +30,19 @@ impl Kept {
     ///
     /// With Q_A and Q_B the rows of the kept and the others, and M = I − Q_BᵀQ_B = L Lᵀ, it leaves r_A + Q_A M⁻¹ Q_Bᵀ r_B, and
     /// Q_A L⁻ᵀ takes the place of Q [Cook and Weisberg 1982, section 3.6].
-    pub fn without(remainder: &Remainder, out: &[bool]) -> Option<Self> {
-        let p = remainder.fitted.ncols();
+    pub fn without(fit: &FitResidual, out: &[bool]) -> Option<Self> {
+        let p = fit.fitted.ncols();
         let (gone, poses): (Vec<usize>, Vec<usize>) = (0..out.len()).partition(|&pose| out[pose]);
         let rows_of = |poses: &[usize]| -> Vec<usize> { poses.iter().flat_map(|&b| 3 * b..3 * b + 3).collect() };
         let (gone, kept) = (rows_of(&gone), rows_of(&poses));
-        let fitted_gone = remainder.fitted.select_rows(&gone);
-        let fitted = remainder.fitted.select_rows(&kept);
+        let fitted_gone = fit.fitted.select_rows(&gone);
+        let fitted = fit.fitted.select_rows(&kept);
         let decided = Cholesky::new(DMatrix::identity(p, p) - fitted_gone.tr_mul(&fitted_gone))?;
         if decided.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < LEAST_DECIDED) {
             return None;
         }
-        let pull = decided.solve(&fitted_gone.tr_mul(&remainder.residual.select_rows(&gone)));
-        let residual = remainder.residual.select_rows(&kept) + &fitted * pull;
+        let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
+        let residual = fit.residual.select_rows(&kept) + &fitted * pull;
         let fitted = decided.l().solve_lower_triangular(&fitted.transpose())?.transpose();
         Some(Self { poses, residual, leverage: Leverage::of(&fitted).ok()? })
     }

@@ -1,4 +1,4 @@
-//! Whether residuals depend on a driver.
+//! Whether residuals depend on a covariate.
 
 use nalgebra::Vector3;
 
@@ -9,11 +9,11 @@ use super::statistic::Sample;
 /// A range this small beside the values is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Distance correlation with a driver, of the mean.
+/// Distance correlation with a covariate, of the mean.
 ///
 /// ρ² = − Σᵢⱼ |xᵢ − xⱼ| yᵢ·yⱼ / (‖K‖ ‖Σ y yᵀ‖) = 2 Σₖ (x₍ₖ₊₁₎ − x₍ₖ₎) |Cₖ|² / (‖K‖ ‖Σ y yᵀ‖)
 ///
-/// with K the doubly centred distances of the driver x, y the centred residuals and Cₖ their sum over the k poses with the
+/// with K the doubly centred distances of the covariate x, y the centred residuals and Cₖ their sum over the k poses with the
 /// smallest x. It is the distance correlation of [Székely, Rizzo and Bakirov 2007] with squared distances between
 /// residuals instead of plain ones, which is the martingale difference correlation of [Shao and Zhang 2014]: 0 (for many
 /// poses) exactly where the mean residual is the same at every x, and no more than 1. An effect that the model lacks moves the

@@ -1,7 +1,7 @@
 //! The verdict of all checks together.
 
 use super::chance::Chance;
-use super::outcome::{Check, Findings, Outcome, Test, Untestable};
+use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
 
 /// Probability that noise alone makes any check fail.
 pub(super) const ALPHA: f64 = 0.01;
@@ -49,7 +49,7 @@ pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
             p_value: p_values[k].unwrap_or(1.0),
             failed: failed[k],
         });
-        Check { test, outcome }
+        ResidualTest { test, outcome }
     };
-    Findings { checks: tried.into_iter().enumerate().map(check).collect(), outliers }
+    Findings { tests: tried.into_iter().enumerate().map(check).collect(), outliers }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::outcome::{Sequence, Untestable};
 use super::statistic::Sample;
-use super::{LEAST_POSES, Remainder};
+use super::{FitResidual, LEAST_POSES};
 
 /// Most lags of the autocorrelation, and poses of a session per lag [Hyndman and Athanasopoulos 2018, section 5.4].
 const MOST_LAGS: usize = 10;
@@ -18,14 +18,14 @@ pub(super) struct Order {
 }
 
 /// The poses `kept` (which count from 0 anew) in the order of time, and in that of the rows where it is another.
-pub(super) fn sequences(remainder: &Remainder, kept: &[usize]) -> Vec<(Sequence, Result<Order, Untestable>)> {
-    let by_rows = Order::of(remainder, kept);
-    if !kept.iter().all(|&pose| remainder.time[pose].is_finite()) {
+pub(super) fn sequences(fit: &FitResidual, kept: &[usize]) -> Vec<(Sequence, Result<Order, Untestable>)> {
+    let by_rows = Order::of(fit, kept);
+    if !kept.iter().all(|&pose| fit.time[pose].is_finite()) {
         return vec![(Sequence::Time, Err(Untestable::NotFinite)), (Sequence::Rows, by_rows)];
     }
     let by_time = by_rows.clone().map(|mut order| {
         for session in &mut order.sessions {
-            session.sort_by(|&a, &b| remainder.time[kept[a]].total_cmp(&remainder.time[kept[b]]));
+            session.sort_by(|&a, &b| fit.time[kept[a]].total_cmp(&fit.time[kept[b]]));
         }
         order
     });
@@ -38,10 +38,10 @@ pub(super) fn sequences(remainder: &Remainder, kept: &[usize]) -> Vec<(Sequence,
 }
 
 impl Order {
-    fn of(remainder: &Remainder, kept: &[usize]) -> Result<Self, Untestable> {
+    fn of(fit: &FitResidual, kept: &[usize]) -> Result<Self, Untestable> {
         let mut by_session = std::collections::BTreeMap::<usize, Vec<usize>>::new();
         for (number, &pose) in kept.iter().enumerate() {
-            by_session.entry(remainder.session[pose]).or_default().push(number);
+            by_session.entry(fit.session[pose]).or_default().push(number);
         }
         let sessions: Vec<Vec<usize>> = by_session.into_values().collect();
         let longest = sessions.iter().map(Vec::len).max().unwrap_or(0);

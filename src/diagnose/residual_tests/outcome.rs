@@ -1,4 +1,6 @@
-//! What the checks found.
+//! What the residual tests found.
+
+use crate::diagnose::covariate::Covariate;
 
 /// An order of the poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -26,10 +28,10 @@ pub enum Test {
         /// The order.
         sequence: Sequence,
     },
-    /// Dependence of the mean residual on a driver; statistic: a distance correlation, 0…1.
+    /// Dependence of the mean residual on a covariate; statistic: a distance correlation, 0…1.
     Dependence {
-        /// Name of the driver.
-        driver: String,
+        /// Which.
+        covariate: Covariate,
     },
     /// Poses too far off to be noise; statistic: the largest distance in units of the others' scatter.
     Outliers {
@@ -49,7 +51,7 @@ pub enum Untestable {
     /// Too few poses in any session.
     #[error("too few poses")]
     TooFewPoses,
-    /// The driver has the same value everywhere.
+    /// The covariate has the same value everywhere.
     #[error("it is the same at every pose")]
     Constant,
     /// No σ was declared.
@@ -64,7 +66,7 @@ pub enum Untestable {
     /// A value is not a finite number.
     #[error("a value is not a finite number")]
     NotFinite,
-    /// Residuals, fitted directions, labels or drivers differ in their number of poses.
+    /// Residuals, fitted directions, labels or covariates differ in their number of poses.
     #[error("residuals and labels differ in their number of poses")]
     SizeMismatch,
 }
@@ -86,14 +88,14 @@ pub struct Outcome {
 
 /// One check; its `Display` is a sentence for people.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Check {
+pub struct ResidualTest {
     /// What was tested.
     pub test: Test,
     /// What came of it, or why nothing did.
     pub outcome: Result<Outcome, Untestable>,
 }
 
-impl Check {
+impl ResidualTest {
     /// Short name of the test.
     pub fn name(&self) -> &'static str {
         match self.test {
@@ -107,13 +109,13 @@ impl Check {
         }
     }
 
-    /// The driver that the check is about: of a dependence its name, of an order `time` or `rows`.
-    pub fn about(&self) -> Option<&str> {
-        match &self.test {
-            Test::Dependence { driver } => Some(driver),
+    /// The covariate that the test is about: of a test of order, time or row.
+    pub fn about(&self) -> Option<Covariate> {
+        match self.test {
+            Test::Dependence { covariate } => Some(covariate),
             Test::Runs { sequence } | Test::LjungBox { sequence } => Some(match sequence {
-                Sequence::Time => "time",
-                Sequence::Rows => "rows",
+                Sequence::Time => Covariate::Time,
+                Sequence::Rows => Covariate::Row,
             }),
             Test::ReducedChiSquared | Test::LackOfFit | Test::Outliers { .. } | Test::Normality => None,
         }
@@ -134,7 +136,7 @@ impl Check {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
     /// Every check, testable or not.
-    pub checks: Vec<Check>,
+    pub tests: Vec<ResidualTest>,
     /// Poses that were left out as outliers, counted from 0.
     pub outliers: Vec<usize>,
 }
@@ -146,14 +148,14 @@ impl Findings {
     }
 
     /// The failed check of structure that chance explains least.
-    pub fn strongest(&self) -> Option<&Check> {
-        let p_value = |check: &Check| check.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value);
-        let failed = self.checks.iter().filter(|check| check.is_structure() && check.failed());
+    pub fn strongest(&self) -> Option<&ResidualTest> {
+        let p_value = |check: &ResidualTest| check.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value);
+        let failed = self.tests.iter().filter(|check| check.is_structure() && check.failed());
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
     /// Whether anything was tested for structure.
     pub fn is_testable(&self) -> bool {
-        self.checks.iter().any(|check| check.is_structure() && check.outcome.is_ok())
+        self.tests.iter().any(|check| check.is_structure() && check.outcome.is_ok())
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::Remainder;
+use super::FitResidual;
 use super::chance::Chance;
 use super::deletion::{Kept, Others, each_left_out};
 use super::judgement::{Trial, Tried};
@@ -29,9 +29,9 @@ pub(super) struct Found {
 /// degrees of freedom: it has the F distribution with 3 and ν of them, whatever σ is (nearly so with priors). The pose is
 /// too far off where N P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. Where more than one pose in five is, the
 /// rest stays in: that is no outlier, but what the noise is like.
-pub(super) fn find(remainder: &Remainder, leverage: &Leverage, level: f64) -> Found {
-    let poses = remainder.residual.len() / 3;
-    let mut distances = distances(leverage, remainder.residual);
+pub(super) fn find(fit: &FitResidual, leverage: &Leverage, level: f64) -> Found {
+    let poses = fit.residual.len() / 3;
+    let mut distances = distances(leverage, fit.residual);
     let mut kept: Option<Kept> = None;
     let tried = test(&distances);
     let mut out = vec![false; poses];
@@ -47,7 +47,7 @@ pub(super) fn find(remainder: &Remainder, leverage: &Leverage, level: f64) -> Fo
         if out.iter().filter(|&&out| out).count() > (poses / ONE_IN).max(1) {
             break;
         }
-        let Some(rest) = Kept::without(remainder, &out) else { break };
+        let Some(rest) = Kept::without(fit, &out) else { break };
         distances = self::distances(&rest.leverage, &rest.residual);
         kept = Some(rest);
     }

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use super::outcome::{Check, Outcome, Sequence, Test};
+use super::outcome::{Outcome, ResidualTest, Sequence, Test};
 
-impl fmt::Display for Check {
+impl fmt::Display for ResidualTest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.outcome {
             Ok(outcome) => tested(&self.test, outcome, f),
@@ -44,9 +44,9 @@ fn tested(test: &Test, outcome: &Outcome, f: &mut fmt::Formatter<'_>) -> fmt::Re
             let follow = if *failed { "follow one another" } else { "do not follow one another beyond chance" };
             write!(f, "residuals {follow} {} (Ljung–Box {statistic:.1}, chance gives up to {to:.1})", order(*sequence))
         }
-        Test::Dependence { driver } => {
+        Test::Dependence { covariate } => {
             let depend = if *failed { "depend" } else { "do not depend beyond chance" };
-            write!(f, "residuals {depend} on {driver} (distance correlation {statistic:.2}, {chance})")
+            write!(f, "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {chance})")
         }
         Test::Outliers { worst } => {
             let pose = worst.map_or_else(String::new, |pose| format!("pose {} ", pose + 1));
@@ -73,7 +73,7 @@ fn untested(test: &Test) -> String {
         Test::LackOfFit => "size against repeats".to_owned(),
         Test::Runs { sequence } => format!("signs {}", order(*sequence)),
         Test::LjungBox { sequence } => format!("autocorrelation {}", order(*sequence)),
-        Test::Dependence { driver } => format!("dependence on {driver}"),
+        Test::Dependence { covariate } => format!("dependence on {covariate}"),
         Test::Outliers { .. } => "outliers".to_owned(),
         Test::Normality => "normal distribution".to_owned(),
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, FisherSnedecor};
 
-use super::Remainder;
+use super::FitResidual;
 use super::chance::Chance;
 use super::deletion::Kept;
 use super::judgement::{Trial, Tried};
@@ -16,10 +16,10 @@ use super::outcome::{Test, Untestable};
 /// Without priors ‖r‖² has the χ² distribution with ν degrees of freedom. With priors, a fit that the truth leaves as the
 /// priors say has residuals of covariance I − H, and ‖r‖² is close to g χ² with ν / g degrees of freedom,
 /// g = tr (I − H)² / ν, which has the same mean and variance [Satterthwaite 1946].
-pub(super) fn reduced_chi_squared(remainder: &Remainder, kept: &Kept) -> Tried {
+pub(super) fn reduced_chi_squared(fit: &FitResidual, kept: &Kept) -> Tried {
     let freedom = kept.leverage.freedom;
     let factor = kept.leverage.squared_freedom / freedom;
-    let trial = if remainder.sigma_is_declared {
+    let trial = if fit.sigma_is_declared {
         let distribution = ChiSquared::new(freedom / factor).map_err(|_| Untestable::NoFreedom);
         distribution.map(|distribution| Trial {
             statistic: kept.residual.norm_squared() / freedom,
@@ -35,14 +35,14 @@ pub(super) fn reduced_chi_squared(remainder: &Remainder, kept: &Kept) -> Tried {
 /// Variance of the residuals beside that of repeats about their mean, which no model explains [Draper and Smith 1998, ch. 2].
 ///
 /// F = ((‖r‖² − P) / (ν − νₚ)) / (P / νₚ),  P = Σ |r − r̄ of the same setup|²,  νₚ = 3 Σ (repeats − 1)
-pub(super) fn lack_of_fit(remainder: &Remainder, kept: &Kept) -> Tried {
-    Tried { test: Test::LackOfFit, trial: ratio(remainder, kept) }
+pub(super) fn lack_of_fit(fit: &FitResidual, kept: &Kept) -> Tried {
+    Tried { test: Test::LackOfFit, trial: ratio(fit, kept) }
 }
 
-fn ratio(remainder: &Remainder, kept: &Kept) -> Result<Trial, Untestable> {
+fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
     let mut setups = BTreeMap::<usize, Vec<Vector3<f64>>>::new();
     for (&pose, residual) in kept.poses.iter().zip(kept.residual.as_slice().chunks_exact(3)) {
-        setups.entry(remainder.setup[pose]).or_default().push(Vector3::from_column_slice(residual));
+        setups.entry(fit.setup[pose]).or_default().push(Vector3::from_column_slice(residual));
     }
     let (mut pure, mut pure_freedom) = (0.0, 0.0);
     for repeats in setups.values() {

@@ -36,7 +36,7 @@ pub(super) enum Statistic {
     Runs(Arc<Order>),
     /// Ljung and Box's Q.
     LjungBox(Arc<Order>),
-    /// Squared distance correlation with a driver.
+    /// Squared distance correlation with a covariate.
     Dependence(Cumulative),
 }
 

@@ -2,9 +2,9 @@
 
 use super::super::candidates::covers;
 use super::super::fitted::{Fitted, Given, Normal};
-use super::super::generic::Generic;
 use super::super::neighbourhood::{Library, Scan, Tried, tries};
-use super::super::tracing::named_place;
+use super::super::screening::named_place;
+use super::super::smooth_term::SmoothTerm;
 use crate::problem::Effect;
 
 /// Candidates whose criterion is this close to that of an effect in its place are not told from it: odds of 20 to 1.
@@ -26,22 +26,27 @@ pub(super) struct Alternatives {
 pub(super) struct Replacements<'f, 'a> {
     fitted: &'f Fitted,
     library: &'f Library<'a>,
-    generics: &'f [Generic],
+    smooth_terms: &'f [SmoothTerm],
     normal: Normal,
     scan: Scan<'a, 'f>,
 }
 
 impl<'f, 'a> Replacements<'f, 'a> {
-    /// Tries `candidates`, whose places `library` holds, in a fit with `generics` put in.
-    pub fn new(fitted: &'f Fitted, library: &'f Library<'a>, candidates: &[Effect], generics: &'f [Generic]) -> Self {
-        let linear = fitted.linear(library, &[], generics);
-        let normal = fitted.normal(library, generics);
-        Self { fitted, library, generics, normal, scan: Scan::new(library, linear, candidates.to_vec()) }
+    /// Tries `candidates`, whose places `library` holds, in a fit with `smooth_terms` put in.
+    pub fn new(
+        fitted: &'f Fitted,
+        library: &'f Library<'a>,
+        candidates: &[Effect],
+        smooth_terms: &'f [SmoothTerm],
+    ) -> Self {
+        let linear = fitted.linear(library, &[], smooth_terms);
+        let normal = fitted.normal(library, smooth_terms);
+        Self { fitted, library, smooth_terms, normal, scan: Scan::new(library, linear, candidates.to_vec()) }
     }
 
     /// Those of one effect; `structured` where the fit leaves more than noise.
     pub fn of(&self, effect: &Effect, structured: bool) -> Alternatives {
-        let Given { directions, part } = self.fitted.given_by(self.library, (&self.normal, self.generics), effect);
+        let Given { directions, part } = self.fitted.given_by(self.library, (&self.normal, self.smooth_terms), effect);
         let sums = self.scan.linear.sums_without(&directions, &part);
         let everything: Vec<Effect> = self.scan.effects.iter().chain([effect]).cloned().collect();
         let (all_tries, families) = tries(&everything);

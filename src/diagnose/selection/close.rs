@@ -4,14 +4,14 @@ use super::super::candidates::{Candidates, covers};
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
-use super::super::tracing::{Trace, check_fit, trace_fit};
+use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
 use super::alternatives::Replacements;
+use super::harmonics;
 use super::interval::{self, Interval};
 use super::pick::LEVEL;
+pub use super::rounds::Round;
 use super::rounds::Rounds;
-pub use super::rounds::Step;
-use super::waves;
 use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
 use crate::measurement::{Measurements, Split};
 use crate::problem::{Effect, Problem};
@@ -48,7 +48,7 @@ pub struct Found {
 
 /// The loop from the declared problem to one that leaves nothing to find.
 #[derive(Debug, Clone)]
-pub struct Closure {
+pub struct ClosedLoop {
     /// What it came to.
     pub verdict: Verdict,
     /// The fit of the declared problem, its checks, and what its residual points to.
@@ -62,16 +62,16 @@ pub struct Closure {
     /// In the order in which they were found.
     pub effects: Vec<Found>,
     /// What each round came to.
-    pub steps: Vec<Step>,
+    pub rounds: Vec<Round>,
     /// 1 σ of the prior that the closed problem has for the waves of joints, where they are many [rad].
-    pub wave_sigma: Option<f64>,
+    pub harmonic_sigma: Option<f64>,
     /// Structure that no effect explains.
     pub unexplained: Option<Unexplained>,
     /// Mean reduction of the error on held-out poses [m].
     pub gain: Interval,
 }
 
-impl Closure {
+impl ClosedLoop {
     /// Error on held-out poses once an effect was in the model, where more was added after it.
     pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
         Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
@@ -87,45 +87,44 @@ pub fn close(
     measurements: &Measurements,
     split: &Split,
     options: &Options,
-) -> Result<Closure, IdentifyError> {
+) -> Result<ClosedLoop, IdentifyError> {
     let data = Data::new(measurements, split);
     let first = Fitted::new(problem.clone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &split.held_out);
     let declared = first.effects();
     let mut rounds =
-        Rounds { data: &data, options, declared, generics: Vec::new(), steps: Vec::new(), seen: Vec::new() };
+        Rounds { data: &data, options, declared, smooth_terms: Vec::new(), steps: Vec::new(), seen: Vec::new() };
     let mut fitted = rounds.run(first)?;
     for _ in 0..if rounds.has_many_poses() { 1 } else { MOST_EXCHANGES } {
         let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
         fitted = rounds.run(next)?;
     }
     let (fitted, unexplained) = with_generic(&mut rounds, fitted)?;
-    let (fitted, wave_sigma) = waves::filled(&rounds, fitted)?;
+    let (fitted, harmonic_sigma) = harmonics::filled(&rounds, fitted)?;
     let findings = check_fit(&fitted, &data);
     let unexplained = if rounds.has_many_poses() {
-        unexplained::localise(&fitted, &data, rounds.generics.first(), LEVEL)
+        unexplained::localise(&fitted, &data, rounds.smooth_terms.first(), LEVEL)
     } else {
         unexplained
     };
     let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
-    let effects = found(&rounds, &fitted, (findings.is_structured(), wave_sigma.is_some()));
+    let effects = found(&rounds, &fitted, (findings.is_structured(), harmonic_sigma.is_some()));
     let verdict = match (&unexplained, effects.is_empty()) {
         (Some(_), _) => Verdict::Unexplained,
         (None, true) => Verdict::NothingFound,
         (None, false) => Verdict::Explained,
     };
     let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &split.held_out));
-    let steps = rounds.steps;
-    Ok(Closure {
+    Ok(ClosedLoop {
         verdict,
         before,
         after: fitted.found,
         findings,
         closed: fitted.problem,
         effects,
-        steps,
-        wave_sigma,
+        rounds: rounds.steps,
+        harmonic_sigma,
         unexplained,
         gain,
     })
@@ -137,15 +136,15 @@ fn with_generic(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<U
     let data = rounds.data;
     let candidates = Candidates::of(&fitted.problem, data).testable;
     let without =
-        if let Some((generic, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates) {
-            rounds.generics.push(generic);
+        if let Some((smooth_term, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates) {
+            rounds.smooth_terms.push(smooth_term);
             let without = rounds.fit(&fitted, &rest)?;
             let without = rounds.without_insignificant(without)?;
             rounds.seen.clear();
             rounds.note(&without);
             rounds.run(without)?
-        } else if let Some(generic) = unexplained::strongest(&fitted, data, LEVEL) {
-            rounds.generics.push(generic);
+        } else if let Some(smooth_term) = unexplained::strongest(&fitted, data, LEVEL) {
+            rounds.smooth_terms.push(smooth_term);
             let without = rounds.without_insignificant(fitted.clone())?;
             if rounds.is_new(&without) {
                 rounds.note(&without);
@@ -154,11 +153,11 @@ fn with_generic(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<U
         } else {
             return Ok((fitted, None));
         };
-    let left = unexplained::localise(&without, data, rounds.generics.first(), LEVEL);
+    let left = unexplained::localise(&without, data, rounds.smooth_terms.first(), LEVEL);
     if left.is_some() {
         return Ok((without, left));
     }
-    rounds.generics.clear();
+    rounds.smooth_terms.clear();
     rounds.note(&fitted);
     Ok((fitted, None))
 }
@@ -170,9 +169,9 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
         return Ok(None);
     }
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let generics = rounds.generics.clone();
-    let library = fitted.library(rounds.data, &candidates, &generics);
-    let replacements = Replacements::new(fitted, &library, &candidates, &generics);
+    let smooth_terms = rounds.smooth_terms.clone();
+    let library = fitted.library(rounds.data, &candidates, &smooth_terms);
+    let replacements = Replacements::new(fitted, &library, &candidates, &smooth_terms);
     for effect in &added {
         let other = replacements.of(effect, false);
         if let Some(better) = &other.better {
@@ -191,14 +190,14 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
 /// Every added effect with what is known of it, where structure is left, and where waves share a prior.
 fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bool)) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let library = fitted.library(rounds.data, &candidates, &rounds.generics);
-    let replacements = Replacements::new(fitted, &library, &candidates, &rounds.generics);
+    let library = fitted.library(rounds.data, &candidates, &rounds.smooth_terms);
+    let replacements = Replacements::new(fitted, &library, &candidates, &rounds.smooth_terms);
     let added = rounds.added(fitted);
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
-        let holds = |step: &&Step| step.effects.iter().any(|known| covers(effect, known));
+        let holds = |step: &&Round| step.effects.iter().any(|known| covers(effect, known));
         let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };

@@ -2,13 +2,13 @@
 
 mod alternatives;
 mod close;
+mod harmonics;
 mod interval;
 mod pick;
 mod retest;
 mod rounds;
-mod waves;
 
-pub use close::{Closure, Found, Step, Verdict, close};
+pub use close::{ClosedLoop, Found, Round, Verdict, close};
+pub use harmonics::HARMONICS;
 pub use interval::Interval;
 pub(super) use pick::LEVEL;
-pub use waves::WAVES;

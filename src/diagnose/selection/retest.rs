@@ -3,8 +3,8 @@
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::super::fitted::Fitted;
-use super::super::generic::Generic;
 use super::super::neighbourhood::{Library, Linear};
+use super::super::smooth_term::SmoothTerm;
 use crate::problem::Effect;
 
 /// An effect of a fit, and the probability that it is none.
@@ -15,8 +15,13 @@ pub(super) struct Retested {
 }
 
 /// Effects of a fit with their p: what it would lose without each.
-pub(super) fn retest(fitted: &Fitted, library: &Library, generics: &[Generic], own: Vec<Effect>) -> Vec<Retested> {
-    let (linear, normal) = (fitted.linear(library, &[], generics), fitted.normal(library, generics));
+pub(super) fn retest(
+    fitted: &Fitted,
+    library: &Library,
+    smooth_terms: &[SmoothTerm],
+    own: Vec<Effect>,
+) -> Vec<Retested> {
+    let (linear, normal) = (fitted.linear(library, &[], smooth_terms), fitted.normal(library, smooth_terms));
     let test = |effect: Effect| {
         let parameters = fitted.parameters_of(&effect);
         let loss = fitted.loss_without(&normal, &parameters);

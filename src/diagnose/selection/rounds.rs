@@ -3,8 +3,8 @@
 use super::super::candidates::{Candidates, joined, parts};
 use super::super::data::Data;
 use super::super::fitted::Fitted;
-use super::super::generic::Generic;
 use super::super::neighbourhood::{Scan, tries};
+use super::super::smooth_term::SmoothTerm;
 use super::pick::{LEAVING, MOST_REFITTED, Pick, pick};
 use super::retest::{Retested, retest};
 use crate::identify::{ErrorSummary, IdentifyError, Options};
@@ -19,7 +19,7 @@ const MOST_RIVALS: usize = 5;
 
 /// One round of the loop.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct Round {
     /// Effects in the model after it.
     pub effects: Vec<Effect>,
     /// Error on the identification poses.
@@ -35,8 +35,8 @@ pub(super) struct Rounds<'a> {
     /// Effects of the problem itself, which stay.
     pub declared: Vec<Effect>,
     /// Smooth structure that is known of and kept out of the search.
-    pub generics: Vec<Generic>,
-    pub steps: Vec<Step>,
+    pub smooth_terms: Vec<SmoothTerm>,
+    pub steps: Vec<Round>,
     /// Sets of effects that were fitted.
     pub seen: Vec<Vec<String>>,
 }
@@ -55,8 +55,8 @@ impl Rounds<'_> {
         while self.steps.len() < MOST_ROUNDS {
             let candidates = Candidates::of(&fitted.problem, self.data);
             let picks = {
-                let library = fitted.library(self.data, &candidates.testable, &self.generics);
-                let linear = fitted.linear(&library, &[], &self.generics);
+                let library = fitted.library(self.data, &candidates.testable, &self.smooth_terms);
+                let linear = fitted.linear(&library, &[], &self.smooth_terms);
                 pick(&mut Scan::new(&library, linear, candidates.testable), self.data)
             };
             let Some(next) = self.with(&fitted, &picks)? else { break };
@@ -97,7 +97,7 @@ impl Rounds<'_> {
     /// Enters a fit into the story.
     pub fn note(&mut self, fitted: &Fitted) {
         let errors = fitted.found.fitted;
-        self.steps.push(Step {
+        self.steps.push(Round {
             effects: self.added(fitted),
             identification: errors.identification,
             held_out: errors.held_out,
@@ -146,8 +146,8 @@ impl Rounds<'_> {
 
     /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect that was picked.
     fn criterion(&self, fitted: &Fitted, picked: &Effect) -> f64 {
-        let library = fitted.library(self.data, &[], &self.generics);
-        let linear = fitted.linear(&library, &[], &self.generics);
+        let library = fitted.library(self.data, &[], &self.smooth_terms);
+        let linear = fitted.linear(&library, &[], &self.smooth_terms);
         let candidates = Candidates::of(&fitted.problem, self.data).testable;
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
@@ -181,13 +181,13 @@ impl Rounds<'_> {
 
     /// Effects of a fit with their p, corrected for the tries: those of all orders of a harmonic together.
     pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
-        let library = fitted.library(self.data, &[], &self.generics);
+        let library = fitted.library(self.data, &[], &self.smooth_terms);
         let mut everything = Candidates::of(&fitted.problem, self.data).testable;
         let first = everything.len();
         everything.extend(own.iter().flat_map(parts));
         let (tries, families) = tries(&everything);
         let mut tries = tries[first..].iter();
-        let mut tested = retest(fitted, &library, &self.generics, own);
+        let mut tested = retest(fitted, &library, &self.smooth_terms, own);
         for tested in &mut tested {
             let own: f64 = tries.by_ref().take(parts(&tested.effect).len()).sum();
             tested.p = (tested.p * own * families as f64).min(1.0);

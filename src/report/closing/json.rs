@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::super::json::{Both, Summary, to_text};
 use super::super::{effect, findings};
-use crate::diagnose::{Closure, Correction, Found, Interval, Step, Unexplained, Verdict};
+use crate::diagnose::{ClosedLoop, Correction, Found, Interval, Round, Unexplained, Verdict};
 use crate::identify::{Estimate, Identification};
 use crate::problem::Problem;
 
@@ -21,12 +21,12 @@ struct Document<'a> {
     /// Mean reduction of the error on held-out poses.
     held_out_gain_mm: IntervalEntry,
     effects: Vec<FoundEntry<'a>>,
-    unexplained: Option<UnexplainedEntry<'a>>,
+    unexplained: Option<UnexplainedEntry>,
     /// 1 σ of the prior that waves of joints were given [rad].
     wave_prior_rad: Option<f64>,
     steps: Vec<StepEntry<'a>>,
-    checks_before: Vec<findings::Entry<'a>>,
-    checks_after: Vec<findings::Entry<'a>>,
+    checks_before: Vec<findings::Entry>,
+    checks_after: Vec<findings::Entry>,
 }
 
 #[derive(Debug, Serialize)]
@@ -63,10 +63,10 @@ struct ParameterEntry<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct UnexplainedEntry<'a> {
+struct UnexplainedEntry {
     #[serde(rename = "where")]
-    place: &'a str,
-    depends_on: &'a [String],
+    place: String,
+    depends_on: Vec<String>,
     p_value: f64,
     held_out_with_empirical_correction: Option<Summary>,
     correction: Option<CorrectionEntry>,
@@ -112,7 +112,7 @@ impl<'a> From<&'a Estimate> for ParameterEntry<'a> {
 }
 
 impl<'a> FoundEntry<'a> {
-    fn of(found: &'a Found, closure: &Closure) -> Self {
+    fn of(found: &'a Found, closure: &ClosedLoop) -> Self {
         Self {
             effect: effect::Entry(&found.effect),
             description: closure.before.describe(&found.effect),
@@ -135,12 +135,12 @@ impl From<&Correction> for CorrectionEntry {
     }
 }
 
-impl<'a> From<&'a Unexplained> for UnexplainedEntry<'a> {
-    fn from(unexplained: &'a Unexplained) -> Self {
+impl From<&Unexplained> for UnexplainedEntry {
+    fn from(unexplained: &Unexplained) -> Self {
         let correction = unexplained.correction.as_ref();
         Self {
-            place: &unexplained.place,
-            depends_on: &unexplained.depends_on,
+            place: unexplained.place.to_string(),
+            depends_on: unexplained.depends_on.iter().map(ToString::to_string).collect(),
             p_value: unexplained.p_value,
             held_out_with_empirical_correction: correction.map(|correction| (&correction.held_out).into()),
             correction: correction.map(CorrectionEntry::from),
@@ -148,8 +148,8 @@ impl<'a> From<&'a Unexplained> for UnexplainedEntry<'a> {
     }
 }
 
-impl<'a> From<&'a Step> for StepEntry<'a> {
-    fn from(step: &'a Step) -> Self {
+impl<'a> From<&'a Round> for StepEntry<'a> {
+    fn from(step: &'a Round) -> Self {
         Self {
             effects: step.effects.iter().map(effect::Entry).collect(),
             identification: (&step.identification).into(),
@@ -159,7 +159,7 @@ impl<'a> From<&'a Step> for StepEntry<'a> {
 }
 
 /// What the loop came to as JSON text, ending in a line break; SI units except where a key says otherwise.
-pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
+pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
     to_text(&Document {
         problem: &problem.name,
         verdict: match closure.verdict {
@@ -175,8 +175,8 @@ pub fn loop_json(problem: &Problem, closure: &Closure) -> String {
         held_out_gain_mm: closure.gain.into(),
         effects: closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
         unexplained: closure.unexplained.as_ref().map(UnexplainedEntry::from),
-        wave_prior_rad: closure.wave_sigma,
-        steps: closure.steps.iter().map(StepEntry::from).collect(),
+        wave_prior_rad: closure.harmonic_sigma,
+        steps: closure.rounds.iter().map(StepEntry::from).collect(),
         checks_before: findings::entries(&closure.before.findings),
         checks_after: findings::entries(&closure.findings),
     })

@@ -5,14 +5,14 @@ use super::super::parameters::parameter_blocks;
 use super::super::quantity::number;
 use super::super::{findings, trace};
 use super::parts;
-use crate::diagnose::{Closure, Step};
+use crate::diagnose::{ClosedLoop, Round};
 use crate::problem::Problem;
 
 /// Candidates that a report shows.
 const SHOWN: usize = 8;
 
 /// The whole story of the loop as Markdown, ending in a line break.
-pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
+pub fn loop_markdown(problem: &Problem, closure: &ClosedLoop) -> String {
     let fit = &closure.before.fit;
     let counts = format!(
         "{} parameters from {} poses; {} poses held out, which took no part in any choice.",
@@ -40,12 +40,12 @@ pub fn loop_markdown(problem: &Problem, closure: &Closure) -> String {
 }
 
 /// What each round of fit, trace and refit came to.
-fn rounds(closure: &Closure) -> Vec<Block> {
-    if closure.steps.is_empty() {
+fn rounds(closure: &ClosedLoop) -> Vec<Block> {
+    if closure.rounds.is_empty() {
         return Vec::new();
     }
     let mm = |value: f64| number(value * 1e3, 4);
-    let row = |(k, step): (usize, &Step)| {
+    let row = |(k, step): (usize, &Round)| {
         let effects =
             match step.effects.iter().map(|effect| closure.before.describe(effect)).collect::<Vec<_>>().join("; ") {
                 none if none.is_empty() => "none".to_owned(),
@@ -55,6 +55,6 @@ fn rounds(closure: &Closure) -> Vec<Block> {
         [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
     };
     let header = vec!["round", "effects in the model", "identification rms, mm", "held out mean", "held out rms"];
-    let rows = closure.steps.iter().enumerate().map(row).collect();
+    let rows = closure.rounds.iter().enumerate().map(row).collect();
     vec![Block::heading("Rounds"), Block::Table(Table { header, rows, left: vec![1] })]
 }

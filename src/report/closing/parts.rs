@@ -8,7 +8,7 @@ use super::super::errors::unpredicted;
 use super::super::findings;
 use super::super::quantity::number;
 use super::super::text::why_not_trusted;
-use crate::diagnose::{Closure, Correction, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
+use crate::diagnose::{ClosedLoop, Correction, Covariate, Found, HELD_FIXED, REFUSED, Unexplained, Verdict};
 use crate::identify::ErrorSummary;
 use crate::problem::{JointKind, Problem};
 
@@ -18,7 +18,7 @@ pub(super) const ALL: &str = "the estimate.json of `flexcal identify problem.clo
 const SHOWN: usize = 4;
 
 /// The outcome in a sentence or two.
-pub(super) fn verdict(closure: &Closure) -> String {
+pub(super) fn verdict(closure: &ClosedLoop) -> String {
     let found = match closure.effects.as_slice() {
         [] => "No effect was found".to_owned(),
         [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
@@ -38,13 +38,13 @@ fn lower(words: &str) -> String {
 }
 
 /// Why the final fit is not to be trusted.
-pub(super) fn distrust(closure: &Closure) -> Option<Block> {
+pub(super) fn distrust(closure: &ClosedLoop) -> Option<Block> {
     let after = &closure.after;
     (!after.is_trusted()).then(|| Block::Text(format!("Beware: {}.", why_not_trusted(after))))
 }
 
 /// Errors of the nominal arm, the declared problem and the closed one.
-pub(super) fn errors(closure: &Closure) -> Table {
+pub(super) fn errors(closure: &ClosedLoop) -> Table {
     let row = |poses: &str, model: &str, of: &ErrorSummary, chi2: Option<f64>| {
         let mut row = vec![poses.to_owned(), model.to_owned()];
         row.extend([of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value * 1e3, 4)));
@@ -67,7 +67,7 @@ pub(super) fn errors(closure: &Closure) -> Table {
 }
 
 /// How the figures are to be read, with the gain and how sure it is.
-pub(super) fn gain(closure: &Closure) -> String {
+pub(super) fn gain(closure: &ClosedLoop) -> String {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
@@ -93,7 +93,7 @@ pub(super) fn gain(closure: &Closure) -> String {
 }
 
 /// Every effect that was found.
-pub(super) fn found(closure: &Closure) -> Vec<Block> {
+pub(super) fn found(closure: &ClosedLoop) -> Vec<Block> {
     if closure.effects.is_empty() {
         return Vec::new();
     }
@@ -101,7 +101,7 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
         Block::heading("What was found"),
         Block::Ranking(closure.effects.iter().map(|found| point(closure, found)).collect()),
     ];
-    if let Some(sigma) = closure.wave_sigma {
+    if let Some(sigma) = closure.harmonic_sigma {
         blocks.push(Block::Text(format!(
             "Waves of joints are many: every order up to the highest that stands out is in the model, with one prior of {} ° \
              for all. With it, poses are predicted best where whole parts of a joint's range are left out.",
@@ -111,7 +111,7 @@ pub(super) fn found(closure: &Closure) -> Vec<Block> {
     blocks
 }
 
-fn point(closure: &Closure, found: &Found) -> Point {
+fn point(closure: &ClosedLoop, found: &Found) -> Point {
     let mut details = Values::of(&found.estimates).lines();
     let mut chance = format!("{}, the probability that it is chance", effect::p(found.p_value));
     if let Some(then) = closure.held_out_once(found) {
@@ -133,10 +133,10 @@ fn point(closure: &Closure, found: &Found) -> Point {
 }
 
 /// What no effect explains.
-pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
+pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
     let Some(unexplained) = &closure.unexplained else { return Vec::new() };
     let Unexplained { place, depends_on, p_value, correction } = unexplained;
-    let on = depends_on.join(", ");
+    let on = depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let mut sentences = vec![match on.as_str() {
         "" => format!("Structure is left: {place} ({}).", effect::p(*p_value)),
         on => format!("Structure is left: {place}, depending on {on} ({}).", effect::p(*p_value)),
@@ -154,7 +154,7 @@ pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
         None => {
             sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
         }
-        Some(Correction { range, beyond, cross_validated: (without, with), held_out, .. }) => {
+        Some(Correction { covariate, range, beyond, cross_validated: (without, with), held_out, .. }) => {
             let mm = |value: &f64| number(value * 1e3, 4);
             sentences.push(format!(
                 "A smooth correction there as a function of {on} would bring the held-out error to {} mm in the mean, rms \
@@ -165,7 +165,7 @@ pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
                 mm(without),
                 mm(with),
             ));
-            let (factor, unit) = unit(problem, &on);
+            let (factor, unit) = unit(problem, *covariate);
             sentences.push(format!(
                 "It holds for {on} from {} to {}{unit}, as far as the identification poses reach; nothing is corrected beyond \
                  ({beyond} of {} held-out poses).",
@@ -179,20 +179,14 @@ pub(super) fn unexplained(problem: &Problem, closure: &Closure) -> Vec<String> {
 }
 
 /// Factor from SI to the unit in which people read a quantity of the poses.
-fn unit(problem: &Problem, quantity: &str) -> (f64, &'static str) {
-    match quantity {
-        "temperature" => (1.0, " °C"),
-        "time" => (1.0 / 3600.0, " h"),
-        "row" => (1.0, ""),
-        "payload" => (1.0, " kg"),
-        "hoist" => (1.0, " N"),
-        command => {
-            let joint = command.strip_prefix('q').and_then(|number| number.parse::<usize>().ok());
-            let joint = joint.and_then(|number| problem.joints.get(number.checked_sub(1)?));
-            match joint.map(|joint| joint.kind) {
-                Some(JointKind::Prismatic) => (1e3, " mm"),
-                _ => (180.0 / std::f64::consts::PI, " °"),
-            }
-        }
+fn unit(problem: &Problem, covariate: Covariate) -> (f64, &'static str) {
+    match covariate {
+        Covariate::Temperature => (1.0, " °C"),
+        Covariate::Time => (1.0 / 3600.0, " h"),
+        Covariate::Payload => (1.0, " kg"),
+        Covariate::Hoist => (1.0, " N"),
+        Covariate::Command(joint) if problem.joints[joint].kind == JointKind::Prismatic => (1e3, " mm"),
+        Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
+        _ => (1.0, ""),
     }
 }

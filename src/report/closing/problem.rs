@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
 
 use super::super::effect::{Values, p};
-use crate::diagnose::{Closure, Found, Trace, WAVES};
+use crate::diagnose::{ClosedLoop, Found, HARMONICS, Trace};
 use crate::model::effect::{self, Argument};
 use crate::problem::{Effect, Problem};
 
@@ -17,7 +17,7 @@ use crate::problem::{Effect, Problem};
 pub fn closed_problem(
     text: &str,
     problem: &Problem,
-    closure: &Closure,
+    closure: &ClosedLoop,
     files: &[PathBuf],
 ) -> Result<String, TomlError> {
     let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
@@ -26,7 +26,7 @@ pub fn closed_problem(
         (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
     });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
-    match closure.wave_sigma {
+    match closure.harmonic_sigma {
         Some(sigma) => with_rule(&edited, sigma),
         None => Ok(edited),
     }
@@ -38,11 +38,11 @@ fn with_rule(text: &str, sigma: f64) -> Result<String, TomlError> {
     let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
     if let Some(parameters) = parameters.as_table_like_mut() {
         let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
-        parameters.insert(WAVES, Item::Value(Value::InlineTable(sigma)));
+        parameters.insert(HARMONICS, Item::Value(Value::InlineTable(sigma)));
     }
     // A table in one line has no room for a comment.
     if let Some(mut key) =
-        document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(WAVES))
+        document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(HARMONICS))
     {
         key.leaf_decor_mut()
             .set_prefix("# Found by flexcal loop: with this prior, what is left out is predicted best.\n");
@@ -214,7 +214,7 @@ mod tests {
         ] {
             let ruled = with_rule(text, 2.5e-5).unwrap();
             let read: toml::Table = ruled.parse().unwrap();
-            assert_eq!(read["parameters"][WAVES]["sigma_rad"].as_float(), Some(2.5e-5), "{ruled}");
+            assert_eq!(read["parameters"][HARMONICS]["sigma_rad"].as_float(), Some(2.5e-5), "{ruled}");
         }
     }
 

@@ -3,11 +3,11 @@
 use super::super::document::{Block, to_text};
 use super::super::findings;
 use super::parts;
-use crate::diagnose::Closure;
+use crate::diagnose::ClosedLoop;
 use crate::problem::Problem;
 
 /// What the loop came to as text, ending in a line break.
-pub fn loop_text(problem: &Problem, closure: &Closure) -> String {
+pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let poses = &closure.before.fit.fitted;
     let (n, held_out) = (poses.identification.n, poses.held_out.n);
     let mut blocks = vec![

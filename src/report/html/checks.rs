@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use crate::diagnose::{Check, Closure, Findings};
+use crate::diagnose::{ClosedLoop, Findings, ResidualTest};
 use crate::report::findings::another_size;
 
 /// Checks of both fits side by side.
-pub(super) fn list(closure: &Closure) -> Markup {
+pub(super) fn list(closure: &ClosedLoop) -> Markup {
     let (before, after) = (&closure.before, &closure.after);
     let another = another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| another_size(&closure.findings, after.reduced_chi2));
@@ -29,14 +29,14 @@ pub(super) fn of(findings: &Findings, chi2: Option<f64>) -> Markup {
 }
 
 fn one(findings: &Findings) -> Markup {
-    let of = |check: &Check| match (&check.outcome, check.failed()) {
+    let of = |check: &ResidualTest| match (&check.outcome, check.failed()) {
         (Err(_), _) => "skip",
         (Ok(_), true) => "fail",
         (Ok(_), false) => "pass",
     };
     html! {
         ul.plain {
-            @for check in &findings.checks { li class=(of(check)) { (check.to_string()) } }
+            @for check in &findings.tests { li class=(of(check)) { (check.to_string()) } }
         }
     }
 }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::figures::{self, Figure, capital, power_of_ten};
-use crate::diagnose::{Closure, Found, Trace, Unexplained};
+use crate::diagnose::{ClosedLoop, Found, Trace, Unexplained};
 use crate::model::effect;
 use crate::problem::Effect;
 use crate::report::effect::Values;
@@ -31,7 +31,7 @@ fn chance(p: f64) -> String {
 }
 
 /// Every found effect with its numbers, then what no effect explains.
-pub(super) fn story(closure: &Closure) -> Markup {
+pub(super) fn story(closure: &ClosedLoop) -> Markup {
     html! {
         @if closure.effects.is_empty() { p { "No effect of the catalogue stands out of the residual." } }
         div.columns {
@@ -41,7 +41,7 @@ pub(super) fn story(closure: &Closure) -> Markup {
     }
 }
 
-fn one(found: &Found, closure: &Closure) -> Markup {
+fn one(found: &Found, closure: &ClosedLoop) -> Markup {
     let values = Values::of(&found.estimates);
     let mut others: Vec<String> = found.alternatives.iter().map(named).collect();
     let more = others.len().saturating_sub(SHOWN);
@@ -70,7 +70,7 @@ fn one(found: &Found, closure: &Closure) -> Markup {
 }
 
 fn unexplained(left: &Unexplained) -> Markup {
-    let depends = left.depends_on.join(", ");
+    let depends = left.depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     html! {
         p.note {
             "Structure is left that no effect explains: " (left.place)
@@ -91,7 +91,7 @@ fn unexplained(left: &Unexplained) -> Markup {
 }
 
 /// The residual against the cause of each effect, and of structure without one.
-pub(super) fn figures(closure: &Closure, picture: &Picture) -> Vec<Figure> {
+pub(super) fn figures(closure: &ClosedLoop, picture: &Picture) -> Vec<Figure> {
     let causes = picture.causes.iter().enumerate();
     let mut all: Vec<Figure> = causes
         .map(|(k, cause)| {
@@ -111,7 +111,7 @@ pub(super) fn figures(closure: &Closure, picture: &Picture) -> Vec<Figure> {
 }
 
 /// What each round of the loop came to.
-pub(super) fn rounds(closure: &Closure) -> Markup {
+pub(super) fn rounds(closure: &ClosedLoop) -> Markup {
     let first = &closure.before.fit.fitted;
     let line = |round: usize, effects: &[Effect], fitted: f64, held_out: f64| {
         let names: Vec<String> = effects.iter().map(named).collect();
@@ -130,7 +130,7 @@ pub(super) fn rounds(closure: &Closure) -> Markup {
             thead { tr { th.l { "round" } th.l { "effects in the model" } th { "fitted [mm]" } th { "held out [mm]" } } }
             tbody {
                 (line(0, &[], first.identification.mean.norm, first.held_out.mean.norm))
-                @for (k, step) in closure.steps.iter().enumerate() {
+                @for (k, step) in closure.rounds.iter().enumerate() {
                     (line(k + 1, &step.effects, step.identification.mean.norm, step.held_out.mean.norm))
                 }
             }

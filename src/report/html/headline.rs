@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::diagnose::{Closure, Verdict};
+use crate::diagnose::{ClosedLoop, Verdict};
 use crate::identify::{Comparison, ErrorSummary, Errors, Identification, Noise};
 use crate::problem::Problem;
 use crate::report::errors::unpredicted;
@@ -108,7 +108,7 @@ pub(super) fn of_comparison(problem: &Problem, comparison: &Comparison) -> Marku
 }
 
 /// Of a closed loop: with the interval of the gain.
-pub(super) fn of_closure(problem: &Problem, closure: &Closure) -> Markup {
+pub(super) fn of_closure(problem: &Problem, closure: &ClosedLoop) -> Markup {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
     let gain = closure.gain;

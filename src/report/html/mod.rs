@@ -13,7 +13,7 @@ mod style;
 
 use maud::{Markup, html};
 
-use crate::diagnose::Closure;
+use crate::diagnose::ClosedLoop;
 use crate::identify::{Comparison, Identification};
 use crate::problem::Problem;
 use crate::report::plot_data::Picture;
@@ -80,7 +80,7 @@ pub fn comparison_page(problem: &Problem, comparison: &Comparison, picture: &Pic
 }
 
 /// The report of the loop.
-pub fn closure_page(problem: &Problem, closure: &Closure, picture: &Picture) -> Page {
+pub fn closure_page(problem: &Problem, closure: &ClosedLoop, picture: &Picture) -> Page {
     let mut figures = Figures::default();
     let causes = effects::figures(closure, picture);
     let body = html! {

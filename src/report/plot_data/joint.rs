@@ -8,7 +8,7 @@ use crate::model::PoseResiduals;
 use crate::model::parameter::Slot;
 
 /// A pose whose position moves by less than this part of the most is left out: it says little about the coordinate.
-const LEAST_LEVER: f64 = 0.1;
+pub(super) const LEAST_LEVER: f64 = 0.1;
 
 /// ∂p/∂(coordinate) of some rows [m/rad] or [m/m].
 pub(super) fn levers(arm: &Arm, sight: &Sight, rows: &[usize], slot: Slot) -> Vec<Vector3<f64>> {

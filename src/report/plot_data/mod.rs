@@ -12,7 +12,7 @@ mod trend;
 
 use nalgebra::Vector3;
 
-use crate::diagnose::{Closure, Findings, examine};
+use crate::diagnose::{ClosedLoop, Findings, examine};
 use crate::identify::{Comparison, Identification, IdentifyError, Noise, Placement, Strategy};
 use crate::measurement::{Measurements, Split};
 use crate::model::{Ablation, Model};
@@ -111,7 +111,7 @@ pub fn of_closure(
     problem: &Problem,
     measurements: &Measurements,
     split: &Split,
-    closure: &Closure,
+    closure: &ClosedLoop,
 ) -> Result<Picture, IdentifyError> {
     let sight = Sight::new(measurements, split);
     let before = Arm::of(problem, &sight, &closure.before.fit)?;
@@ -124,7 +124,7 @@ pub fn of_closure(
     let mut picture = sight.picture(states, &after, &closure.after, (sigma, closure.findings.clone()));
     picture.causes =
         closure.effects.iter().filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &sight)).collect();
-    picture.trend = closure.unexplained.as_ref().and_then(|left| trend::of(left, closure, &after, &sight, sigma));
+    picture.trend = closure.unexplained.as_ref().and_then(|left| trend::of(left, &closure.closed));
     Ok(picture)
 }
 

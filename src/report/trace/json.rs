@@ -16,7 +16,7 @@ struct Document<'a> {
     reduced_chi2: Option<f64>,
     /// Whether the checks see structure that an effect could explain.
     structured: bool,
-    checks: Vec<findings::Entry<'a>>,
+    checks: Vec<findings::Entry>,
     /// Candidates tried, orders and times counted.
     tried: usize,
     /// The p below which a candidate stands out.
@@ -85,7 +85,7 @@ impl<'a> RankedEntry<'a> {
             alike: alike
                 .map(|(effect, angle)| AlikeEntry { effect: effect::Entry(effect), angle_deg: angle.to_degrees() })
                 .collect(),
-            told_apart: ranked.apart.as_ref().map(|apart| ApartEntry {
+            told_apart: ranked.telling_pose.as_ref().map(|apart| ApartEntry {
                 from: effect::Entry(&apart.other),
                 q: &apart.configuration,
                 payload_kg: apart.payload,

@@ -6,7 +6,7 @@ use super::super::document::{Block, Point, to_text};
 use super::super::errors::counted;
 use super::super::quantity::number;
 use super::super::{effect, findings};
-use crate::diagnose::{Apart, Ranked, Trace};
+use crate::diagnose::{Ranked, TellingPose, Trace};
 use crate::identify::Identification;
 use crate::problem::{JointKind, Problem};
 
@@ -104,7 +104,7 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
         };
         details.push(format!("hard to tell from: {}{more}", named.collect::<Vec<_>>().join("; ")));
     }
-    if let Some(apart) = &ranked.apart {
+    if let Some(apart) = &ranked.telling_pose {
         let other = trace.describe(&apart.other);
         details.push(format!("“{other}” would differ by {} mm at {}", mm(apart.difference), pose(problem, apart)));
     }
@@ -112,7 +112,7 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
 }
 
 /// A pose in words: joints, payload, hoist, temperature.
-fn pose(problem: &Problem, apart: &Apart) -> String {
+fn pose(problem: &Problem, apart: &TellingPose) -> String {
     let joints = problem.joints.iter().zip(&apart.configuration).enumerate();
     let mut words: Vec<String> = joints
         .filter_map(|(index, (joint, q))| match joint.kind {

@@ -15,7 +15,7 @@ const POSES: usize = 400;
 
 /// A pose that tells two effects apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Apart {
+pub struct TellingPose {
     /// The other effect.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) [rad] or [m].
@@ -57,13 +57,13 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
 }
 
 /// The pose of `poses`, which `there` describes, where the fits with the one effect and with the other differ most.
-pub(super) fn apart(
+pub(super) fn telling_pose(
     fitted: &Fitted,
     here: &Library,
     there: &Library,
     poses: &Measurements,
     (one, other): (&Effect, &Effect),
-) -> Option<Apart> {
+) -> Option<TellingPose> {
     let moved = |effect: &Effect| {
         let columns = beside(here.fitted(), &here.columns(effect));
         let step = fitted.step(here, &columns);
@@ -73,7 +73,7 @@ pub(super) fn apart(
     let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
     let best = (0..poses.len()).max_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     let at = |column: &Option<Vec<f64>>| column.as_ref().map(|column| column[best]);
-    Some(Apart {
+    Some(TellingPose {
         other: other.clone(),
         configuration: poses.configuration(best).to_vec(),
         payload: at(&poses.payload),

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::covariate::Place;
 use super::data::Data;
 use super::neighbourhood::Library;
 use crate::mechanics::Setup;
@@ -24,7 +25,7 @@ const CURVE: u32 = 100;
 
 /// A smooth error at one place that depends on one quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Generic {
+pub(super) struct SmoothTerm {
     pub slot: Slot,
     pub of: Quantity,
     /// Range of the quantity in the identification poses.
@@ -37,7 +38,7 @@ pub(super) struct Generic {
     pub fitted: usize,
 }
 
-impl Generic {
+impl SmoothTerm {
     /// Every place and quantity: cubic B-splines as fine as the poses allow, single bumps and single steps.
     pub fn all(problem: &Problem, data: &Data) -> Vec<Self> {
         let mut all = Vec::new();
@@ -118,36 +119,23 @@ impl Generic {
 
     /// The function that these coefficients make, at a hundred values over the range.
     pub fn curve(&self, coefficients: &[f64]) -> Vec<(f64, f64)> {
-        let at =
-            |value: f64| coefficients.iter().zip(&self.functions).map(|(c, function)| c * function.at(value)).sum();
         let value = |k| self.range.0 + (self.range.1 - self.range.0) * f64::from(k) / f64::from(CURVE);
-        (0..=CURVE).map(value).map(|value| (value, at(value))).collect()
+        (0..=CURVE).map(value).map(|value| (value, self.at(coefficients, value))).collect()
     }
 
-    /// Where it is, in words.
-    pub fn place(&self) -> String {
-        match self.slot {
-            Slot::Joint { joint, field: JointField::Alpha | JointField::A } => {
-                format!("link before joint {}", joint + 1)
-            }
-            Slot::Joint { joint, .. } => format!("joint {}", joint + 1),
-            _ => "measurement".to_owned(),
-        }
+    /// Where it is.
+    pub fn place(&self) -> Place {
+        Place::of(self.slot)
     }
 
-    /// What it depends on, as the files name it.
-    pub fn depends_on(&self) -> String {
-        match self.of {
-            Quantity::Command(joint) => format!("q{}", joint + 1),
-            Quantity::Temperature => "temperature".to_owned(),
-            Quantity::Elapsed => "time".to_owned(),
-            Quantity::Payload => "payload".to_owned(),
-            Quantity::Hoist => "hoist".to_owned(),
-        }
+    /// The function that these coefficients make, at a value of the quantity; beyond the range it keeps its last value.
+    pub fn at(&self, coefficients: &[f64], value: f64) -> f64 {
+        let value = value.clamp(self.range.0, self.range.1);
+        coefficients.iter().zip(&self.functions).map(|(c, function)| c * function.at(value)).sum()
     }
 }
 
-/// Every place where a generic error may be.
+/// Every place where a smooth error may be.
 pub(super) fn places(problem: &Problem) -> impl Iterator<Item = Slot> + '_ {
     (0..problem.joints.len())
         .flat_map(|joint| JointField::GEOMETRY.into_iter().map(move |field| Slot::Joint { joint, field }))

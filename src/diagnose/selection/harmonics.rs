@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::super::candidates::{covers, joined};
 use super::super::data::Data;
-use super::super::fitted::{Fitted, with_generics};
-use super::super::generic::Generic;
+use super::super::fitted::{Fitted, with_smooth_terms};
+use super::super::smooth_term::SmoothTerm;
 use super::pick::LEAVING;
 use super::retest::Retested;
 use super::rounds::Rounds;
@@ -31,7 +31,7 @@ const SCALES: std::ops::RangeInclusive<i32> = -8..=2;
 /// Part of a column's own square that holds what nothing sees where it is.
 const HELD: f64 = 1e-10;
 /// Pattern of the rule that gives all waves of joints one prior.
-pub const WAVES: &str = "joint-harmonic.*";
+pub const HARMONICS: &str = "joint-harmonic.*";
 
 /// The fit with every order of the joints whose waves are many, and 1 σ of their prior [rad]; the fit, settled, where they
 /// are few or no common prior can hold them.
@@ -46,7 +46,7 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     let squares: f64 = waves.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / waves.len() as f64).sqrt();
     let first = rounds.fit_few(with_scale(dense.clone(), found), &fitted)?;
-    let scale = best_scale(&first, rounds.data, &rounds.generics, found);
+    let scale = best_scale(&first, rounds.data, &rounds.smooth_terms, found);
     let mut filled = rounds.fit_whole(with_scale(dense, scale), &first)?;
     // What more waves explain need not be explained by anything else.
     loop {
@@ -96,7 +96,7 @@ fn all_orders(effect: Effect, declared: &[Effect]) -> Effect {
 /// The problem with a prior for all waves.
 fn with_scale(mut problem: Problem, sigma: f64) -> Problem {
     problem.parameters.push(ParameterRule {
-        pattern: WAVES.to_owned(),
+        pattern: HARMONICS.to_owned(),
         freedom: Freedom::Free {
             sigma: Quantities { angle: Some(sigma), ..Quantities::default() },
             min: Quantities::default(),
@@ -117,10 +117,10 @@ struct Part {
 
 /// The scale [rad] of the prior on waves with which parts of the joints' ranges that are left out are
 /// predicted best, in the linear neighbourhood of the fit.
-fn best_scale(fitted: &Fitted, data: &Data, generics: &[Generic], found: f64) -> f64 {
+fn best_scale(fitted: &Fitted, data: &Data, smooth_terms: &[SmoothTerm], found: f64) -> f64 {
     let waves = waves(fitted);
-    let library = fitted.library(data, &[], generics);
-    let (columns, residual) = (with_generics(&library, generics), library.residual());
+    let library = fitted.library(data, &[], smooth_terms);
+    let (columns, residual) = (with_smooth_terms(&library, smooth_terms), library.residual());
     let part = |poses: &Vec<usize>| {
         let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
         let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));

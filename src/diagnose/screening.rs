@@ -1,12 +1,12 @@
 //! What the residual of one fit points to.
 
-use super::apart::{Apart, apart, shuffled};
 use super::candidates::Candidates;
 use super::data::{Data, SEED};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
-use super::residual_tests::{Findings, Remainder, check};
+use super::residual_tests::{Findings, FitResidual, test_residual};
 use super::selection::LEVEL;
+use super::telling_pose::{TellingPose, shuffled, telling_pose};
 use super::unexplained::named;
 use crate::identify::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::{Measurements, Split};
@@ -36,7 +36,7 @@ pub struct Ranked {
     /// Entries of the ranking that it is hard to tell from, with the largest principal angle between them [rad].
     pub alike: Vec<(Effect, f64)>,
     /// A pose that would tell it from the first of those.
-    pub apart: Option<Apart>,
+    pub telling_pose: Option<TellingPose>,
 }
 
 /// What the residual of the declared problem's fit points to.
@@ -118,7 +118,8 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let own = &scan.effects[tried.index];
         let pair = alike.first().zip(there.as_ref());
-        let apart = pair.and_then(|((other, _), there)| apart(fitted, &library, there, &poses, (own, other)));
+        let telling_pose =
+            pair.and_then(|((other, _), there)| telling_pose(fitted, &library, there, &poses, (own, other)));
         Ranked {
             effect: scan.effects[tried.index].clone(),
             p_value: tried.corrected,
@@ -126,7 +127,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             gain: rms(scan.linear.sums().squares) - rms(scan.linear.sums().squares - tried.gain.squares),
             cross_validated,
             alike,
-            apart,
+            telling_pose,
         }
     };
     let ranking = best.iter().enumerate().map(ranked).collect();
@@ -161,16 +162,16 @@ pub fn examine(
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let library = fitted.library(data, &[], &[]);
     let linear = fitted.linear(&library, &[], &[]);
-    let remainder = Remainder {
+    let fit = FitResidual {
         residual: &linear.data_residual(),
         fitted: &linear.fitted(),
         sigma_is_declared: fitted.found.noise == Noise::Declared,
         time: &data.time(),
         session: &data.session(),
         setup: &data.setup,
-        drivers: &data.drivers(&fitted.problem),
+        covariates: &data.covariates(&fitted.problem),
     };
-    check(&remainder, SEED)
+    test_residual(&fit, SEED)
 }
 
 /// Family and place, orders and times left out.
