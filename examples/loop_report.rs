@@ -6,7 +6,7 @@ use std::{env, fs};
 
 use flexcal::diagnose::close;
 use flexcal::identify::Options;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, plot_data};
 
@@ -16,10 +16,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (problem, folder) = (Problem::read(Path::new(problem))?, Path::new(folder));
     let files: Vec<PathBuf> = files.iter().map(PathBuf::from).collect();
     let files = if files.is_empty() { &problem.data.files } else { &files };
-    let (measurements, _) = Measurements::read(files, &problem)?;
-    let split = Split::new(&problem, &measurements)?;
-    let closure = close(&problem, &measurements, &split, &Options::default())?;
-    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure)?;
+    let (data, _warnings) = Dataset::read_files(files, &problem)?;
+    let closure = close(&problem, &data, &Options::default())?;
+    let shown = plot_data::of_closure(&problem, &data, &closure)?;
     let page = report::closure_page(&problem, &closure, &shown);
     fs::create_dir_all(folder.join("figures"))?;
     for (name, figure) in &page.figures {

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::Path;
 
 use flexcal::identify::{Options, identify};
-use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::measurement::{Dataset, DatasetError};
 use flexcal::problem::Problem;
 use flexcal::simulate::{Simulation, Truth, simulate};
 
@@ -56,10 +56,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let problem = Problem::parse(ARM, Path::new("own_arm.toml"))?;
     let truth = Truth::parse(TRUTH, Path::new("truth.toml"), &problem)?;
     let simulation = simulate(&problem, &truth, 90, 1)?;
-    let measurements = table(&simulation);
-    let split = Split::new(&problem, &measurements)?;
+    let data = measured(&simulation)?;
 
-    let found = identify(&problem, &measurements, &split, &Options::default())?;
+    let found = identify(&problem, &data, &Options::default())?;
     let mut lines = vec![format!("{:<18} {:>13} {:>11} {:>13}", "SI", "estimate", "± 1 σ", "true")];
     for estimate in &found.estimates {
         let known = simulation.parameters.iter().find(|parameter| parameter.name == estimate.name);
@@ -76,24 +75,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Simulated rows as measurements. Your own would come from a file, by `Measurements::read`.
-fn table(simulation: &Simulation) -> Measurements {
+/// Simulated rows as data. Your own would come from arrays as well, or from files by `Dataset::read`.
+fn measured(simulation: &Simulation) -> Result<Dataset, DatasetError> {
     let rows = &simulation.rows;
-    Measurements {
-        files: Vec::new(),
-        origin: (2_u32..).take(rows.len()).map(|line| (0, line)).collect(),
-        joints: simulation.joints.len(),
-        configurations: rows.iter().flat_map(|row| row.conditions.configuration.clone()).collect(),
-        positions: rows.iter().map(|row| row.position).collect(),
-        sigma: None,
-        payload: rows.iter().map(|row| row.conditions.payload).collect(),
-        hoist: None,
-        temperature: None,
-        time: rows.iter().map(|row| row.conditions.time).collect(),
-        time_measured: true,
-        approach: None,
-        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
-        target: None,
-        marked_held_out: Some(rows.iter().map(|row| row.held_out).collect()),
-    }
+    let configurations = rows.iter().map(|row| &row.conditions.configuration);
+    let held_out = (0..rows.len()).filter(|&row| rows[row].held_out);
+    Dataset::builder(configurations, rows.iter().map(|row| row.position))
+        .payload(rows.iter().map(|row| row.conditions.payload.unwrap_or(0.0)).collect())
+        .time(rows.iter().map(|row| row.conditions.time).collect())
+        .held_out(held_out)
+        .build()
 }

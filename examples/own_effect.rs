@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::Path;
 
 use flexcal::identify::{Options, Placement, identify, identify_model};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::model::Model;
 use flexcal::model::effect::{Term, named};
 use flexcal::model::parameter::{Driver, JointField, Slot};
@@ -15,19 +15,18 @@ use flexcal::problem::Problem;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let problem = Problem::read(Path::new("problems/lunar-sampler"))?;
-    let (measurements, _) = Measurements::read(&problem.data.files, &problem)?;
-    let split = Split::new(&problem, &measurements)?;
+    let (data, _warnings) = Dataset::read(&problem)?;
     let options = Options::default();
 
     // Joints count from 0 here; the last number is 1 σ of the prior [rad/K].
     let slot = Slot::Joint { joint: 1, field: JointField::Theta };
     let slack = Term::driven("slack", slot, Driver::Warming { reference: 20.0 }, 1e-4);
     let belt = named("joint-belt", "2", vec![slack]);
-    let placement = Placement::of(&measurements);
+    let placement = Placement::of(&data.measurements);
     let model = Model::with_terms(&problem, &placement.bases, &placement.targets, &belt)?;
 
-    let before = identify(&problem, &measurements, &split, &options)?;
-    let after = identify_model(&model, &problem, &measurements, &split, &options)?;
+    let before = identify(&problem, &data, &options)?;
+    let after = identify_model(&model, &problem, &data, &options)?;
     let own = after.estimates.iter().find(|estimate| estimate.name == "joint-belt[2].slack").ok_or("not fitted")?;
     let rms = |poses: f64| poses * 1e3;
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]

@@ -25,23 +25,22 @@
 //! use std::path::Path;
 //!
 //! use flexcal::diagnose::{Verdict, close};
-//! use flexcal::measurement::{Measurements, Split};
+//! use flexcal::measurement::Dataset;
 //! use flexcal::problem::Problem;
 //! use flexcal::identify::{Options, identify};
 //!
 //! // The arm as declared, and the poses: 28 to identify, 50 held out.
 //! let problem = Problem::read(Path::new("problems/lunar-sampler"))?;
-//! let (measurements, _warnings) = Measurements::read(&problem.data.files, &problem)?;
-//! let split = Split::new(&problem, &measurements)?;
+//! let (data, _warnings) = Dataset::read(&problem)?;
 //!
 //! // Fit what is free. Held-out poses only judge.
-//! let found = identify(&problem, &measurements, &split, &Options::default())?;
+//! let found = identify(&problem, &data, &Options::default())?;
 //! let stiffness = found.estimates.iter().find(|estimate| estimate.name == "joint2.stiffness");
 //! assert!(stiffness.is_some_and(|estimate| estimate.std_error.is_some()));
 //!
 //! // The residual is larger than noise: find what the model lacks.
 //! assert!(found.reduced_chi2.is_some_and(|chi2| chi2 > 5.0));
-//! let closure = close(&problem, &measurements, &split, &Options::default())?;
+//! let closure = close(&problem, &data, &Options::default())?;
 //! assert_eq!(closure.verdict, Verdict::Explained);
 //! assert_eq!(flexcal::model::effect::describe(&closure.effects[0].effect), "link A bows with temperature");
 //! assert!(closure.after.fitted.held_out.mean.norm < 0.1e-3);
@@ -67,3 +66,6 @@ pub mod report;
 pub mod scalar;
 pub mod simulate;
 pub mod spatial;
+
+/// Vectors and matrices in the interface are of this version of nalgebra.
+pub use nalgebra;

@@ -5,9 +5,9 @@
 mod common;
 
 use common::arms::{measured as read, parse, path, with_parameters};
-use common::made::{at_random, labels, measure, model_of, split_at};
+use common::made::{at_random, divided, labels, measure, model_of, split_at};
 use flexcal::identify::{Distrust, Estimate, Identification, Options, Strategy, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use nalgebra::DVector;
 use rand::SeedableRng;
@@ -28,15 +28,14 @@ fn estimate<'a>(found: &'a Identification, name: &str) -> &'a Estimate {
 }
 
 /// Ninety noisy poses of the arm with these deviations, sixty of them to identify.
-fn measured(problem: &Problem, truth: &[(&str, f64)]) -> (Measurements, Split) {
+fn measured(problem: &Problem, truth: &[(&str, f64)]) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut rows = at_random(problem, 90, 2.0, &mut rng);
     let parameters = model_of(problem, &rows).parameters;
     let deviation = |name: &str| truth.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, x)| *x);
     let x = DVector::from_iterator(parameters.len(), parameters.iter().map(|p| deviation(&p.name)));
     measure(problem, &mut rows, &x, SIGMA, &mut rng);
-    let split = split_at(60, &rows);
-    (rows, split)
+    divided(60, &rows)
 }
 
 #[test]
@@ -44,8 +43,8 @@ fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
     let free = "'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.alpha' = { free = true }";
     let problem = parallel(free);
     let truth = [("joint2.d", 0.02), ("joint3.d", -0.02), ("joint3.alpha", 2.0_f64.to_radians())];
-    let (rows, split) = measured(&problem, &truth);
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let data = measured(&problem, &truth);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     assert_eq!(found.identifiability.rank, 2);
     assert!(found.is_trusted() && found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
     for (name, deviation) in truth {
@@ -58,8 +57,8 @@ fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
 #[test]
 fn a_bound_that_cuts_a_blind_combination_leaves_the_rest_of_it_free() {
     let problem = parallel("'joint2.d' = { min_mm = -0.5, max_mm = 0.5 }\n'joint3.d' = { free = true }");
-    let (rows, split) = measured(&problem, &[("joint2.d", 0.0005), ("joint3.d", 0.0035)]);
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let data = measured(&problem, &[("joint2.d", 0.0005), ("joint3.d", 0.0035)]);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
     let sum: f64 =
         ["joint2.d", "joint3.d"].iter().map(|name| estimate(&found, name)).map(|e| e.estimate - e.nominal).sum();
@@ -72,8 +71,8 @@ fn a_bound_that_cuts_a_blind_combination_leaves_the_rest_of_it_free() {
 #[test]
 fn parameters_of_a_blind_combination_have_no_error_of_their_own() {
     let problem = parallel("'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.a' = { free = true }");
-    let (rows, split) = measured(&problem, &[("joint2.d", 0.001)]);
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let data = measured(&problem, &[("joint2.d", 0.001)]);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     for name in ["joint2.d", "joint3.d"] {
         let estimate = estimate(&found, name);
         assert!(estimate.std_error.is_none() && (estimate.identified - 0.5).abs() < 1e-6, "{estimate:?}");
@@ -84,9 +83,9 @@ fn parameters_of_a_blind_combination_have_no_error_of_their_own() {
 #[test]
 fn a_session_with_too_few_poses_is_not_trusted() {
     let problem = parallel("'joint3.a' = { free = true }\n'base.*' = { free = true }");
-    let (mut rows, split) = measured(&problem, &[("joint3.a", 0.001)]);
-    rows.session = labels((0..90).map(|row| if row == 75 { "B" } else { "A" }));
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let mut data = measured(&problem, &[("joint3.a", 0.001)]);
+    data.measurements.session = labels((0..90).map(|row| if row == 75 { "B" } else { "A" }));
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     let expected = Distrust::TooFewEquations { of: "base[B]".to_owned(), coordinates: 3, unknowns: 6 };
     assert_eq!(found.distrust, Some(expected));
 }
@@ -94,22 +93,22 @@ fn a_session_with_too_few_poses_is_not_trusted() {
 #[test]
 fn an_arm_that_misses_is_not_trusted() {
     let problem = parallel("'joint3.a' = { sigma_mm = 5 }\n'joint3.theta' = { sigma_deg = 1 }");
-    let (mut rows, split) = measured(&problem, &[("joint3.a", 0.001)]);
-    for q in rows.configurations.iter_mut().skip(1).step_by(3) {
+    let mut data = measured(&problem, &[("joint3.a", 0.001)]);
+    for q in data.measurements.configurations.iter_mut().skip(1).step_by(3) {
         *q = -*q;
     }
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(matches!(found.distrust, Some(Distrust::Misses { .. })), "{:?}", found.distrust);
 }
 
 #[test]
 fn a_mirrored_arm_is_not_trusted() {
     let problem = parallel("'joint*.alpha' = { sigma_deg = 0.2 }\n'base.*' = { free = true }");
-    let (mut rows, split) = measured(&problem, &[("joint3.alpha", 0.001)]);
-    for position in &mut rows.positions {
+    let mut data = measured(&problem, &[("joint3.alpha", 0.001)]);
+    for position in &mut data.measurements.positions {
         position.swap_rows(0, 1);
     }
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(found.distrust.is_some());
 }
 
@@ -121,8 +120,8 @@ fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
     };
     let find = |rules: &str, truth: &str, size: f64| {
         let problem = declared(rules);
-        let (rows, split) = measured(&problem, &[(truth, size)]);
-        identify(&problem, &rows, &split, &Options::default()).unwrap().distrust
+        let data = measured(&problem, &[(truth, size)]);
+        identify(&problem, &data, &Options::default()).unwrap().distrust
     };
     assert_eq!(find("'joint-harmonic.*' = { sigma_deg = 0.01 }", "joint-harmonic[3].sin2", 0.02), None);
     let angle = find("'joint3.alpha' = { sigma_deg = 0.01 }", "joint3.alpha", 0.02);
@@ -133,9 +132,9 @@ fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
 fn stage_by_stage_settles_on_two_hundred_poses() {
     let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
-    let split = Split::new(&problem, &rows).unwrap();
-    let options = Options { strategy: Strategy::Sequential, ..Options::default() };
-    let found = identify(&problem, &rows, &split, &options).unwrap();
+    let data = Dataset::of(&problem, rows).unwrap();
+    let options = Options::default().with_strategy(Strategy::Sequential);
+    let found = identify(&problem, &data, &options).unwrap();
     assert!(found.is_trusted());
     assert!(found.fitted.identification.rms.norm < 0.0865e-3, "{}", found.fitted.identification.rms.norm);
 }
@@ -144,8 +143,8 @@ fn stage_by_stage_settles_on_two_hundred_poses() {
 fn everything_free_and_no_prior_converges() {
     let problem = with_parameters("tests/cases/problem.toml", "'joint*' = { free = true }\n'tool.*' = { free = true }");
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
-    let split = Split::new(&problem, &rows).unwrap();
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, rows).unwrap();
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(found.is_trusted() && found.identifiability.rank < found.unknowns.len());
     assert!(found.fitted.held_out.rms.norm < 0.2e-3);
 }
@@ -156,8 +155,8 @@ fn a_constraint_that_cuts_a_blind_combination_does_what_the_bound_does() {
     let bounded = parallel("'joint2.d' = { min_mm = 2 }\n'joint3.d' = { free = true }");
     let constraint = "[[constraint]]\nterms = { 'joint2.d' = 1.0 }\nat_least_mm = 102";
     let constrained = parallel(&format!("{free}\n{constraint}"));
-    let (rows, split) = measured(&parallel(free), &[("joint2.d", -0.003)]);
-    let find = |problem: &Problem| identify(problem, &rows, &split, &Options::default()).unwrap();
+    let data = measured(&parallel(free), &[("joint2.d", -0.003)]);
+    let find = |problem: &Problem| identify(problem, &data, &Options::default()).unwrap();
     let (by_bound, by_constraint) = (find(&bounded), find(&constrained));
     assert!(by_constraint.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", by_constraint.reduced_chi2);
     assert!((&by_bound.x - &by_constraint.x).amax() < 1e-8);
@@ -166,9 +165,9 @@ fn a_constraint_that_cuts_a_blind_combination_does_what_the_bound_does() {
 #[test]
 fn base_and_tool_of_a_held_out_session_count_together() {
     let problem = parallel("'joint3.a' = { free = true }\n'base.*' = { free = true }\n'tool.*' = { free = true }");
-    let (mut rows, split) = measured(&problem, &[]);
-    rows.session = labels((0..90).map(|row| if row >= 88 { "B" } else { "A" }));
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let mut data = measured(&problem, &[]);
+    data.measurements.session = labels((0..90).map(|row| if row >= 88 { "B" } else { "A" }));
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     let expected = Distrust::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 9 };
     assert_eq!(found.distrust, Some(expected));
 }
@@ -176,9 +175,9 @@ fn base_and_tool_of_a_held_out_session_count_together() {
 #[test]
 fn two_points_do_not_turn_a_base() {
     let problem = parallel("'base.*' = { free = true }");
-    let (rows, _) = measured(&problem, &[]);
-    let split = split_at(2, &rows);
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let mut data = measured(&problem, &[]);
+    data.split = split_at(2, &data.measurements);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     let turned: f64 = ["base.rx", "base.ry", "base.rz"].iter().map(|name| estimate(&found, name).estimate.abs()).sum();
     assert!(turned < 0.01 && !found.identifiability.blind.is_empty(), "{turned} rad");
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use common::arms::{measured, path};
 use flexcal::identify::{Identification, Options, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -17,8 +17,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 fn check(case: &str, limit_mm: f64) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let measurements = measured(&problem, &[case]);
-    let split = Split::new(&problem, &measurements).unwrap();
-    let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, measurements).unwrap();
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     let (registered, held_out) = (found.registered.held_out.rms.norm * 1e3, found.fitted.held_out.rms.norm * 1e3);
     let chi2 = found.reduced_chi2.unwrap();
     println!(
@@ -65,14 +65,13 @@ fn three_sessions_of_a_measured_ur10() {
     };
     let problem = Problem::read(&path("problems/ur10-ipa")).unwrap();
     let files = ["A", "B", "C"].map(|session| folder.join(format!("session_{session}.csv")));
-    let (measurements, _) = Measurements::read(&files, &problem).unwrap();
-    let split = Split::new(&problem, &measurements).unwrap();
-    let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
+    let (data, _) = Dataset::read_files(&files, &problem).unwrap();
+    let found = identify(&problem, &data, &Options::default()).unwrap();
     let mean = |errors: &flexcal::identify::Errors| errors.held_out.mean.norm * 1e3;
     let (registered, fitted) = (mean(&found.registered), mean(&found.fitted));
     println!(
         "UR10: {} poses, held-out mean {fitted:.4} mm (registered {registered:.3}), rank {} of {}, {} steps, {:.2} s",
-        measurements.len(),
+        data.measurements.len(),
         found.identifiability.rank,
         found.unknowns.len(),
         found.iterations,

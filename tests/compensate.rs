@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use flexcal::identify::{Options, Placement, compensate, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -37,9 +37,9 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let problem = Problem::read(&case("problem.toml")).unwrap();
     let truth = Truth::read(&case("truth.toml"), &problem).unwrap();
     let simulation = simulate(&problem, &truth, 78, 7).unwrap();
-    let rows = measured(&simulation.csv(), &problem);
-    let split = Split::new(&problem, &rows).unwrap();
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, measured(&simulation.csv(), &problem)).unwrap();
+    let rows = &data.measurements;
+    let found = identify(&problem, &data, &Options::default()).unwrap();
 
     // Where the nominal arm would be in the held-out configurations is where the true arm should be.
     let nominal = Arm::nominal(&problem);
@@ -51,9 +51,9 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }
-    let commands = compensate(&problem, &model(&problem, &rows), &found.x, &targets).unwrap();
+    let commands = compensate(&problem, &model(&problem, rows), &found.x, &targets).unwrap();
     let mut misses = Vec::new();
-    for &row in &split.held_out {
+    for &row in &data.split.held_out {
         let command = &commands[row];
         assert!(command.is_reached(), "row {row}");
         let miss = |configuration: &[f64]| {

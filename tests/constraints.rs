@@ -10,7 +10,7 @@ use flexcal::diagnose::trace;
 use flexcal::identify::{
     Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify,
 };
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::{estimate_json, estimate_text};
 
@@ -27,8 +27,8 @@ fn problem(more: &str) -> Problem {
 
 fn run(problem: &Problem, options: &Options) -> Result<Identification, IdentifyError> {
     let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], problem).unwrap();
-    let split = Split::new(problem, &measurements).unwrap();
-    identify(problem, &measurements, &split, options)
+    let data = Dataset::of(problem, measurements).unwrap();
+    identify(problem, &data, options)
 }
 
 fn identified(more: &str) -> Identification {
@@ -97,7 +97,7 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     assert_eq!(json["outliers"], serde_json::json!([]));
 
     // Alone, the stiffnesses keep the constraint between them and know of no other.
-    let stiffness = Options { strategy: Strategy::StiffnessOnly, ..Options::default() };
+    let stiffness = Options::default().with_strategy(Strategy::StiffnessOnly);
     let alone = run(&problem, &stiffness).unwrap();
     assert!(alone.active_constraints.iter().all(|active| active.words == words[0]));
     assert!(estimate(&alone, "A.EI").estimate / estimate(&alone, "B.EI").estimate / limit > 1.0 - 1e-9);
@@ -130,7 +130,7 @@ fn what_cannot_be_is_refused() {
     assert!(matches!(refused, Err(IdentifyError::Stage(StageError::Infeasible))));
     let solver = SolverChoice::LevenbergMarquardt;
     let any = constraint("\"joint3.a\" = 1", "at_least_mm = 1000");
-    let refused = run(&problem(&any), &Options { solver, ..Options::default() });
+    let refused = run(&problem(&any), &Options::default().with_solver(solver));
     assert!(matches!(refused, Err(IdentifyError::BoundsIgnored { .. })));
 
     let mistakes: [(&str, &str, &[&str]); 7] = [
@@ -175,12 +175,12 @@ fn cost_of_bounds() {
         let seconds = |text: &str| {
             let problem = Problem::parse(text, &file).unwrap();
             let (measurements, _) = Measurements::read(&[cases().join(data)], &problem).unwrap();
-            let split = Split::new(&problem, &measurements).unwrap();
+            let data = Dataset::of(&problem, measurements).unwrap();
             let mut best = f64::INFINITY;
             let mut last = None;
             for _ in 0..10 {
                 let clock = Instant::now();
-                last = Some(identify(&problem, &measurements, &split, &Options::default()).unwrap());
+                last = Some(identify(&problem, &data, &Options::default()).unwrap());
                 best = best.min(clock.elapsed().as_secs_f64());
             }
             (best, last.unwrap())
@@ -207,8 +207,8 @@ fn checks_are_of_what_a_constraint_leaves() {
     // 10 mm less than the links have: the fit misses, and so must the residual that is checked.
     let problem = problem(&constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 3690"));
     let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], &problem).unwrap();
-    let split = Split::new(&problem, &measurements).unwrap();
-    let trace = trace(&problem, &measurements, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, measurements).unwrap();
+    let trace = trace(&problem, &data, &Options::default()).unwrap();
     assert_eq!(trace.fit.active_constraints.len(), 1);
     let check = trace.findings.tests.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
     let (checked, fitted) = (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());

@@ -6,7 +6,7 @@
 mod common;
 
 use common::arms::{measured, parse, path};
-use common::made::{at_random, draw, measure, model_of, part, split_at};
+use common::made::{at_random, divided, draw, measure, model_of, part};
 use flexcal::identify::{Options, Placement, identify};
 use flexcal::least_squares::{Identifiability, jacobian};
 use flexcal::measurement::{Measurements, Split};
@@ -53,8 +53,7 @@ impl Trial {
         let truth = draw(&self.model, self.spread, &mut rng);
         let mut rows = self.rows.clone();
         measure(&self.problem, &mut rows, &truth, self.problem.data.position_sigma.unwrap(), &mut rng);
-        let split = split_at(rows.len(), &rows);
-        let found = identify(&self.problem, &rows, &split, &Options::default()).unwrap();
+        let found = identify(&self.problem, &divided(rows.len(), &rows), &Options::default()).unwrap();
         if !found.is_trusted() {
             println!("seed {seed}: {:?}", found.termination);
             return None;

@@ -4,7 +4,7 @@
 mod common;
 
 use common::arms::golden_problem;
-use common::made::{at_random, normal, split_at};
+use common::made::{at_random, divided, normal};
 use flexcal::identify::{Options, Placement, identify_model};
 use flexcal::least_squares::jacobian;
 use flexcal::measurement::Measurements;
@@ -54,7 +54,7 @@ fn an_effect_of_one_s_own_is_fitted_beside_the_declared_model() {
     for (position, error) in rows.positions.iter_mut().zip(errors) {
         *position += Vector3::from_fn(|_, _| 2e-5 * normal(&mut rng)) - error;
     }
-    let found = identify_model(&model, &problem, &rows, &split_at(30, &rows), &Options::default()).unwrap();
+    let found = identify_model(&model, &problem, &divided(30, &rows), &Options::default()).unwrap();
     for k in [rate, sag] {
         let (estimate, error) = (found.estimates[k].estimate, found.estimates[k].std_error.unwrap());
         assert!((estimate - truth[k]).abs() < 4.0 * error && error < 0.1 * truth[k].abs(), "{estimate} ± {error}");

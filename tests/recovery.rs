@@ -10,7 +10,7 @@ use common::arms::{
 use common::made::{at_random, draw, labels, measure, model_of, part, predicted, split_at};
 use flexcal::identify::{Identification, Options, Strategy, identify};
 use flexcal::least_squares::solver::AtBound;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::parameter::{Parameter, Unit};
 use flexcal::problem::Problem;
 use nalgebra::{DVector, Vector3};
@@ -22,8 +22,8 @@ fn fit(problem: &Problem, rows: &Measurements, split: &Split) -> Identification 
 }
 
 fn fit_by(strategy: Strategy, problem: &Problem, rows: &Measurements, split: &Split) -> Identification {
-    let options = Options { strategy, ..Options::default() };
-    let found = identify(problem, rows, split, &options).unwrap();
+    let options = Options::default().with_strategy(strategy);
+    let found = identify(problem, &Dataset::new(rows.clone(), split.clone()), &options).unwrap();
     assert!(found.is_trusted(), "{:?}", found.termination);
     found
 }

@@ -8,7 +8,7 @@ use common::arms::{measured, path};
 use common::made::part;
 use flexcal::diagnose::close;
 use flexcal::identify::{ErrorSummary, Options, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::plot_data;
 use flexcal::report::{self, Page};
@@ -17,11 +17,11 @@ use nalgebra::Vector3;
 /// Elements without an end.
 const VOID: [&str; 3] = ["meta", "link", "!DOCTYPE"];
 
-fn case(file: &str) -> (Problem, Measurements, Split) {
+fn case(file: &str) -> (Problem, Dataset) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let measurements = measured(&problem, &[file]);
-    let split = Split::new(&problem, &measurements).unwrap();
-    (problem, measurements, split)
+    let data = Dataset::of(&problem, measurements).unwrap();
+    (problem, data)
 }
 
 /// The first element that is not closed in its turn.
@@ -72,13 +72,13 @@ fn check(page: &Page) {
 
 #[test]
 fn a_closed_loop_shows_what_it_found() {
-    let (problem, mut measurements, split) = case("tests/cases/a-none.csv");
-    for row in 0..measurements.len() {
-        let hours = measurements.time[row] / 3600.0;
-        measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
+    let (problem, mut data) = case("tests/cases/a-none.csv");
+    for row in 0..data.measurements.len() {
+        let hours = data.measurements.time[row] / 3600.0;
+        data.measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
     }
-    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
-    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    let closure = close(&problem, &data, &Options::default()).unwrap();
+    let shown = plot_data::of_closure(&problem, &data, &closure).unwrap();
     let page = report::closure_page(&problem, &closure, &shown);
     check(&page);
     assert!(closure.effects.iter().any(|found| flexcal::model::effect::name(&found.effect) == "tracker-drift"));
@@ -98,15 +98,15 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
     let again = report::closure_page(&problem, &closure, &shown);
     assert_eq!(page, again);
-    let other = plot_data::of_closure(&problem, &measurements, &split, &closure).unwrap();
+    let other = plot_data::of_closure(&problem, &data, &closure).unwrap();
     assert_eq!(report::closure_page(&problem, &closure, &other).html, page.html);
 }
 
 #[test]
 fn the_picture_holds_the_errors_that_the_tables_sum_up() {
-    let (problem, measurements, split) = case("tests/cases/a-none.csv");
-    let found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
-    let shown = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let (problem, data) = case("tests/cases/a-none.csv");
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let shown = plot_data::of_identification(&problem, &data, &found).unwrap();
     let close = |errors: &[Vector3<f64>], summary: &ErrorSummary| {
         let ratio = ErrorSummary::of(errors).rms.norm / summary.rms.norm;
         assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
@@ -136,9 +136,9 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
 
 #[test]
 fn poses_without_an_equilibrium_are_counted_and_left_out() {
-    let (problem, measurements, split) = case("tests/cases/a-none.csv");
-    let mut found = identify(&problem, &measurements, &split, &Options::default()).unwrap();
-    let mut shown = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let (problem, data) = case("tests/cases/a-none.csv");
+    let mut found = identify(&problem, &data, &Options::default()).unwrap();
+    let mut shown = plot_data::of_identification(&problem, &data, &found).unwrap();
     let last = shown.states.len() - 1;
     let errors = &mut shown.states[last].errors;
     for error in errors.iter_mut().take(3) {
@@ -153,7 +153,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let dots = |page: &Page| {
         page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
     };
-    let whole = plot_data::of_identification(&problem, &measurements, &split, &found).unwrap();
+    let whole = plot_data::of_identification(&problem, &data, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
     assert_eq!(dots(&page) + 12, dots(&report::identification_page(&problem, &found, &whole)));
     for text in
@@ -165,11 +165,11 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
 
 #[test]
 fn thousands_of_poses_make_no_large_page() {
-    let (problem, few, split) = case("tests/cases/h-none-large.csv");
-    let found = identify(&problem, &few, &split, &Options::default()).unwrap();
-    let many = part(&few, (0..6600).map(|k| k % few.len()));
-    let split = Split::new(&problem, &many).unwrap();
-    let shown = plot_data::of_identification(&problem, &many, &split, &found).unwrap();
+    let (problem, few) = case("tests/cases/h-none-large.csv");
+    let found = identify(&problem, &few, &Options::default()).unwrap();
+    let many = part(&few.measurements, (0..6600).map(|k| k % few.measurements.len()));
+    let many = Dataset::of(&problem, many).unwrap();
+    let shown = plot_data::of_identification(&problem, &many, &found).unwrap();
     let page = report::identification_page(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());

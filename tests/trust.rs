@@ -8,7 +8,7 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use flexcal::identify::{Distrust, Options, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use serde_json::Value;
 
@@ -208,9 +208,8 @@ fn wrong_units_are_told_before_anything_else() {
     // Also where the fit did not converge.
     let problem = Problem::read(&metres.path("problem.toml")).unwrap();
     let fit = |table: &str, max_steps| {
-        let (rows, _) = Measurements::read(&[metres.path(table)], &problem).unwrap();
-        let split = Split::new(&problem, &rows).unwrap();
-        identify(&problem, &rows, &split, &Options { max_steps, ..Options::default() }).unwrap()
+        let (data, _) = Dataset::read_files(&[metres.path(table)], &problem).unwrap();
+        identify(&problem, &data, &Options::default().with_max_steps(max_steps)).unwrap()
     };
     let stopped = fit("m.csv", Some(2));
     assert!(matches!(stopped.distrust, Some(Distrust::Misses { .. })), "{:?}", stopped.distrust);

@@ -11,7 +11,7 @@ use common::arms::parse;
 use common::made::{normal, predicted};
 use flexcal::diagnose::{HARMONICS, close};
 use flexcal::identify::{Identification, Options};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, EffectDeclaration, Freedom, Problem};
 use flexcal::simulate::{Truth, simulate};
@@ -82,7 +82,7 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     let held_out = beyond.iter().chain(&among).copied().collect();
     let split = Split { identification, held_out };
 
-    let closure = close(&problem, &measured, &split, &Options::default()).unwrap();
+    let closure = close(&problem, &Dataset::new(measured.clone(), split), &Options::default()).unwrap();
     let sigma = closure.harmonic_sigma.unwrap();
     let rule = closure.closed.parameters.last().unwrap();
     assert_eq!(rule.pattern, HARMONICS);

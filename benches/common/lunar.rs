@@ -2,7 +2,7 @@
 
 use flexcal::identify::Placement;
 use flexcal::least_squares::{Fit, LinearRows};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
 use nalgebra::{DMatrix, DVector};
@@ -10,8 +10,7 @@ use nalgebra::{DMatrix, DVector};
 /// The arm and its 28 identification poses.
 pub struct Lunar {
     model: Model,
-    measurements: Measurements,
-    split: Split,
+    data: Dataset,
     placement: Placement,
     sigma: f64,
 }
@@ -25,8 +24,7 @@ impl Lunar {
         let placement = Placement::of(&measurements);
         Self {
             model: Model::new(&problem, &placement.bases, &placement.targets).unwrap(),
-            split: Split::new(&problem, &measurements).unwrap(),
-            measurements,
+            data: Dataset::of(&problem, measurements).unwrap(),
             placement,
             sigma: problem.data.position_sigma.unwrap(),
         }
@@ -39,13 +37,13 @@ impl Lunar {
 
     /// Number of identification poses.
     pub fn poses(&self) -> usize {
-        self.split.identification.len()
+        self.data.split.identification.len()
     }
 
     /// Residuals of the identification poses as a function of all parameters.
     pub fn residuals(&self) -> PoseResiduals<'_> {
         let n = self.parameters();
-        let poses = self.placement.poses(&self.measurements, &self.split.identification, self.sigma);
+        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, self.sigma);
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 

@@ -3,7 +3,7 @@
 use flexcal::identify::Placement;
 use flexcal::least_squares::solver::Bounds;
 use flexcal::least_squares::{LeastSquares, LinearRows};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Dataset;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
 use nalgebra::{DMatrix, DVector};
@@ -30,8 +30,7 @@ pub struct Arms {
 /// The lunar sampler with errors drawn as wide as a part of its priors, as it would be measured.
 pub struct Lunar {
     pub problem: Problem,
-    pub measurements: Measurements,
-    pub split: Split,
+    pub data: Dataset,
     model: Model,
     placement: Placement,
     truth: DVector<f64>,
@@ -84,12 +83,12 @@ impl Lunar {
         let model = made::model_of(&problem, &measurements);
         let truth = ERRORS * made::draw(&model, |_| 0.0, &mut random);
         made::measure(&problem, &mut measurements, &truth, problem.data.position_sigma.unwrap(), &mut random);
+        let split = made::split_at(poses, &measurements);
         let mut lunar = Self {
-            split: made::split_at(poses, &measurements),
             placement: Placement::of(&measurements),
             far: Vec::new(),
             problem,
-            measurements,
+            data: Dataset::new(measurements, split),
             model,
             truth,
         };
@@ -101,7 +100,7 @@ impl Lunar {
     }
 
     pub fn name(&self) -> String {
-        format!("lunar sampler, {} poses", self.measurements.len())
+        format!("lunar sampler, {} poses", self.data.measurements.len())
     }
 
     fn sigmas(&self) -> DVector<f64> {
@@ -111,7 +110,7 @@ impl Lunar {
     fn residuals(&self) -> PoseResiduals<'_> {
         let n = self.truth.len();
         let sigma = self.problem.data.position_sigma.unwrap();
-        let poses = self.placement.poses(&self.measurements, &self.split.identification, sigma);
+        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 

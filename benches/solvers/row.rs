@@ -88,13 +88,13 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     let joint = Options::default();
     let cost = |options: &Options| {
         let begin = Instant::now();
-        let found = identify(&arm.problem, &arm.measurements, &arm.split, options).unwrap();
+        let found = identify(&arm.problem, &arm.data, options).unwrap();
         let seconds = begin.elapsed().as_secs_f64();
         (whole.cost(&found.x), found, seconds)
     };
     let (best, ..) = cost(&joint);
     let each = SolverChoice::EACH;
-    let solve = |k: usize| cost(&Options { strategy: Strategy::Sequential, solver: each[k], ..Options::default() });
+    let solve = |k: usize| cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]));
     let (runs, seconds) = repeated(each.len(), solve, |run| run.2);
     let row = |((run, seconds), solver): ((&(f64, flexcal::identify::Identification, f64), f64), SolverChoice)| {
         let (cost, found, _) = run;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, value_parser};
 use flexcal::design::{self, Judged};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report;
 
@@ -93,8 +93,9 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             if !common.quiet {
                 diagnostic::print_warnings(&warnings);
             }
-            let split = Split::new(problem, &measured)?;
-            let held_out = design::with_known_words(&measured, &split);
+            let data = Dataset::of(problem, measured)?;
+            let held_out = design::with_known_words(&data);
+            let Dataset { measurements: measured, split } = data;
             Ok(Judged::Table {
                 poses: Box::new(measured.select(&split.identification)),
                 within: source.known_ranges(problem)?,

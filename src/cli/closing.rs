@@ -30,11 +30,11 @@ pub struct Arguments {
 /// Closes the loop, writes `loop.json`, `problem.closed.toml` and both reports, and prints the story.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, measurements, split } = common.read()?;
+    let Input { problem, data } = common.read()?;
     let text = fs::read_to_string(common.problem_file())?;
     let line = common.talks().then(Line::new);
-    let options = Options { progress: line.as_ref().map(Line::sink), ..Options::default() };
-    let result = diagnose::close(&problem, &measurements, &split, &options);
+    let options = Options::default().with_progress(line.as_ref().map(Line::sink));
+    let result = diagnose::close(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();
     }
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
         ("report.md", &report::loop_markdown(&problem, &closure)),
     ];
-    let shown = plot_data::of_closure(&problem, &measurements, &split, &closure)?;
+    let shown = plot_data::of_closure(&problem, &data, &closure)?;
     let page = report::closure_page(&problem, &closure, &shown);
     output::write_report(&folder, &results, &page)?;
     if common.json {

@@ -23,17 +23,17 @@ pub struct Arguments {
 /// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, measurements, split } = common.read()?;
+    let Input { problem, data } = common.read()?;
     let line = common.talks().then(Line::new);
     let sink = line.as_ref().map(Line::sink);
-    let result = identify::compare(&problem, &measurements, &split, sink.as_ref());
+    let result = identify::compare(&problem, &data, sink.as_ref());
     if let Some(line) = line {
         line.clear();
     }
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
-    let shown = plot_data::of_comparison(&problem, &measurements, &split, &comparison)?;
+    let shown = plot_data::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_markdown(&problem, &comparison, &shown.findings);
     let page = report::comparison_page(&problem, &comparison, &shown);
     output::write_report(&folder, &[("compare.json", &json), ("report.md", &told)], &page)?;

@@ -82,22 +82,20 @@ impl From<SolverArgument> for SolverChoice {
 /// Identifies, writes `estimate.json`, `report.md` and `report.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, measurements, split } = common.read()?;
+    let Input { problem, data } = common.read()?;
     let line = common.talks().then(Line::new);
-    let options = Options {
-        strategy: arguments.strategy.into(),
-        solver: arguments.solver.into(),
-        progress: line.as_ref().map(Line::sink),
-        ..Options::default()
-    };
-    let result = identify::identify(&problem, &measurements, &split, &options);
+    let options = Options::default()
+        .with_strategy(arguments.strategy.into())
+        .with_solver(arguments.solver.into())
+        .with_progress(line.as_ref().map(Line::sink));
+    let result = identify::identify(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();
     }
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
-    let shown = plot_data::of_identification(&problem, &measurements, &split, &identification)?;
+    let shown = plot_data::of_identification(&problem, &data, &identification)?;
     let told = report::identification_markdown(&problem, &identification, &shown.findings);
     let page = report::identification_page(&problem, &identification, &shown);
     output::write_report(&folder, &[("estimate.json", &json), ("report.md", &told)], &page)?;

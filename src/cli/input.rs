@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::error::InputError;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
 use super::diagnostic;
@@ -31,8 +31,7 @@ pub struct Common {
 /// Everything that was read.
 pub struct Input {
     pub problem: Problem,
-    pub measurements: Measurements,
-    pub split: Split,
+    pub data: Dataset,
 }
 
 impl Common {
@@ -43,8 +42,8 @@ impl Common {
         if !self.quiet {
             diagnostic::print_warnings(&warnings);
         }
-        let split = Split::new(&problem, &measurements)?;
-        Ok(Input { problem, measurements, split })
+        let data = Dataset::of(&problem, measurements)?;
+        Ok(Input { problem, data })
     }
 
     /// The measurement files.

@@ -24,10 +24,10 @@ pub struct Arguments {
 /// Fits, traces what is left, writes `trace.json`, and prints the ranking.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, measurements, split } = common.read()?;
+    let Input { problem, data } = common.read()?;
     let line = common.talks().then(Line::new);
-    let options = Options { progress: line.as_ref().map(Line::sink), ..Options::default() };
-    let result = diagnose::trace(&problem, &measurements, &split, &options);
+    let options = Options::default().with_progress(line.as_ref().map(Line::sink));
+    let result = diagnose::trace(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();
     }

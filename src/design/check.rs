@@ -8,7 +8,7 @@ use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensiti
 use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
 use crate::identify::Placement;
-use crate::measurement::{Labels, Measurements, Split, different};
+use crate::measurement::{Dataset, Labels, Measurements, different};
 use crate::problem::Problem;
 
 /// Poses in which predictions are judged.
@@ -160,7 +160,8 @@ pub fn some_of(table: &Measurements, count: usize, seed: u64) -> Measurements {
 }
 
 /// The held-out rows of sessions and targets that identification rows use as well: those in which predictions can be judged.
-pub fn with_known_words(measurements: &Measurements, split: &Split) -> Vec<usize> {
+pub fn with_known_words(data: &Dataset) -> Vec<usize> {
+    let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
     let known = |of: fn(&Placement, usize) -> usize, row: usize| {
         split.identification.iter().any(|&own| of(&placement, own) == of(&placement, row))

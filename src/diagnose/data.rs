@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::covariate::Covariate;
 use super::residual_tests::CovariateValues;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::Conditions;
 use crate::model::parameter::Quantity;
 use crate::problem::{JointKind, Problem};
@@ -25,6 +25,8 @@ const MOST_TIMES: usize = 200;
 /// Measurements and which of their rows take part.
 #[derive(Debug, Clone)]
 pub(super) struct Data<'a> {
+    /// What is fitted again.
+    pub dataset: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     /// Number of the conditions of each identification row; rows with the same are repeats.
@@ -34,7 +36,8 @@ pub(super) struct Data<'a> {
 }
 
 impl<'a> Data<'a> {
-    pub fn new(measurements: &'a Measurements, split: &'a Split) -> Self {
+    pub fn new(dataset: &'a Dataset) -> Self {
+        let Dataset { measurements, split } = dataset;
         let rows = &split.identification;
         let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
         let configurations = number(rows.iter().map(|&row| bits(measurements.configuration(row))));
@@ -46,7 +49,7 @@ impl<'a> Data<'a> {
             block_of[configuration] = place % BLOCKS.min(count.max(1));
         }
         let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
-        Self { measurements, split, setup, block }
+        Self { dataset, measurements, split, setup, block }
     }
 
     /// The identification rows.

@@ -10,7 +10,7 @@ use super::power::ScanTest;
 use super::selection::LEVEL;
 use crate::error::InputError;
 use crate::identify::Placement;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::effect;
 use crate::model::parameter::{Unit, unit};
@@ -104,7 +104,7 @@ pub(super) fn timed(poses: &Measurements) -> Measurements {
 /// What of the catalogue all these poses could show.
 pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
     let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
-    Candidates::of(problem, &Data::new(poses, &split))
+    Candidates::of(problem, &Data::new(&Dataset::new(poses.clone(), split)))
 }
 
 /// What `with` makes of the nominal arm in these poses, and of a fit of everything free before anything was measured there:

@@ -31,7 +31,7 @@ pub(super) struct Fitted {
 impl Fitted {
     /// Fits `problem` to the identification rows.
     pub fn new(problem: Problem, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
-        let found = identify(&problem, data.measurements, data.split, options)?;
+        let found = identify(&problem, data.dataset, options)?;
         Self::of(problem, data, found)
     }
 

@@ -9,7 +9,7 @@ use super::selection::LEVEL;
 use super::telling_pose::{TellingPose, shuffled, telling_pose};
 use super::unexplained::named;
 use crate::identify::{Identification, IdentifyError, Noise, Options};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Dataset;
 use crate::model::effect;
 use crate::problem::{Effect, Problem};
 
@@ -71,13 +71,8 @@ impl Trace {
 ///
 /// # Errors
 /// Problem, data and options do not fit each other.
-pub fn trace(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    options: &Options,
-) -> Result<Trace, IdentifyError> {
-    let data = Data::new(measurements, split);
+pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Trace, IdentifyError> {
+    let data = Data::new(data);
     Ok(trace_fit(&Fitted::new(problem.clone(), &data, options)?, &data))
 }
 
@@ -148,13 +143,8 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
 ///
 /// # Errors
 /// Problem, data and fit do not belong together.
-pub fn examine(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    found: &Identification,
-) -> Result<Findings, IdentifyError> {
-    let data = Data::new(measurements, split);
+pub fn examine(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Findings, IdentifyError> {
+    let data = Data::new(data);
     Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
 }
 

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Dataset;
 use crate::paper::{self, EndPoint, Form, Measured};
 use crate::problem::Problem;
 
@@ -41,7 +41,8 @@ impl Baseline {
 ///
 /// `None` where the procedure does not apply: it knows base and target, so that there are no sessions or targets, and it
 /// needs as many equations as it has geometric parameters.
-pub(super) fn baseline(problem: &Problem, data: &Measurements, split: &Split, form: Form) -> Option<Baseline> {
+pub(super) fn baseline(problem: &Problem, data: &Dataset, form: Form) -> Option<Baseline> {
+    let Dataset { measurements: data, split } = data;
     if data.session.names.len() > 1 || data.target.is_some() {
         return None;
     }

@@ -3,7 +3,7 @@
 use super::baseline::{Baseline, baseline};
 use super::identification::identify_model;
 use super::{Identification, IdentifyError, Options, Placement, ProgressSink, SolverChoice, Strategy};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::paper::Form;
 use crate::problem::Problem;
@@ -32,15 +32,14 @@ pub struct Comparison {
 /// Problem and data do not fit each other.
 pub fn compare(
     problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
+    data: &Dataset,
     progress: Option<&ProgressSink>,
 ) -> Result<Comparison, IdentifyError> {
-    let placement = Placement::of(measurements);
+    let placement = Placement::of(&data.measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let run = |model: &Model, strategy, solver| {
         let options = Options { strategy, solver, progress: progress.cloned(), ..Options::default() };
-        identify_model(model, problem, measurements, split, &options)
+        identify_model(model, problem, data, &options)
     };
     let bounded = model.is_bounded();
     let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
@@ -64,10 +63,7 @@ pub fn compare(
         joint: run(&model, Strategy::Joint, SolverChoice::Auto)?,
         rigid: run(&model.ablated(Ablation::Rigid), Strategy::Joint, SolverChoice::Auto)?,
         strategies,
-        paper: [Form::Corrected, Form::Printed]
-            .into_iter()
-            .filter_map(|form| baseline(problem, measurements, split, form))
-            .collect(),
+        paper: [Form::Corrected, Form::Printed].into_iter().filter_map(|form| baseline(problem, data, form)).collect(),
         ablations,
     })
 }

@@ -14,7 +14,7 @@ use super::trust::{Distrust, TooFewPoses, beyond_prior, misses, underdetermined}
 use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::{Identifiability, Loss};
-use crate::measurement::{Measurements, Split, different};
+use crate::measurement::{Dataset, Measurements, different};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
 use crate::problem::{Effect, EffectDeclaration, JointKind, Problem, Robust, RobustLoss};
@@ -26,8 +26,9 @@ const MAX_NOISE_FITS: usize = 20;
 /// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding [m].
 const LEAST_NOISE: f64 = 1e-9;
 
-/// How to identify.
+/// How to identify: [`Options::default()`] with what the `with_…` methods change.
 #[derive(Clone, Default)]
+#[non_exhaustive]
 pub struct Options {
     /// Which parameters are fitted together.
     pub strategy: Strategy,
@@ -39,6 +40,47 @@ pub struct Options {
     pub start: Vec<(String, f64)>,
     /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
     pub max_steps: Option<u64>,
+}
+
+impl Options {
+    /// The same with another choice of what is fitted together.
+    #[must_use]
+    pub fn with_strategy(self, strategy: Strategy) -> Self {
+        Self { strategy, ..self }
+    }
+
+    /// The same with another solver.
+    #[must_use]
+    pub fn with_solver(self, solver: SolverChoice) -> Self {
+        Self { solver, ..self }
+    }
+
+    /// The same, telling `progress` of every step; `None`: nobody.
+    #[must_use]
+    pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
+        Self { progress: progress.into(), ..self }
+    }
+
+    /// The same, starting from these values [SI] by name.
+    #[must_use]
+    pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
+        Self { start, ..self }
+    }
+
+    /// The same, stopped after so many steps.
+    #[must_use]
+    pub fn with_max_steps(self, max_steps: impl Into<Option<u64>>) -> Self {
+        Self { max_steps: max_steps.into(), ..self }
+    }
+
+    /// Full parameter vector from which the fit begins: `x`, with the values of `start`.
+    fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
+        let given = |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
+        let own = model.parameters.iter().zip(x);
+        let value =
+            |(parameter, x): (&Parameter, &f64)| given(parameter).map_or(*x, |(_, value)| parameter.deviation(*value));
+        DVector::from_iterator(x.len(), own.map(value))
+    }
 }
 
 /// Why an identification could not be made.
@@ -74,15 +116,10 @@ pub enum IdentifyError {
 ///
 /// # Errors
 /// Problem, data, strategy and solver do not fit each other.
-pub fn identify(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    options: &Options,
-) -> Result<Identification, IdentifyError> {
-    let placement = Placement::of(measurements);
+pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<Identification, IdentifyError> {
+    let placement = Placement::of(&data.measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
-    identify_model(&model, problem, measurements, split, options)
+    identify_model(&model, problem, data, options)
 }
 
 /// Declared effects of which the measurements hold nothing are mistakes.
@@ -106,10 +143,10 @@ fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), I
 pub fn identify_model(
     model: &Model,
     problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
+    data: &Dataset,
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
+    let Dataset { measurements, split } = data;
     let clock = Instant::now();
     check_columns(problem, measurements)?;
     if split.identification.is_empty() {
@@ -148,12 +185,7 @@ pub fn identify_model(
     if !noise_is_declared {
         fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
     }
-    let mut begin = start.clone();
-    for (k, parameter) in model.parameters.iter().enumerate() {
-        if let Some((_, value)) = options.start.iter().find(|(name, _)| *name == parameter.name) {
-            begin[k] = parameter.deviation(*value);
-        }
-    }
+    let begin = options.begin(model, &start);
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, noise_is_declared)?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);

@@ -1,6 +1,8 @@
 //! Measured poses, as columns in SI units.
 
+mod builder;
 mod columns;
+mod dataset;
 mod limits;
 mod lines;
 mod read;
@@ -8,12 +10,15 @@ mod repeats;
 mod split;
 mod table;
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
 use crate::error::Location;
 
+pub use builder::{DatasetBuilder, DatasetError};
+pub use dataset::Dataset;
 pub(crate) use repeats::different;
 pub use split::Split;
 
@@ -59,6 +64,23 @@ pub struct Labels {
     pub names: Vec<String>,
     /// Word of each row.
     pub of_row: Vec<usize>,
+}
+
+/// Words of the rows in order.
+impl<W: AsRef<str>> FromIterator<W> for Labels {
+    fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
+        let mut labels = Self::default();
+        let mut known = HashMap::new();
+        for word in words {
+            let word = word.as_ref();
+            let place = *known.entry(word.to_owned()).or_insert_with(|| {
+                labels.names.push(word.to_owned());
+                labels.names.len() - 1
+            });
+            labels.of_row.push(place);
+        }
+        labels
+    }
 }
 
 impl Measurements {

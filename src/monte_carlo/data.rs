@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::plan::{Campaign, Cell, Source};
 use crate::identify::Placement;
-use crate::measurement::{Labels, Measurements, Split};
+use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::{Model, PoseResiduals};
 use crate::problem::Problem;
 use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
@@ -16,8 +16,7 @@ use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
 /// Measurements whose truth is known.
 pub(super) struct Data {
     /// The held-out poses, then those to identify with.
-    pub measurements: Measurements,
-    pub split: Split,
+    pub dataset: Dataset,
     /// True x of each free parameter; `None` where the truth does not say.
     pub truth: Vec<Option<f64>>,
 }
@@ -45,7 +44,7 @@ impl Campaign {
         }
         let split =
             Split { held_out: (0..self.held_out).collect(), identification: (self.held_out..rows.len()).collect() };
-        Some(Data { measurements: table(&rows), split, truth: true_x })
+        Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
     }
 
     /// A seed of its own for each repetition.

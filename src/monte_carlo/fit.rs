@@ -18,7 +18,7 @@ impl Campaign {
     pub(super) fn fit(&self, problem: &Problem, cell: &Cell, repetition: usize) -> (Score, f64) {
         let Some(data) = self.data(cell, repetition) else { return (Score::Failed("no-equilibrium"), 0.0) };
         let options = Options { strategy: cell.strategy, solver: cell.solver, ..Options::default() };
-        match identify(problem, &data.measurements, &data.split, &options) {
+        match identify(problem, &data.dataset, &options) {
             // The files fit each other: what is left is a nominal arm that does not stand in one of the poses.
             Err(IdentifyError::Input(_)) => (Score::Failed("no-equilibrium"), 0.0),
             Err(_) => (Score::Failed("cannot-be-fitted"), 0.0),

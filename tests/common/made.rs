@@ -2,10 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
-use std::path::PathBuf;
-
 use flexcal::identify::Placement;
-use flexcal::measurement::{Labels, Measurements, Split};
+use flexcal::measurement::{Dataset, Labels, Measurements, Split};
 use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{JointKind, Problem};
@@ -17,44 +15,18 @@ use rand_distr::{Distribution as _, StandardNormal};
 /// `count` configurations, angles within ±`reach` [rad] and offsets within ±0.3 m; positions are still to be measured.
 pub fn at_random(problem: &Problem, count: usize, reach: f64, rng: &mut ChaCha8Rng) -> Measurements {
     let kinds: Vec<JointKind> = problem.joints.iter().map(|joint| joint.kind).collect();
-    let configurations = (0..count)
-        .flat_map(|_| kinds.iter().copied())
-        .map(|kind| match kind {
-            JointKind::Revolute => rng.random_range(-reach..reach),
-            JointKind::Prismatic => rng.random_range(-0.3..0.3),
-            JointKind::Fixed => 0.0,
-        })
-        .collect();
-    Measurements {
-        files: vec![PathBuf::from("made.csv")],
-        origin: (2_u32..).take(count).map(|line| (0, line)).collect(),
-        joints: kinds.len(),
-        configurations,
-        positions: vec![Vector3::zeros(); count],
-        sigma: None,
-        payload: None,
-        hoist: None,
-        temperature: None,
-        time: (0_u32..).take(count).map(f64::from).collect(),
-        time_measured: false,
-        approach: None,
-        session: Labels { names: vec![String::new()], of_row: vec![0; count] },
-        target: None,
-        marked_held_out: None,
-    }
+    let drawn = |rng: &mut ChaCha8Rng, kind: &JointKind| match kind {
+        JointKind::Revolute => rng.random_range(-reach..reach),
+        JointKind::Prismatic => rng.random_range(-0.3..0.3),
+        JointKind::Fixed => 0.0,
+    };
+    let configurations = (0..count).map(|_| kinds.iter().map(|kind| drawn(rng, kind)).collect::<Vec<f64>>());
+    Dataset::builder(configurations, vec![Vector3::zeros(); count]).measurements().unwrap()
 }
 
 /// Labels of the rows, in order of appearance.
 pub fn labels<'a>(words: impl Iterator<Item = &'a str>) -> Labels {
-    let mut labels = Labels::default();
-    for word in words {
-        let known = labels.names.iter().position(|name| name == word);
-        labels.of_row.push(known.unwrap_or(labels.names.len()));
-        if known.is_none() {
-            labels.names.push(word.to_owned());
-        }
-    }
-    labels
+    words.collect()
 }
 
 /// The rows with these numbers, with no sessions and targets but their own.
@@ -104,4 +76,9 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
 /// The first `count` rows to identify with, the others held out.
 pub fn split_at(count: usize, measurements: &Measurements) -> Split {
     Split { identification: (0..count).collect(), held_out: (count..measurements.len()).collect() }
+}
+
+/// The same with the rows themselves.
+pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
+    Dataset::new(measurements.clone(), split_at(count, measurements))
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use flexcal::design::Ranges;
 use flexcal::identify::{Identification, Options, identify};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::Problem;
 use flexcal::simulate::{Conditions, Rig, Truth, simulate};
 use nalgebra::{DVector, Vector3};
@@ -32,7 +32,7 @@ pub fn ranges(truth: &Truth) -> Ranges {
 pub fn fit(problem: &Problem, rows: &Measurements) -> Identification {
     let all: Vec<usize> = (0..rows.len()).collect();
     let split = Split { identification: all.clone(), held_out: all };
-    identify(problem, rows, &split, &Options::default()).unwrap()
+    identify(problem, &Dataset::new(rows.clone(), split), &Options::default()).unwrap()
 }
 
 /// A true arm on the test rig, drawn from `seed`, and its deviations from nominal as the model counts them.

@@ -5,7 +5,7 @@ use std::path::Path;
 use flexcal::design::Extremes;
 use flexcal::diagnose::{detectable, trace};
 use flexcal::identify::Options;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::effect;
 use flexcal::problem::{Effect, Freedom, Problem};
 use rand::SeedableRng as _;
@@ -46,7 +46,7 @@ fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, 
     let mut rows = rows.clone();
     measure(&with, &mut rows, &x, problem.data.position_sigma.unwrap(), &mut random);
     let split = Split { identification: (0..rows.len()).collect(), held_out: vec![0] };
-    let trace = trace(problem, &rows, &split, &Options::default()).unwrap();
+    let trace = trace(problem, &Dataset::new(rows, split), &Options::default()).unwrap();
     trace.ranking.iter().any(|ranked| ranked.effect == *effect && ranked.p_value < trace.level)
 }
 

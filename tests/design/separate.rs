@@ -5,7 +5,7 @@ use std::path::Path;
 use flexcal::design::{Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate};
 use flexcal::diagnose::close;
 use flexcal::identify::Options;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::{Cause, TrueEffect, Truth};
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ fn is_named(problem: &Problem, truth: &Truth, poses: &Measurements, own: &(Effec
     let (rig, _) = true_arm(problem, &truth, &rows, seed);
     measure(&rig, &mut rows, truth.noise_sigma, 5000 + seed);
     let split = Split { identification: (0..poses.len()).collect(), held_out: (poses.len()..rows.len()).collect() };
-    let closure = close(problem, &rows, &split, &Options::default()).unwrap();
+    let closure = close(problem, &Dataset::new(rows, split), &Options::default()).unwrap();
     closure.effects.len() == 1 && closure.effects[0].effect == *effect
 }
 

@@ -1,7 +1,7 @@
 //! Declared effects are found from 28 noisy poses, within their errors.
 
 use flexcal::identify::{Identification, Options, identify, identify_model};
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Measurements;
 use flexcal::model::Ablation;
 use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::Rig;
@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::catalogue::{conditions, declared, in_truth, lunar, odd, of_effects, poses, strengths};
 use crate::common::arms::{ODD, parse, path};
-use crate::common::made::{draw, labels, measure, model_of, normal, split_at};
+use crate::common::made::{divided, draw, labels, measure, model_of, normal};
 
 /// 1 σ of a coordinate [m].
 const NOISE: f64 = 2e-5;
@@ -46,7 +46,7 @@ fn every_effect_is_found_beside_the_arm_s_own_errors() {
             truth[k] = strong[k];
         }
         measure(&problem, &mut rows, &truth, NOISE, &mut rng);
-        let found = identify(&problem, &rows, &split_at(28, &rows), &Options::default()).unwrap();
+        let found = identify(&problem, &divided(28, &rows), &Options::default()).unwrap();
         check(&problem, &rows, &truth, &found);
     }
 }
@@ -81,7 +81,7 @@ fn several_effects_of_the_rig_are_found_at_once() {
             let noise = Vector3::from_fn(|_, _| NOISE * normal(&mut rng));
             rows.positions[row] = rig.position(&conditions(&rows, row)).unwrap() + noise;
         }
-        let found = identify(&problem, &rows, &split_at(28, &rows), &Options::default()).unwrap();
+        let found = identify(&problem, &divided(28, &rows), &Options::default()).unwrap();
         check(&problem, &rows, &strengths(&model_of(&problem, &rows), &values), &found);
     }
 }
@@ -102,8 +102,7 @@ fn sessions_are_registered_with_the_effects_at_work() {
         truth[k] = strong[k];
     }
     measure(&problem, &mut rows, &truth, NOISE, &mut rng);
-    let split = Split { identification: (0..40).collect(), held_out: (40..50).collect() };
-    let found = identify(&problem, &rows, &split, &Options::default()).unwrap();
+    let found = identify(&problem, &divided(40, &rows), &Options::default()).unwrap();
     check(&problem, &rows, &truth, &found);
     let held_out = found.fitted.held_out.rms.norm;
     assert!(held_out < 4.0 * NOISE, "{held_out} m");
@@ -132,7 +131,7 @@ fn every_part_of_the_elasticity_can_be_left_out_with_effects_declared() {
     measure(&problem, &mut rows, &truth, NOISE, &mut rng);
     let model = model_of(&problem, &rows);
     let identify = |ablation: Ablation| {
-        identify_model(&model.ablated(ablation), &problem, &rows, &split_at(28, &rows), &Options::default()).unwrap()
+        identify_model(&model.ablated(ablation), &problem, &divided(28, &rows), &Options::default()).unwrap()
     };
     let ablations = Ablation::EACH.map(|ablation| (ablation, identify(ablation)));
     for (ablation, found) in &ablations {
@@ -160,7 +159,7 @@ fn effects_that_the_columns_cannot_show_are_refused() {
         let problem = declared(&arm, &[effect]);
         let mut rows = poses(&problem, 20, false, &mut ChaCha8Rng::seed_from_u64(12));
         rows.temperature = None;
-        let error = identify(&problem, &rows, &split_at(10, &rows), &Options::default()).unwrap_err().to_string();
+        let error = identify(&problem, &divided(10, &rows), &Options::default()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
 }

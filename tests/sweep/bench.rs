@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::{Dataset, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::{Cause, Shape, TrueEffect, Truth, simulate};
@@ -82,8 +82,7 @@ pub const LARGE: Size = Size { identification: 200, held_out: 100 };
 
 /// Measurements whose truth is known.
 pub struct Set {
-    pub measurements: Measurements,
-    pub split: Split,
+    pub data: Dataset,
 }
 
 /// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd ones; stiffnesses 18 % off
@@ -101,7 +100,7 @@ pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();
     let rows = simulated.rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
-    Set { measurements: table(&rows), split: Split { identification, held_out } }
+    Set { data: Dataset::new(table(&rows), Split { identification, held_out }) }
 }
 
 /// An effect of the catalogue with its strengths in SI units.

@@ -47,7 +47,7 @@ impl Judged {
         let on_the_rig: Vec<_> = lacking.iter().filter_map(Lacking::on_the_rig).collect();
         let set = measured(&on_the_rig, size, seed);
         let problem = declared(lacking);
-        let closure = close(&problem, &set.measurements, &set.split, &Options::default()).unwrap();
+        let closure = close(&problem, &set.data, &Options::default()).unwrap();
         let all: Vec<Effect> = lacking.iter().map(|one| one.effect.clone()).collect();
         let full = Squares::of(&problem, &all, &set);
         let without = |k: usize| {
@@ -133,9 +133,9 @@ impl Squares {
         let location = problem.data.location.clone();
         let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
         problem.effects = effects.iter().map(declare).collect();
-        let found = identify(&problem, &set.measurements, &set.split, &Options::default()).unwrap();
+        let found = identify(&problem, &set.data, &Options::default()).unwrap();
         let errors = found.fitted.identification;
-        let model = model_of(&problem, &set.measurements);
+        let model = model_of(&problem, &set.data.measurements);
         let pull = |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
         let priors = found.x.iter().enumerate().map(pull);
         let given: f64 = found.estimates.iter().map(|estimate| estimate.identified).sum();

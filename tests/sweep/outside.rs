@@ -41,7 +41,7 @@ pub struct Left {
 impl Left {
     pub fn of((joint, shape, values): Outside, size: Size, seed: u64) -> Self {
         let set = measured(&[outside(joint, shape, values)], size, seed);
-        let closure = close(&lunar(), &set.measurements, &set.split, &Options::default()).unwrap();
+        let closure = close(&lunar(), &set.data, &Options::default()).unwrap();
         let left = closure.unexplained.as_ref();
         let located = left.is_some_and(|left| {
             left.place.to_string() == format!("joint {joint}") && words(&left.depends_on) == format!("q{joint}")

@@ -2,7 +2,7 @@
 
 use flexcal::diagnose::{Covariate, Verdict, close};
 use flexcal::identify::{Options, identify};
-use flexcal::measurement::Split;
+use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, EffectDeclaration};
 use flexcal::simulate::Shape;
 use rayon::prelude::*;
@@ -80,12 +80,12 @@ fn what_no_catalogue_holds_is_located_and_corrected() {
 fn case(file: &str, effects: &[Effect], limit_mm: f64) {
     let mut problem = lunar();
     let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);
-    let split = Split::new(&problem, &measurements).unwrap();
-    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, measurements).unwrap();
+    let closure = close(&problem, &data, &Options::default()).unwrap();
     let location = problem.data.location.clone();
     problem.effects =
         effects.iter().map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() }).collect();
-    let known = identify(&problem, &measurements, &split, &Options::default()).unwrap().fitted.held_out.rms.norm;
+    let known = identify(&problem, &data, &Options::default()).unwrap().fitted.held_out.rms.norm;
     let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
     let after = closure.after.fitted.held_out.rms.norm;
     println!(
@@ -122,8 +122,8 @@ fn cases_with_effects() {
 fn a_case_of_what_no_catalogue_holds() {
     let problem = lunar();
     let measurements = read(&problem, &["tests/cases/g-not-in-catalogue.csv"]);
-    let split = Split::new(&problem, &measurements).unwrap();
-    let closure = close(&problem, &measurements, &split, &Options::default()).unwrap();
+    let data = Dataset::of(&problem, measurements).unwrap();
+    let closure = close(&problem, &data, &Options::default()).unwrap();
     let left = closure.unexplained.unwrap();
     assert_eq!((left.place.to_string().as_str(), left.depends_on), ("joint 2", vec![Covariate::Command(1)]));
     let (before, after) = (closure.before.fit.fitted.held_out, left.correction.unwrap().held_out);

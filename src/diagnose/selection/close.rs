@@ -13,7 +13,7 @@ use super::pick::LEVEL;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
 use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
 
 /// Effects that are exchanged for better ones at most.
@@ -82,16 +82,11 @@ impl ClosedLoop {
 ///
 /// # Errors
 /// Problem, data and options do not fit each other.
-pub fn close(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    options: &Options,
-) -> Result<ClosedLoop, IdentifyError> {
-    let data = Data::new(measurements, split);
+pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<ClosedLoop, IdentifyError> {
+    let data = Data::new(data);
     let first = Fitted::new(problem.clone(), &data, options)?;
     let before = trace_fit(&first, &data);
-    let errors_before = first.errors(&data, &split.held_out);
+    let errors_before = first.errors(&data, &data.split.held_out);
     let declared = first.effects();
     let mut rounds =
         Rounds { data: &data, options, declared, smooth_terms: Vec::new(), steps: Vec::new(), seen: Vec::new() };
@@ -115,7 +110,7 @@ pub fn close(
         (None, true) => Verdict::NothingFound,
         (None, false) => Verdict::Explained,
     };
-    let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &split.held_out));
+    let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &data.split.held_out));
     Ok(ClosedLoop {
         verdict,
         before,

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use crate::diagnose::{ClosedLoop, Findings, examine};
 use crate::identify::{Comparison, Identification, IdentifyError, Noise, Placement, Strategy};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::problem::Problem;
 
@@ -66,18 +66,13 @@ pub struct Picture {
 ///
 /// # Errors
 /// Problem and data do not fit each other.
-pub fn of_identification(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    found: &Identification,
-) -> Result<Picture, IdentifyError> {
-    let sight = Sight::new(measurements, split);
+pub fn of_identification(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Picture, IdentifyError> {
+    let sight = Sight::new(data);
     let fitted = Arm::of(problem, &sight, found)?;
     let mut states = vec![sight.nominal(problem, &fitted.model)?];
     states.extend(sight.rigid(problem, &fitted.model)?);
     states.push(sight.identified(&fitted, found));
-    let findings = examine(problem, measurements, split, found)?;
+    let findings = examine(problem, data, found)?;
     Ok(sight.picture(states, &fitted, found, (sigma_of(problem, found, &sight), findings)))
 }
 
@@ -85,13 +80,8 @@ pub fn of_identification(
 ///
 /// # Errors
 /// Problem and data do not fit each other.
-pub fn of_comparison(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    comparison: &Comparison,
-) -> Result<Picture, IdentifyError> {
-    let sight = Sight::new(measurements, split);
+pub fn of_comparison(problem: &Problem, data: &Dataset, comparison: &Comparison) -> Result<Picture, IdentifyError> {
+    let sight = Sight::new(data);
     let fitted = Arm::of(problem, &sight, &comparison.joint)?;
     let mut states = vec![sight.nominal(problem, &fitted.model)?];
     if states::is_elastic(&fitted.model) {
@@ -99,7 +89,7 @@ pub fn of_comparison(
         states.push(sight.state(Stand::GeometryOnly, &rigid));
     }
     states.push(sight.identified(&fitted, &comparison.joint));
-    let findings = examine(problem, measurements, split, &comparison.joint)?;
+    let findings = examine(problem, data, &comparison.joint)?;
     Ok(sight.picture(states, &fitted, &comparison.joint, (sigma_of(problem, &comparison.joint, &sight), findings)))
 }
 
@@ -107,13 +97,8 @@ pub fn of_comparison(
 ///
 /// # Errors
 /// Problem and data do not fit each other.
-pub fn of_closure(
-    problem: &Problem,
-    measurements: &Measurements,
-    split: &Split,
-    closure: &ClosedLoop,
-) -> Result<Picture, IdentifyError> {
-    let sight = Sight::new(measurements, split);
+pub fn of_closure(problem: &Problem, data: &Dataset, closure: &ClosedLoop) -> Result<Picture, IdentifyError> {
+    let sight = Sight::new(data);
     let before = Arm::of(problem, &sight, &closure.before.fit)?;
     let after = Arm::of(&closure.closed, &sight, &closure.after)?;
     let mut states = vec![sight.nominal(problem, &before.model)?];

@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::model_of;
 use crate::identify::{Identification, IdentifyError, Options, Placement, identify_model};
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::{Ablation, Model, PoseResiduals};
 use crate::problem::Problem;
 
@@ -49,14 +49,16 @@ impl Arm {
 
 /// The measurements that a picture is made from.
 pub(super) struct Sight<'a> {
+    pub data: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub placement: Placement,
 }
 
 impl<'a> Sight<'a> {
-    pub fn new(measurements: &'a Measurements, split: &'a Split) -> Self {
-        Self { measurements, split, placement: Placement::of(measurements) }
+    pub fn new(data: &'a Dataset) -> Self {
+        let Dataset { measurements, split } = data;
+        Self { data, measurements, split, placement: Placement::of(measurements) }
     }
 
     /// Residuals of some rows, measuring frame [m].
@@ -92,7 +94,7 @@ impl<'a> Sight<'a> {
     }
 
     fn fitted(&self, problem: &Problem, model: &Model) -> Result<DVector<f64>, IdentifyError> {
-        Ok(identify_model(model, problem, self.measurements, self.split, &Options::default())?.x)
+        Ok(identify_model(model, problem, self.data, &Options::default())?.x)
     }
 }
 
