@@ -11,8 +11,9 @@ use common::made::{at_random, draw, labels, measure, model_of, part, predicted, 
 use flexcal::identify::{Identification, Options, Strategy, identify};
 use flexcal::least_squares::solver::AtBound;
 use flexcal::measurement::{Dataset, Measurements, Split};
-use flexcal::model::parameter::{Parameter, Unit};
+use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
+use flexcal::quantity::Unit;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -44,7 +44,7 @@ impl Ur10 {
         let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
         let mut truth = DVector::zeros(model.parameters.len());
         for k in identifiable.clone() {
-            let angle = model.parameters[k].unit() == flexcal::model::parameter::Unit::Angle;
+            let angle = model.parameters[k].unit() == flexcal::quantity::Unit::Angle;
             truth[k] = normal(&mut random) * if angle { ERRORS.0 } else { ERRORS.1 };
         }
         let configurations: Vec<[f64; 6]> =

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::Sensitivity;
 use crate::least_squares::{Identifiability, Uncertainty};
-use crate::model::parameter::{Parameter, Unit};
+use crate::model::parameter::Parameter;
+use crate::quantity::Unit;
 
 /// A part this large in combinations that stay open leaves a parameter without an error of its own.
 const PARTLY_OPEN: f64 = 1e-3;

@@ -13,8 +13,9 @@ use crate::identify::Placement;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::effect;
-use crate::model::parameter::{Unit, unit};
+use crate::model::parameter::unit;
 use crate::problem::{Effect, Problem};
+use crate::quantity::Unit;
 
 /// Probability with which an effect of the stated size is found.
 pub(super) const POWER: f64 = 0.8;

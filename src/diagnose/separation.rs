@@ -77,12 +77,7 @@ pub fn separation(
 
 /// The size of those parameters of an effect that are named first; every effect has one.
 fn first(sizes: Vec<Size>) -> Size {
-    let none = Size {
-        parameters: Vec::new(),
-        unit: crate::model::parameter::Unit::Number,
-        prior: 0.0,
-        worst: None,
-        best: None,
-    };
+    let none =
+        Size { parameters: Vec::new(), unit: crate::quantity::Unit::Number, prior: 0.0, worst: None, best: None };
     sizes.into_iter().next().unwrap_or(none)
 }

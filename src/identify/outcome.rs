@@ -8,7 +8,8 @@ use super::statistics::Statistics;
 use super::{ActiveConstraint, Distrust, ErrorSummary, Outlier, SolverChoice, Strategy, TooFewPoses};
 use crate::least_squares::Identifiability;
 use crate::least_squares::solver::{AtBound, Termination};
-use crate::model::parameter::{Parameter, Unit};
+use crate::model::parameter::Parameter;
+use crate::quantity::Unit;
 
 /// A parameter of which the data gave no more than this part has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;

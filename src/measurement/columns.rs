@@ -6,7 +6,7 @@ use std::convert::identity;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest};
 use crate::problem::{HeldOut, JointKind, Problem};
-use crate::quantity::suffix::{self, ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
+use crate::quantity::Unit;
 
 /// What a column stands for; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,18 +31,18 @@ const PLAIN: [(&str, Role); 4] =
     [("split", Role::Split), ("session", Role::Session), ("target", Role::Target), ("pose", Role::Pose)];
 
 /// Columns with a unit, and whether they need one: a column such as `time` may be about something else.
-const MEASURED: [(&str, Role, &Kind, bool); 11] = [
-    ("x", Role::Position(0), &LENGTH, true),
-    ("y", Role::Position(1), &LENGTH, true),
-    ("z", Role::Position(2), &LENGTH, true),
-    ("sigma", Role::Sigma, &LENGTH, true),
-    ("rx", Role::Orientation(0), &ANGLE, true),
-    ("ry", Role::Orientation(1), &ANGLE, true),
-    ("rz", Role::Orientation(2), &ANGLE, true),
-    ("payload", Role::Payload, &MASS, false),
-    ("hoist", Role::Hoist, &FORCE, false),
-    ("temperature", Role::Temperature, &TEMPERATURE, false),
-    ("time", Role::Time, &TIME, false),
+const MEASURED: [(&str, Role, Unit, bool); 11] = [
+    ("x", Role::Position(0), Unit::Length, true),
+    ("y", Role::Position(1), Unit::Length, true),
+    ("z", Role::Position(2), Unit::Length, true),
+    ("sigma", Role::Sigma, Unit::Length, true),
+    ("rx", Role::Orientation(0), Unit::Angle, true),
+    ("ry", Role::Orientation(1), Unit::Angle, true),
+    ("rz", Role::Orientation(2), Unit::Angle, true),
+    ("payload", Role::Payload, Unit::Mass, false),
+    ("hoist", Role::Hoist, Unit::Force, false),
+    ("temperature", Role::Temperature, Unit::Temperature, false),
+    ("time", Role::Time, Unit::Time, false),
 ];
 
 /// A column that is read.
@@ -122,15 +122,15 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let missing = |base: &str, kind: &Kind| {
-            let (write, near) = (kind.spelled(base), spellings(base, kind).find_map(|name| near(&name)));
+        let missing = |base: &str, unit: Unit| {
+            let (write, near) = (unit.spelled(base), unit.spellings(base).find_map(|name| near(&name)));
             Err(table.column(base).error(InputErrorKind::MissingColumn { write, near }))
         };
         for (index, joint) in problem.joints.iter().enumerate() {
-            if let Some(kind) = kind_of(joint.kind)
+            if let Some(unit) = unit_of(joint.kind)
                 && !self.has(Role::Joint(index))
             {
-                return missing(&format!("q{}", numbering.number(index)), kind);
+                return missing(&format!("q{}", numbering.number(index)), unit);
             }
         }
         if !measured {
@@ -138,7 +138,7 @@ impl Columns {
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             if !self.has(Role::Position(axis)) {
-                return missing(name, &LENGTH);
+                return missing(name, Unit::Length);
             }
         }
         if let Some(HeldOut::Column(name)) = &problem.data.held_out
@@ -192,13 +192,13 @@ impl Numbering {
 
     /// The column that an unknown name is meant to be, of those that the table does not have.
     fn meant(&self, name: &str, table: &Table, problem: &Problem) -> Option<String> {
-        let joints = problem.joints.iter().enumerate().filter_map(|(index, joint)| Some((index, kind_of(joint.kind)?)));
-        let joints = joints.map(|(index, kind)| (self.number(index), kind));
+        let joints = problem.joints.iter().enumerate().filter_map(|(index, joint)| Some((index, unit_of(joint.kind)?)));
+        let joints = joints.map(|(index, unit)| (self.number(index), unit));
         let plain = PLAIN.iter().map(|(name, _)| (*name).to_owned());
         let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
-        let measured = MEASURED.iter().map(|&(base, _, kind, _)| (base.to_owned(), kind));
-        let measured = measured.chain(joints.map(|(number, kind)| (format!("q{number}"), kind)));
-        let measured = measured.flat_map(|(base, kind)| spellings(&base, kind).collect::<Vec<_>>());
+        let measured = MEASURED.iter().map(|&(base, _, unit, _)| (base.to_owned(), unit));
+        let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
+        let measured = measured.flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
         let there = |name: &String| table.header.iter().any(|own| split_unit(own).0 == split_unit(name).0);
         nearest(name, plain.chain(approach).chain(measured).filter(|name| !there(name)))
     }
@@ -217,42 +217,37 @@ impl Numbering {
         }
         let (base, suffix) = split_unit(name);
         let measured = MEASURED.iter().find(|(known, ..)| *known == base);
-        let (role, kind, strict) = if let Some(&(_, role, kind, strict)) = measured {
-            (role, kind, strict)
+        let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
+            (role, unit, strict)
         } else {
             let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
             let joint = self.joint(number);
-            let Some((joint, kind)) = joint.and_then(|joint| Some((joint, kind_of(problem.joints[joint].kind)?)))
+            let Some((joint, unit)) = joint.and_then(|joint| Some((joint, unit_of(problem.joints[joint].kind)?)))
             else {
                 return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
             };
-            (Role::Joint(joint), kind, true)
+            (Role::Joint(joint), unit, true)
         };
-        let write = || kind.spelled(base);
+        let write = || unit.spelled(base);
         match suffix {
-            Some(suffix) => match kind.unit(suffix) {
-                Some(unit) => Ok(Meaning::Read(role, unit.to_si)),
-                None if strict && suffix::suffixes().any(|known| known == suffix) => {
-                    Err(InputErrorKind::WrongUnit { noun: kind.noun, suffix: suffix.to_owned(), write: write() })
+            Some(suffix) => match unit.suffix(suffix) {
+                Some(suffix) => Ok(Meaning::Read(role, suffix.to_si)),
+                None if strict && Unit::all_suffixes().any(|known| known == suffix) => {
+                    Err(InputErrorKind::WrongUnit { noun: unit.noun(), suffix: suffix.to_owned(), write: write() })
                 }
                 None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
             },
-            None if strict => Err(InputErrorKind::NeedsUnit { noun: kind.noun, write: write() }),
+            None if strict => Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: write() }),
             None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
         }
     }
 }
 
-/// A name with each of its units.
-fn spellings(base: &str, kind: &Kind) -> impl Iterator<Item = String> {
-    kind.units.iter().map(move |unit| format!("{base}_{}", unit.suffix))
-}
-
 /// What q of a joint is measured in, where it takes one.
-fn kind_of(joint: JointKind) -> Option<&'static Kind> {
+fn unit_of(joint: JointKind) -> Option<Unit> {
     match joint {
-        JointKind::Revolute => Some(&ANGLE),
-        JointKind::Prismatic => Some(&LENGTH),
+        JointKind::Revolute => Some(Unit::Angle),
+        JointKind::Prismatic => Some(Unit::Length),
         JointKind::Fixed => None,
     }
 }

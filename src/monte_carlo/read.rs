@@ -10,7 +10,7 @@ use crate::problem::item::{Document, Item};
 use crate::problem::read::name;
 use crate::problem::section::Section;
 use crate::problem::{Freedom, ParameterRule, Problem};
-use crate::quantity::suffix::LENGTH;
+use crate::quantity::Unit;
 use crate::simulate::{HeldOutRows, RandomRule, Truth};
 
 const STRATEGIES: [&str; Strategy::EACH.len()] =
@@ -119,7 +119,7 @@ fn prior(rule: &ParameterRule) -> RandomRule {
 
 /// Noise levels [m].
 fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
-    let Some((item, unit)) = root.quantity("position_sigma", &LENGTH)? else {
+    let Some((item, unit)) = root.quantity("position_sigma", Unit::Length)? else {
         return Err(root.missing("position_sigma_mm", "position_sigma_mm = [0.05], the noise levels"));
     };
     distinct(&item, |item| {

@@ -6,7 +6,7 @@ use super::item::Item;
 use super::section::Section;
 use super::{Beam, Body, Hoist, Joint, JointKind, effects};
 use crate::error::{InputError, InputErrorKind};
-use crate::quantity::suffix::{ANGLE, FORCE, Kind, LENGTH, MASS, RIGIDITY, STIFFNESS};
+use crate::quantity::Unit;
 
 /// Every `[[joint]]`, at least one.
 pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputError> {
@@ -25,13 +25,13 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
     let name = section.text("name")?.map_or_else(|| format!("joint {number}"), str::to_owned);
     let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed];
     let kind = section.word("kind", &["revolute", "prismatic", "fixed"], &kinds)?.unwrap_or(JointKind::Revolute);
-    let alpha = section.number("alpha", &ANGLE)?.unwrap_or(0.0);
-    let a = section.number("a", &LENGTH)?.unwrap_or(0.0);
-    let theta = section.number("theta", &ANGLE)?.unwrap_or(0.0);
-    let d = section.number("d", &LENGTH)?.unwrap_or(0.0);
-    let beta = section.number("beta", &ANGLE)?.unwrap_or(0.0);
+    let alpha = section.number("alpha", Unit::Angle)?.unwrap_or(0.0);
+    let a = section.number("a", Unit::Length)?.unwrap_or(0.0);
+    let theta = section.number("theta", Unit::Angle)?.unwrap_or(0.0);
+    let d = section.number("d", Unit::Length)?.unwrap_or(0.0);
+    let beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     let limits = limits(&mut section, kind)?;
-    let stiffness = stiff(&mut section, "stiffness", &STIFFNESS)?;
+    let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
         Some(section) => Some(beam(section, beams)?),
@@ -46,13 +46,13 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
 /// Range of q, infinite where none is given.
 fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), InputError> {
     let unit = match kind {
-        JointKind::Revolute => &ANGLE,
-        JointKind::Prismatic => &LENGTH,
+        JointKind::Revolute => Unit::Angle,
+        JointKind::Prismatic => Unit::Length,
         JointKind::Fixed => return Ok((f64::NEG_INFINITY, f64::INFINITY)),
     };
     let mut limit = |base| -> Result<_, InputError> {
-        let Some((item, unit)) = section.quantity(base, unit)? else { return Ok(None) };
-        Ok(Some(((unit.to_si)(item.number()?), item)))
+        let Some((item, suffix)) = section.quantity(base, unit)? else { return Ok(None) };
+        Ok(Some(((suffix.to_si)(item.number()?), item)))
     };
     match (limit("min")?, limit("max")?) {
         (Some((min, lower)), Some((max, upper))) if min > max => Err(lower.above(&upper)),
@@ -64,11 +64,11 @@ fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, I
     let item = section.require("name", "name = \"…\"")?;
     let name = beam_name(&item, beams)?;
     beams.push(name.clone());
-    let mass = section.not_negative("mass", &MASS)?.unwrap_or(0.0);
-    let ea = stiff(&mut section, "EA", &FORCE)?;
-    let ei_y = stiff(&mut section, "EIy", &RIGIDITY)?;
-    let ei_z = stiff(&mut section, "EIz", &RIGIDITY)?;
-    let gj = stiff(&mut section, "GJ", &RIGIDITY)?;
+    let mass = section.not_negative("mass", Unit::Mass)?.unwrap_or(0.0);
+    let ea = stiff(&mut section, "EA", Unit::AxialRigidity)?;
+    let ei_y = stiff(&mut section, "EIy", Unit::FlexuralRigidity)?;
+    let ei_z = stiff(&mut section, "EIz", Unit::FlexuralRigidity)?;
+    let gj = stiff(&mut section, "GJ", Unit::FlexuralRigidity)?;
     let masses = bodies(&mut section, "mass", "at", true)?;
     let hoist = section.section("hoist")?.map(hoist).transpose()?;
     section.finish()?;
@@ -93,8 +93,8 @@ fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError
 }
 
 fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
-    let at = section.require_vector("at", &LENGTH)?;
-    let force = section.number("force", &FORCE)?.unwrap_or(0.0);
+    let at = section.require_vector("at", Unit::Length)?;
+    let force = section.number("force", Unit::Force)?.unwrap_or(0.0);
     let direction = match section.get("direction") {
         Some(item) => {
             let given = item.vector()?;
@@ -120,11 +120,11 @@ fn bodies(
     for mut section in section.sections(key)? {
         let number = bodies.len() + 1;
         let name = section.text("name")?.map_or_else(|| format!("{key} {number}"), str::to_owned);
-        let mass = section.not_negative("mass", &MASS)?.ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
+        let mass = section.not_negative("mass", Unit::Mass)?.ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
         let position = if position_needed {
-            section.require_vector(base, &LENGTH)?
+            section.require_vector(base, Unit::Length)?
         } else {
-            section.vector(base, &LENGTH)?.unwrap_or_default()
+            section.vector(base, Unit::Length)?.unwrap_or_default()
         };
         section.finish()?;
         bodies.push(Body { name, mass, position });
@@ -133,6 +133,6 @@ fn bodies(
 }
 
 /// A stiffness or rigidity, above zero where it is given.
-fn stiff(section: &mut Section<'_, '_>, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
-    section.positive(base, kind, |value| InputErrorKind::NotStiff { value })
+fn stiff(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
+    section.positive(base, unit, |value| InputErrorKind::NotStiff { value })
 }

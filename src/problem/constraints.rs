@@ -3,7 +3,7 @@
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::quantity::suffix::{ANGLE, LENGTH};
+use crate::quantity::Unit;
 
 /// `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
 #[derive(Debug, Clone)]
@@ -94,9 +94,9 @@ fn limit<'a, 'i>(section: &mut Section<'a, 'i>, base: &str) -> Result<Option<(Li
     if let Some(item) = section.get(base) {
         found.push((item.number()?, LimitKind::Logarithm, item));
     }
-    for (kind, of) in [(&ANGLE, LimitKind::Angle), (&LENGTH, LimitKind::Length)] {
-        if let Some((item, unit)) = section.pick(base, kind)? {
-            found.push(((unit.to_si)(item.number()?), of, item));
+    for (unit, of) in [(Unit::Angle, LimitKind::Angle), (Unit::Length, LimitKind::Length)] {
+        if let Some((item, suffix)) = section.pick(base, unit)? {
+            found.push(((suffix.to_si)(item.number()?), of, item));
         }
     }
     if let [_, (.., second), ..] = &found[..] {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::quantity::suffix::{LENGTH, TEMPERATURE};
+use crate::quantity::Unit;
 
 /// `[data]`.
 #[derive(Debug, Clone)]
@@ -66,14 +66,15 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         }
         files_location = item.location();
     }
-    let position_sigma = section.positive("position_sigma", &LENGTH, |value| InputErrorKind::NotPositive { value })?;
+    let position_sigma =
+        section.positive("position_sigma", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
     let mut held_out = None;
     let mut held_out_location = location.clone();
     if let Some(item) = section.get("held_out") {
         held_out_location = item.location();
         held_out = Some(held_out_rows(item.section()?)?);
     }
-    let reference_temperature = section.number("reference_temperature", &TEMPERATURE)?;
+    let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
     section.finish()?;
     Ok(Data { files, position_sigma, held_out, reference_temperature, files_location, held_out_location, location })
 }

@@ -8,7 +8,7 @@ use super::item::{Document, Item};
 use super::section::Section;
 use super::{Data, Effect, EffectDeclaration, Equilibrium, Joint, JointKind, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::quantity::suffix::TIME;
+use crate::quantity::Unit;
 
 /// The effects by name.
 pub(crate) const NAMES: [&str; 21] = [
@@ -246,6 +246,6 @@ impl Arguments<'_, '_, '_> {
 
     /// A time [s].
     fn time(&mut self, base: &str) -> Result<f64, InputError> {
-        self.section.number(base, &TIME)?.ok_or_else(|| self.section.missing(base, TIME.spelled(base)))
+        self.section.number(base, Unit::Time)?.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
     }
 }

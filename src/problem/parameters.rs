@@ -3,7 +3,7 @@
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::quantity::suffix::{ANGLE, Kind, LENGTH, RELATIVE};
+use crate::quantity::Unit;
 
 /// One line of `[parameters]`.
 #[derive(Debug, Clone)]
@@ -43,7 +43,7 @@ pub struct Quantities {
     pub relative: Option<f64>,
 }
 
-const KINDS: [&Kind; 3] = [&ANGLE, &LENGTH, &RELATIVE];
+const KINDS: [Unit; 3] = [Unit::Angle, Unit::Length, Unit::Ratio];
 /// Where the nominal value lies on the scale of each kind: no deviation, or once the nominal.
 const NOMINALS: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -104,13 +104,13 @@ struct Spread<'a, 'i>([Option<Value<'a, 'i>>; 3]);
 impl<'a, 'i> Spread<'a, 'i> {
     fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
         if let Some(bare) = section.peek(base) {
-            let write = KINDS.map(|kind| kind.spelled(base)).join(" or ");
+            let write = KINDS.map(|unit| unit.spelled(base)).join(" or ");
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: "a spread or bound", write }));
         }
         let mut values = [None, None, None];
-        for (value, kind) in values.iter_mut().zip(KINDS) {
-            if let Some((item, unit)) = section.pick(base, kind)? {
-                *value = Some(((unit.to_si)(item.number()?), item));
+        for (value, unit) in values.iter_mut().zip(KINDS) {
+            if let Some((item, suffix)) = section.pick(base, unit)? {
+                *value = Some(((suffix.to_si)(item.number()?), item));
             }
         }
         Ok(Self(values))

@@ -12,7 +12,7 @@ use super::{
     robust,
 };
 use crate::error::{InputError, InputErrorKind};
-use crate::quantity::suffix::{ACCELERATION, ANGLE, LENGTH, MASS};
+use crate::quantity::Unit;
 
 impl Problem {
     /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
@@ -49,7 +49,7 @@ fn problem_of(document: &Document) -> Result<Problem, InputError> {
 fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let name = name(&mut root)?;
     let title = root.text("title")?.unwrap_or(&name).to_owned();
-    let gravity = root.vector("gravity", &ACCELERATION)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
+    let gravity = root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
     let joints = arm::joints(&mut root)?;
     let tool = tool(root.section("tool")?)?;
@@ -94,9 +94,9 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
 fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
     let mut tool = Tool { target: Vector3::zeros(), payload_at: Vector3::zeros(), payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
-    tool.target = section.vector("target", &LENGTH)?.unwrap_or_default();
-    tool.payload_at = section.vector("payload_at", &LENGTH)?.unwrap_or(tool.target);
-    tool.payload_mass = section.not_negative("payload", &MASS)?.unwrap_or(0.0);
+    tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
+    tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
+    tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;
     Ok(tool)
 }
@@ -104,8 +104,8 @@ fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
 fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
     let mut base = BasePose { translation: Vector3::zeros(), rotation: Vector3::zeros() };
     let Some(mut section) = section else { return Ok(base) };
-    base.translation = section.vector("translation", &LENGTH)?.unwrap_or_default();
-    base.rotation = section.vector("rotation", &ANGLE)?.unwrap_or_default();
+    base.translation = section.vector("translation", Unit::Length)?.unwrap_or_default();
+    base.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
     section.finish()?;
     Ok(base)
 }

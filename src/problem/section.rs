@@ -7,7 +7,7 @@ use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
 use crate::error::{InputError, InputErrorKind, Location, nearest};
-use crate::quantity::suffix::{self, Kind, Unit};
+use crate::quantity::{Suffix, Unit};
 
 /// A table that is being read.
 pub(crate) struct Section<'a, 'i> {
@@ -106,74 +106,74 @@ impl<'a, 'i> Section<'a, 'i> {
         item.list("a list of tables, each with its header in double brackets")?.iter().map(Item::section).collect()
     }
 
-    /// The value of the key `base` in one of the units of `kind`, and that unit.
-    pub fn pick(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
-        let mut found: Option<(Item<'a, 'i>, Unit)> = None;
+    /// The value of the key `base` with one of the suffixes of `unit`, and that suffix.
+    pub fn pick(&mut self, base: &str, unit: Unit) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
+        let mut found: Option<(Item<'a, 'i>, Suffix)> = None;
         let mut first_key = String::new();
-        for unit in kind.units {
-            let key = format!("{base}_{}", unit.suffix);
+        for suffix in unit.suffixes() {
+            let key = format!("{base}_{}", suffix.name);
             if let Some(item) = self.get(&key) {
                 if found.is_some() {
                     return Err(item.error(InputErrorKind::GivenTwice { first: first_key }));
                 }
-                found = Some((item, *unit));
+                found = Some((item, *suffix));
                 first_key = key;
             }
         }
         Ok(found)
     }
 
-    /// The same, where `base` has this one kind: no unit or the unit of another kind is an error.
-    pub fn quantity(&mut self, base: &str, kind: &Kind) -> Result<Option<(Item<'a, 'i>, Unit)>, InputError> {
+    /// The same, where `base` has this one unit: no suffix, or that of another unit, is an error.
+    pub fn quantity(&mut self, base: &str, unit: Unit) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
         if let Some(bare) = self.peek(base).filter(|item| !item.holds_tables()) {
-            let write = kind.spelled(base);
-            return Err(bare.error(InputErrorKind::NeedsUnit { noun: kind.noun, write }));
+            let write = unit.spelled(base);
+            return Err(bare.error(InputErrorKind::NeedsUnit { noun: unit.noun(), write }));
         }
-        for suffix in suffix::suffixes().filter(|suffix| kind.unit(suffix).is_none()) {
+        for suffix in Unit::all_suffixes().filter(|suffix| unit.suffix(suffix).is_none()) {
             if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
-                let (suffix, write) = (suffix.to_owned(), kind.spelled(base));
-                return Err(item.error(InputErrorKind::WrongUnit { noun: kind.noun, suffix, write }));
+                let (suffix, write) = (suffix.to_owned(), unit.spelled(base));
+                return Err(item.error(InputErrorKind::WrongUnit { noun: unit.noun(), suffix, write }));
             }
         }
-        self.pick(base, kind)
+        self.pick(base, unit)
     }
 
     /// A number with a unit [SI].
-    pub fn number(&mut self, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
-        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
-        Ok(Some((unit.to_si)(item.number()?)))
+    pub fn number(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
+        let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
+        Ok(Some((suffix.to_si)(item.number()?)))
     }
 
     /// A number with a unit that is not negative [SI].
-    pub fn not_negative(&mut self, base: &str, kind: &Kind) -> Result<Option<f64>, InputError> {
-        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+    pub fn not_negative(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
+        let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
-        if value < 0.0 { Err(item.error(InputErrorKind::Negative { value })) } else { Ok(Some((unit.to_si)(value))) }
+        if value < 0.0 { Err(item.error(InputErrorKind::Negative { value })) } else { Ok(Some((suffix.to_si)(value))) }
     }
 
     /// A number with a unit that is above zero [SI]; `zero` makes the error where it is not.
     pub fn positive(
         &mut self,
         base: &str,
-        kind: &Kind,
+        unit: Unit,
         zero: fn(f64) -> InputErrorKind,
     ) -> Result<Option<f64>, InputError> {
-        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
+        let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
         // A tiny length in millimetres may become 0 in metres.
-        let converted = (unit.to_si)(value);
+        let converted = (suffix.to_si)(value);
         if converted > 0.0 { Ok(Some(converted)) } else { Err(item.error(zero(value))) }
     }
 
     /// Three numbers with a unit [SI].
-    pub fn vector(&mut self, base: &str, kind: &Kind) -> Result<Option<Vector3<f64>>, InputError> {
-        let Some((item, unit)) = self.quantity(base, kind)? else { return Ok(None) };
-        Ok(Some(item.vector()?.map(unit.to_si)))
+    pub fn vector(&mut self, base: &str, unit: Unit) -> Result<Option<Vector3<f64>>, InputError> {
+        let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
+        Ok(Some(item.vector()?.map(suffix.to_si)))
     }
 
     /// Three numbers with a unit that have to be there [SI].
-    pub fn require_vector(&mut self, base: &str, kind: &Kind) -> Result<Vector3<f64>, InputError> {
-        self.vector(base, kind)?.ok_or_else(|| self.missing(base, kind.spelled(base)))
+    pub fn require_vector(&mut self, base: &str, unit: Unit) -> Result<Vector3<f64>, InputError> {
+        self.vector(base, unit)?.ok_or_else(|| self.missing(base, unit.spelled(base)))
     }
 
     /// Whether the section holds a key that nobody asked for: an error at the first of them.

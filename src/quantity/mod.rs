@@ -1,3 +1,6 @@
-//! Quantities and their units: SI inside, a suffix at every boundary.
+//! Quantities and their units: SI inside, a suffix in files, a unit of a handy size for people.
 
-pub(crate) mod suffix;
+mod unit;
+
+pub(crate) use unit::Suffix;
+pub use unit::{Display, Unit};

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::document::{Block, Table, to_text};
 use super::effect;
-use super::quantity::{Display, decimals, number};
+use super::quantity::{decimals, number};
 use crate::diagnose::{Detectable, Detection, Size};
 use crate::model::effect::{name, place};
 use crate::problem::Effect;
@@ -129,7 +129,7 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
 }
 
 fn row(effect: &Effect, size: &Size) -> Vec<String> {
-    let unit = Display::of(size.unit, size.prior);
+    let unit = size.unit.display(size.prior);
     let show = |value: Option<f64>| {
         let scaled = value.map(|value| value * unit.factor);
         scaled.map_or_else(|| "–".to_owned(), |value| number(value, decimals(value, MOST)))

@@ -2,7 +2,7 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::quantity::{Display, decimals, number};
+use super::quantity::{decimals, number};
 use crate::diagnose::Trace;
 use crate::identify::Estimate;
 use crate::model::effect::{self, Argument};
@@ -103,7 +103,7 @@ fn wave(pair: &[Estimate]) -> Option<(String, Estimate)> {
 
 /// A parameter with its error in a unit for people: `4.12 ± 0.05 µrad/(m·K)`.
 pub(super) fn value(estimate: &Estimate) -> String {
-    let unit = Display::of(estimate.unit, estimate.estimate);
+    let unit = estimate.unit.display(estimate.estimate);
     let scaled = estimate.estimate * unit.factor;
     match estimate.std_error.map(|error| error * unit.factor) {
         Some(error) => {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::quantity::{Display, decimals, number};
+use super::quantity::{decimals, number};
 use crate::design::Expected;
 
 /// Decimals of any value at most.
@@ -34,7 +34,7 @@ impl<'a> ExpectedEntry<'a> {
 
 /// Nominal value and some errors [SI] of a parameter in a unit for display: cells, and the unit.
 pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>, String) {
-    let unit = Display::of(expected.unit, expected.nominal);
+    let unit = expected.unit.display(expected.nominal);
     let show = |value: Option<f64>| {
         value.map_or_else(|| "–".to_owned(), |v| number(v * unit.factor, decimals(v * unit.factor, MOST)))
     };

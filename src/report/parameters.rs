@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Table};
-use super::quantity::{Display, decimals, number, table};
+use super::quantity::{decimals, number, table};
 use super::waves::{Line, shown};
 use crate::identify::{Estimate, Identification};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{BlindCombination, Identifiability};
-use crate::model::parameter::Unit;
+use crate::quantity::Unit;
 
 /// Decimals of a value that has no error.
 const PLAIN: usize = 4;
@@ -59,7 +59,7 @@ pub(super) fn parameter_blocks(result: &Identification, file: &str) -> Vec<Block
 /// The rows of that table.
 fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
     let row = |estimate: &Estimate| {
-        let unit = Display::of(estimate.unit, estimate.nominal);
+        let unit = estimate.unit.display(estimate.nominal);
         let error = estimate.std_error.map(|error| error * unit.factor);
         let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
         let show = |value: f64| number(value * unit.factor, digits);

@@ -1,47 +1,7 @@
 //! Numbers with units, as people read them.
 
-use crate::model::parameter::Unit;
-
 /// From here on numbers are written with a power of ten.
 const HUGE: f64 = 1e12;
-
-/// A unit for display and the factor from SI to it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Display {
-    pub factor: f64,
-    pub symbol: String,
-}
-
-impl Display {
-    /// Degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` [SI].
-    pub fn of(unit: Unit, magnitude: f64) -> Self {
-        match unit {
-            Unit::Angle => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°".to_owned() },
-            Unit::Length => Self { factor: 1e3, symbol: "mm".to_owned() },
-            Unit::AnglePerDegree => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°/K".to_owned() },
-            Unit::LengthPerDegree => Self { factor: 1e3, symbol: "mm/K".to_owned() },
-            Unit::Speed => Self { factor: 3.6e6, symbol: "mm/h".to_owned() },
-            Unit::Compliance => Self { factor: 1e6, symbol: "µrad/(N·m)".to_owned() },
-            Unit::CubicCompliance => Self { factor: 1e9, symbol: "nrad/(N·m)³".to_owned() },
-            Unit::Flexibility => Self { factor: 1e6, symbol: "1/(MN·m²)".to_owned() },
-            Unit::CurvaturePerDegree => Self { factor: 1e6, symbol: "µrad/(m·K)".to_owned() },
-            Unit::PerDegree => Self { factor: 1e6, symbol: "10⁻⁶/K".to_owned() },
-            Unit::LengthPerAngle => Self { factor: 1e3, symbol: "mm/rad".to_owned() },
-            Unit::AnglePerLength => Self { factor: 180.0 / std::f64::consts::PI, symbol: "°/m".to_owned() },
-            Unit::Ratio => Self { factor: 1e3, symbol: "‰".to_owned() },
-            Unit::Mass | Unit::PerLength | Unit::Number => Self { factor: 1.0, symbol: unit.symbol().to_owned() },
-            Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
-                let (factor, prefix) = match magnitude.abs() {
-                    m if m >= 1e9 => (1e-9, "G"),
-                    m if m >= 1e6 => (1e-6, "M"),
-                    m if m >= 1e3 => (1e-3, "k"),
-                    _ => (1.0, ""),
-                };
-                Self { factor, symbol: format!("{prefix}{}", unit.symbol()) }
-            }
-        }
-    }
-}
 
 /// Decimals that show `error` with two significant digits, at most `most`.
 pub(super) fn decimals(error: f64, most: usize) -> usize {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::document::{Block, Table, to_text};
 use super::effect;
-use super::quantity::{Display, decimals, number};
+use super::quantity::{decimals, number};
 use crate::design::Separated;
 use crate::diagnose::{Separation, Side};
 
@@ -104,7 +104,7 @@ pub(super) fn text(separated: &Separated) -> String {
     let mut rows = vec![cells(["angle between them", &angle(random_angle(separated)), &angle(planned), "°"])];
     for (k, own) in separated.effects.iter().enumerate() {
         let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, k);
-        let unit = Display::of(planned.found.unit, planned.found.prior);
+        let unit = planned.found.unit.display(planned.found.prior);
         let show = |value: Option<f64>| {
             let scaled = value.map(|value| value * unit.factor);
             scaled.map_or_else(|| "–".to_owned(), |value| number(value, decimals(value, MOST)))

@@ -69,7 +69,7 @@ pub(super) fn shown(estimates: &[Estimate]) -> Shown<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Unit;
+    use crate::quantity::Unit;
 
     fn estimate(name: String, value: f64) -> Estimate {
         Estimate {

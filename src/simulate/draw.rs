@@ -137,18 +137,18 @@ fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
 fn true_arm(problem: &Problem, truth: &Truth, mut random: ChaCha8Rng) -> (Problem, Vec<TrueParameter>) {
     let mut arm = problem.clone();
     let mut all = Vec::new();
-    parameters::visit(&mut arm, |name, kind, value| {
+    parameters::visit(&mut arm, |name, unit, value| {
         let nominal = *value;
         // Drawn for every parameter, so that a rule for one does not change another.
         let drawn = normal(&mut random);
         if let Some(given) = truth.parameters.iter().rev().find(|given| given.name == name) {
-            *value = kind.deviate(nominal, given.value);
+            *value = parameters::deviated(unit, nominal, given.value);
         } else if let Some(sigma) =
-            truth.random.iter().rev().find(|rule| matches(&rule.pattern, &name)).and_then(|rule| rule.sigma(kind))
+            truth.random.iter().rev().find(|rule| matches(&rule.pattern, &name)).and_then(|rule| rule.sigma(unit))
         {
-            *value = kind.spread(nominal, sigma, drawn);
+            *value = parameters::spread(unit, nominal, sigma, drawn);
         }
-        all.push(TrueParameter { name, kind, nominal, value: *value });
+        all.push(TrueParameter { name, unit, nominal, value: *value });
     });
     (arm, all)
 }

@@ -1,10 +1,7 @@
 //! Effects that the rig injects: what the catalogue names, one thing that it does not, and how strong they are.
 
 use crate::problem::{Effect, Joint, JointKind};
-use crate::quantity::suffix::{
-    ANGLE, ANGLE_PER_DEGREE, COMPLIANCE, CUBIC_COMPLIANCE, CURVATURE_PER_DEGREE, FLEXIBILITY, Kind, LENGTH,
-    LENGTH_PER_DEGREE, MASS, PER_LENGTH, RELATIVE, SPEED, STRAIN_PER_DEGREE,
-};
+use crate::quantity::Unit;
 
 /// What makes the arm differ from its declared model.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +67,7 @@ impl TrueEffect {
 
     /// Names of the values in the order of the law, with the suffix of their SI unit.
     pub fn keys(cause: &Cause, joints: &[Joint]) -> Vec<String> {
-        keys(cause, joints).into_iter().map(|(name, kind)| format!("{name}_{}", kind.si_suffix())).collect()
+        keys(cause, joints).into_iter().map(|(name, unit)| format!("{name}_{}", unit.si_suffix())).collect()
     }
 
     /// The effect of the catalogue with its values, where it is one.
@@ -83,15 +80,15 @@ impl TrueEffect {
 }
 
 /// What the values of a cause are called and measured in, in the order of the law in FORMAT.
-pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, &'static Kind)> {
+pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
     let slides = |joint: &usize| joints.get(joint - 1).is_some_and(|joint| joint.kind == JointKind::Prismatic);
-    let coordinate = |joint| if slides(joint) { &LENGTH } else { &ANGLE };
-    let about_xy = |kind| named(&[("about_x", kind), ("about_y", kind)]);
-    let xyz = |kind| named(&[("x", kind), ("y", kind), ("z", kind)]);
+    let coordinate = |joint| if slides(joint) { Unit::Length } else { Unit::Angle };
+    let about_xy = |unit| named(&[("about_x", unit), ("about_y", unit)]);
+    let xyz = |unit| named(&[("x", unit), ("y", unit), ("z", unit)]);
     let effect = match cause {
         Cause::Outside { joint, .. } => {
-            let kind = coordinate(joint);
-            return named(&[("height", kind), ("centre", kind), ("width", kind)]);
+            let unit = coordinate(joint);
+            return named(&[("height", unit), ("centre", unit), ("width", unit)]);
         }
         Cause::Catalogued(effect) => effect,
     };
@@ -100,30 +97,32 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, &'static Kin
             .iter()
             .flat_map(|order| ["sin", "cos"].map(|wave| (format!("{wave}{order}"), coordinate(joint))))
             .collect(),
-        Effect::JointCompliance { .. } => named(&[("compliance", &COMPLIANCE)]),
-        Effect::GearRatio { .. } | Effect::HoistForce | Effect::TrackerScale => named(&[("error", &RELATIVE)]),
+        Effect::JointCompliance { .. } => named(&[("compliance", Unit::Compliance)]),
+        Effect::GearRatio { .. } | Effect::HoistForce | Effect::TrackerScale => named(&[("error", Unit::Ratio)]),
         Effect::Backlash { joint } => named(&[("width", coordinate(joint))]),
-        Effect::JointNonlinearStiffness { .. } => named(&[("cubic", &CUBIC_COMPLIANCE)]),
-        Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => about_xy(&COMPLIANCE),
+        Effect::JointNonlinearStiffness { .. } => named(&[("cubic", Unit::CubicCompliance)]),
+        Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => about_xy(Unit::Compliance),
         Effect::JointThermalDrift { joint } => {
-            named(&[("rate", if slides(joint) { &LENGTH_PER_DEGREE } else { &ANGLE_PER_DEGREE })])
+            named(&[("rate", if slides(joint) { Unit::LengthPerDegree } else { Unit::AnglePerDegree })])
         }
-        Effect::JointCoupling { .. } => named(&[("factor", &RELATIVE)]),
-        Effect::LinkBending { .. } => named(&[("flexibility", &FLEXIBILITY)]),
+        Effect::JointCoupling { .. } => named(&[("factor", Unit::Ratio)]),
+        Effect::LinkBending { .. } => named(&[("flexibility", Unit::Flexibility)]),
         Effect::LinkThermalBending { .. } => {
-            named(&[("about_y", &CURVATURE_PER_DEGREE), ("about_z", &CURVATURE_PER_DEGREE)])
+            named(&[("about_y", Unit::CurvaturePerDegree), ("about_z", Unit::CurvaturePerDegree)])
         }
-        Effect::LinkThermalExpansion { .. } => named(&[("strain", &STRAIN_PER_DEGREE)]),
-        Effect::UnmodelledMass { .. } => named(&[("mass", &MASS), ("at", &LENGTH)]),
-        Effect::PayloadMass => named(&[("mass", &MASS)]),
-        Effect::HoistDirection => named(&[("lean_x", &RELATIVE), ("lean_y", &RELATIVE), ("trolley", &PER_LENGTH)]),
-        Effect::GravityDirection => about_xy(&ANGLE),
-        Effect::DeflectedEquilibrium => named(&[("lambda", &RELATIVE)]),
-        Effect::TrackerDrift => xyz(&SPEED),
-        Effect::StationShift { .. } => xyz(&LENGTH),
+        Effect::LinkThermalExpansion { .. } => named(&[("strain", Unit::PerDegree)]),
+        Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
+        Effect::PayloadMass => named(&[("mass", Unit::Mass)]),
+        Effect::HoistDirection => {
+            named(&[("lean_x", Unit::Ratio), ("lean_y", Unit::Ratio), ("trolley", Unit::PerLength)])
+        }
+        Effect::GravityDirection => about_xy(Unit::Angle),
+        Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
+        Effect::TrackerDrift => xyz(Unit::Speed),
+        Effect::StationShift { .. } => xyz(Unit::Length),
     }
 }
 
-fn named(keys: &[(&str, &'static Kind)]) -> Vec<(String, &'static Kind)> {
-    keys.iter().map(|(name, kind)| ((*name).to_owned(), *kind)).collect()
+fn named(keys: &[(&str, Unit)]) -> Vec<(String, Unit)> {
+    keys.iter().map(|(name, unit)| ((*name).to_owned(), *unit)).collect()
 }

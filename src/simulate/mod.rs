@@ -30,7 +30,7 @@ use equilibrium::AtRest;
 
 pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate};
 pub use effect::{Cause, Shape, TrueEffect, ValueCount};
-pub use parameters::{ParameterKind, TrueParameter};
+pub use parameters::TrueParameter;
 pub use truth::{Deviation, HeldOutRows, PoseRanges, RandomRule, Truth};
 
 /// Segments per beam where nobody asks for another number.

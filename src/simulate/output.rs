@@ -112,7 +112,7 @@ impl Simulation {
 }
 
 fn parameter(known: &TrueParameter) -> Parameter<'_> {
-    Parameter { name: &known.name, unit: known.kind.symbol(), nominal: known.nominal, value: known.value }
+    Parameter { name: &known.name, unit: known.unit.symbol(), nominal: known.nominal, value: known.value }
 }
 
 /// An effect under its name, with arguments and values.
@@ -130,7 +130,7 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
     let values: Map<String, Value> = names
         .iter()
         .zip(effect.values())
-        .map(|((name, kind), value)| (format!("{name}_{}", kind.si_suffix()), json!(value)))
+        .map(|((name, unit), value)| (format!("{name}_{}", unit.si_suffix()), json!(value)))
         .collect();
     entry["values"] = Value::Object(values);
     entry

@@ -1,22 +1,7 @@
 //! The parameters of an arm by name, to be given true values.
 
 use crate::problem::Problem;
-use crate::quantity::suffix::{ANGLE, Kind, LENGTH, RELATIVE};
-
-/// What kind of quantity a parameter is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ParameterKind {
-    /// [rad]; its deviation adds.
-    Angle,
-    /// [m]; its deviation adds.
-    Length,
-    /// [N·m/rad]; its deviation multiplies.
-    Stiffness,
-    /// EA [N]; its deviation multiplies.
-    AxialRigidity,
-    /// EI or GJ [N·m²]; its deviation multiplies.
-    FlexuralRigidity,
-}
+use crate::quantity::Unit;
 
 /// A parameter with its nominal and its true value, SI.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,53 +9,26 @@ pub struct TrueParameter {
     /// Name as in the problem file.
     pub name: String,
     /// Kind of quantity.
-    pub kind: ParameterKind,
+    pub unit: Unit,
     /// Declared value.
     pub nominal: f64,
     /// True value.
     pub value: f64,
 }
 
-impl ParameterKind {
-    /// Units that a deviation is given in.
-    pub(super) fn units(self) -> &'static Kind {
-        match self {
-            Self::Angle => &ANGLE,
-            Self::Length => &LENGTH,
-            Self::Stiffness | Self::AxialRigidity | Self::FlexuralRigidity => &RELATIVE,
-        }
-    }
-
-    /// SI unit in words.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Angle => "rad",
-            Self::Length => "m",
-            Self::Stiffness => "N·m/rad",
-            Self::AxialRigidity => "N",
-            Self::FlexuralRigidity => "N·m²",
-        }
-    }
-
-    /// Whether a deviation multiplies.
-    pub fn is_relative(self) -> bool {
-        !matches!(self, Self::Angle | Self::Length)
-    }
-
-    /// The true value from the nominal one and its deviation.
-    pub(super) fn deviate(self, nominal: f64, deviation: f64) -> f64 {
-        if self.is_relative() { nominal * deviation } else { nominal + deviation }
-    }
-
-    /// The true value from the nominal one, 1 σ and a standard normal number; relative: σ of ln(value / nominal).
-    pub(super) fn spread(self, nominal: f64, sigma: f64, normal: f64) -> f64 {
-        if self.is_relative() { nominal * (sigma * normal).exp() } else { nominal + sigma * normal }
-    }
+/// The true value from the nominal one and its deviation, a multiple where the unit is relative, else a difference.
+pub(super) fn deviated(unit: Unit, nominal: f64, deviation: f64) -> f64 {
+    if unit.is_relative() { nominal * deviation } else { nominal + deviation }
 }
 
-/// Calls `see` on every parameter, in the order of the file format: name, kind, and the value that may be changed.
-pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, ParameterKind, &mut f64)) {
-    use ParameterKind::{Angle, AxialRigidity, FlexuralRigidity, Length, Stiffness};
+/// The true value from the nominal one, 1 σ and a standard normal number; relative: σ of ln(value / nominal).
+pub(super) fn spread(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
+    if unit.is_relative() { nominal * (sigma * normal).exp() } else { nominal + sigma * normal }
+}
+
+/// Calls `see` on every parameter, in the order of the file format: name, unit, and the value that may be changed.
+pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mut f64)) {
+    use Unit::{Angle, AxialRigidity, FlexuralRigidity, Length, TorsionalStiffness};
     for (index, joint) in problem.joints.iter_mut().enumerate() {
         let fields = [
             ("alpha", Angle, &mut joint.alpha),
@@ -79,16 +37,16 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Parameter
             ("d", Length, &mut joint.d),
             ("beta", Angle, &mut joint.beta),
         ];
-        let stiffness = joint.stiffness.iter_mut().map(|stiffness| ("stiffness", Stiffness, stiffness));
-        for (field, kind, value) in fields.into_iter().chain(stiffness) {
-            see(format!("joint{}.{field}", index + 1), kind, value);
+        let stiffness = joint.stiffness.iter_mut().map(|stiffness| ("stiffness", TorsionalStiffness, stiffness));
+        for (field, unit, value) in fields.into_iter().chain(stiffness) {
+            see(format!("joint{}.{field}", index + 1), unit, value);
         }
     }
     for beam in problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
         let name = &beam.name;
-        let mut rigidity = |field: &str, kind, value: &mut Option<f64>| {
+        let mut rigidity = |field: &str, unit, value: &mut Option<f64>| {
             if let Some(value) = value {
-                see(format!("{name}.{field}"), kind, value);
+                see(format!("{name}.{field}"), unit, value);
             }
         };
         rigidity("EA", AxialRigidity, &mut beam.ea);
@@ -116,8 +74,8 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Parameter
 /// Every parameter of a problem at its nominal value.
 pub(super) fn nominal(problem: &Problem) -> Vec<TrueParameter> {
     let mut all = Vec::new();
-    visit(&mut problem.clone(), |name, kind, value| {
-        all.push(TrueParameter { name, kind, nominal: *value, value: *value });
+    visit(&mut problem.clone(), |name, unit, value| {
+        all.push(TrueParameter { name, unit, nominal: *value, value: *value });
     });
     all
 }

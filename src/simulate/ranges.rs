@@ -5,7 +5,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Joint, JointKind};
-use crate::quantity::suffix::{ANGLE, FORCE, Kind, LENGTH, MASS, TEMPERATURE, TIME};
+use crate::quantity::Unit;
 
 /// Part of the rows that is held out where the file says nothing.
 const HELD_OUT: f64 = 0.3;
@@ -17,8 +17,8 @@ pub(super) fn read(mut section: Section<'_, '_>, joints: &[Joint]) -> Result<Pos
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.kind));
     let joints = joints.collect::<Result<_, _>>()?;
     let payloads = payloads(&mut section)?;
-    let hoist = range(&mut section, "hoist", &FORCE)?;
-    let temperature = range(&mut section, "temperature", &TEMPERATURE)?;
+    let hoist = range(&mut section, "hoist", Unit::Force)?;
+    let temperature = range(&mut section, "temperature", Unit::Temperature)?;
     let time_step = time_step(&mut section)?;
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
@@ -27,23 +27,23 @@ pub(super) fn read(mut section: Section<'_, '_>, joints: &[Joint]) -> Result<Pos
 }
 
 fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {
-    let (base, kind) = (
+    let (base, unit) = (
         format!("q{number}"),
         match kind {
-            JointKind::Revolute => &ANGLE,
-            JointKind::Prismatic => &LENGTH,
+            JointKind::Revolute => Unit::Angle,
+            JointKind::Prismatic => Unit::Length,
             JointKind::Fixed => return Ok((0.0, 0.0)),
         },
     );
-    let missing = |section: &Section<'_, '_>| section.missing(&base, format!("{} = [from, to]", kind.spelled(&base)));
-    range(section, &base, kind)?.ok_or_else(|| missing(section))
+    let missing = |section: &Section<'_, '_>| section.missing(&base, format!("{} = [from, to]", unit.spelled(&base)));
+    range(section, &base, unit)?.ok_or_else(|| missing(section))
 }
 
 /// `base_unit = [from, to]` [SI].
-fn range(section: &mut Section<'_, '_>, base: &str, kind: &Kind) -> Result<Option<(f64, f64)>, InputError> {
-    let Some((item, unit)) = section.quantity(base, kind)? else { return Ok(None) };
+fn range(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<(f64, f64)>, InputError> {
+    let Some((item, suffix)) = section.quantity(base, unit)? else { return Ok(None) };
     let (from, to) = pair(&item)?;
-    Ok(Some(((unit.to_si)(from), (unit.to_si)(to))))
+    Ok(Some(((suffix.to_si)(from), (suffix.to_si)(to))))
 }
 
 fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
@@ -62,7 +62,7 @@ fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
 }
 
 fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
-    let Some((item, _)) = section.quantity("payload", &MASS)? else { return Ok(Vec::new()) };
+    let Some((item, _)) = section.quantity("payload", Unit::Mass)? else { return Ok(Vec::new()) };
     let choices = item.list("a list of masses to choose from")?;
     if choices.is_empty() {
         return Err(item.error(InputErrorKind::Empty));
@@ -76,7 +76,7 @@ fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
 
 /// A number, or a range of them; time does not run backwards.
 fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
-    let Some((item, _)) = section.quantity("time_step", &TIME)? else { return Ok((TIME_STEP, TIME_STEP)) };
+    let Some((item, _)) = section.quantity("time_step", Unit::Time)? else { return Ok((TIME_STEP, TIME_STEP)) };
     let (from, to) = item.number().map(|step| (step, step)).or_else(|_| pair(&item))?;
     if from < 0.0 { Err(item.error(InputErrorKind::Negative { value: from })) } else { Ok((from, to)) }
 }

@@ -12,7 +12,7 @@ use crate::problem::item::{Document, Item};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
 use crate::problem::{HeldOut, Problem};
-use crate::quantity::suffix::{ANGLE, Kind, LENGTH, RELATIVE};
+use crate::quantity::Unit;
 
 pub(super) fn file(path: &Path, problem: &Problem) -> Result<Truth, InputError> {
     let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
@@ -55,9 +55,9 @@ pub(super) fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<
 }
 
 fn noise(mut section: Section<'_, '_>) -> Result<f64, InputError> {
-    let sigma = section.not_negative("position_sigma", &LENGTH)?;
+    let sigma = section.not_negative("position_sigma", Unit::Length)?;
     section.finish()?;
-    sigma.ok_or_else(|| section.missing("position_sigma_mm", LENGTH.spelled("position_sigma")))
+    sigma.ok_or_else(|| section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma")))
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
@@ -73,20 +73,20 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
     };
-    let units = parameter.kind.units().units;
-    let given: Vec<_> = units.iter().filter_map(|unit| section.get(unit.suffix).map(|item| (item, unit))).collect();
+    let units = parameter.unit.of_deviation().suffixes();
+    let given: Vec<_> = units.iter().filter_map(|unit| section.get(unit.name).map(|item| (item, unit))).collect();
     section.finish()?;
     let value = match given.as_slice() {
         [] => {
-            let keys: Vec<_> = units.iter().map(|unit| format!("{} = …", unit.suffix)).collect();
-            return Err(section.missing(units[0].suffix, keys.join(" or ")));
+            let keys: Vec<_> = units.iter().map(|unit| format!("{} = …", unit.name)).collect();
+            return Err(section.missing(units[0].name, keys.join(" or ")));
         }
         [(item, unit)] => (unit.to_si)(item.number()?),
         [(_, first), (item, _), ..] => {
-            return Err(item.error(InputErrorKind::GivenTwice { first: first.suffix.to_owned() }));
+            return Err(item.error(InputErrorKind::GivenTwice { first: first.name.to_owned() }));
         }
     };
-    if parameter.kind.is_relative() && value <= 0.0 {
+    if parameter.unit.is_relative() && value <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value }));
     }
     Ok(Deviation { name: name.to_owned(), value })
@@ -95,14 +95,14 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
 /// `"joint*.alpha" = { sigma_deg = 0.3 }`.
 fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result<RandomRule, InputError> {
     let mut section = named(pattern, item)?;
-    let mut sigma = |kind: &Kind| match section.pick("sigma", kind)? {
-        Some((item, unit)) => match item.number()? {
+    let mut sigma = |unit: Unit| match section.pick("sigma", unit)? {
+        Some((item, suffix)) => match item.number()? {
             value if value < 0.0 => Err(item.error(InputErrorKind::Negative { value })),
-            value => Ok(Some((unit.to_si)(value))),
+            value => Ok(Some((suffix.to_si)(value))),
         },
         None => Ok(None),
     };
-    let (angle, length, relative) = (sigma(&ANGLE)?, sigma(&LENGTH)?, sigma(&RELATIVE)?);
+    let (angle, length, relative) = (sigma(Unit::Angle)?, sigma(Unit::Length)?, sigma(Unit::Ratio)?);
     section.finish()?;
     let matched: Vec<_> = known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
     if matched.is_empty() {
@@ -110,8 +110,8 @@ fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
         return Err(item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known }));
     }
     let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
-    if matched.iter().all(|parameter| rule.sigma(parameter.kind).is_none()) {
-        let write = matched[0].kind.units().spelled("sigma");
+    if matched.iter().all(|parameter| rule.sigma(parameter.unit).is_none()) {
+        let write = matched[0].unit.of_deviation().spelled("sigma");
         return Err(section.missing("sigma", write));
     }
     Ok(rule)

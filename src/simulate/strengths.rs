@@ -32,13 +32,13 @@ fn one(mut section: Section<'_, '_>, problem: &Problem, poses: &PoseRanges) -> R
     let keys = keys(&cause, &problem.joints);
     let mut values = Vec::with_capacity(keys.len());
     let mut given = false;
-    for (key, kind) in &keys {
-        let value = section.number(key, kind)?;
+    for (key, unit) in &keys {
+        let value = section.number(key, *unit)?;
         given |= value.is_some();
         values.push(value.unwrap_or(0.0));
     }
     section.finish()?;
-    let write = || keys.iter().map(|(key, kind)| kind.spelled(key)).collect::<Vec<_>>().join(", ");
+    let write = || keys.iter().map(|(key, unit)| unit.spelled(key)).collect::<Vec<_>>().join(", ");
     if !given {
         return Err(item.error(InputErrorKind::NoStrength { write: write() }));
     }

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::effect::TrueEffect;
-use super::parameters::ParameterKind;
 use super::read;
 use crate::error::InputError;
 use crate::problem::Problem;
 use crate::problem::section::Section;
+use crate::quantity::Unit;
 
 /// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
 #[derive(Debug, Clone)]
@@ -100,11 +100,11 @@ impl Truth {
 }
 
 impl RandomRule {
-    /// 1 σ of a kind of parameter.
-    pub(super) fn sigma(&self, kind: ParameterKind) -> Option<f64> {
-        match kind {
-            ParameterKind::Angle => self.angle,
-            ParameterKind::Length => self.length,
+    /// 1 σ of a parameter of that unit.
+    pub(super) fn sigma(&self, unit: Unit) -> Option<f64> {
+        match unit {
+            Unit::Angle => self.angle,
+            Unit::Length => self.length,
             _ => self.relative,
         }
     }

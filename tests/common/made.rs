@@ -4,9 +4,9 @@
 
 use flexcal::identify::Placement;
 use flexcal::measurement::{Dataset, Labels, Measurements, Split};
-use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{JointKind, Problem};
+use flexcal::quantity::Unit;
 use nalgebra::{DVector, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;

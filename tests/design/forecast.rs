@@ -2,8 +2,8 @@
 
 use flexcal::design::{Check, Expected, Extremes, Judged, check};
 use flexcal::measurement::Measurements;
-use flexcal::model::parameter::Unit;
 use flexcal::problem::{Freedom, Problem};
+use flexcal::quantity::Unit;
 use nalgebra::DVector;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;

@@ -3,9 +3,9 @@
 use flexcal::identify::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
-use flexcal::model::parameter::Unit;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{Effect, Equilibrium, Problem};
+use flexcal::quantity::Unit;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

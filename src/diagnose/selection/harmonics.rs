@@ -17,8 +17,9 @@ use super::retest::Retested;
 use super::rounds::Rounds;
 use crate::identify::IdentifyError;
 use crate::model::effect;
-use crate::model::parameter::{Driver, EffectParameter, Unit, rule_of};
+use crate::model::parameter::{Driver, EffectParameter, rule_of};
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
+use crate::quantity::Unit;
 
 /// Coefficients from which on they have a scale of their own.
 const MANY: usize = 20;

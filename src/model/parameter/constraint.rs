@@ -1,9 +1,10 @@
 //! From `[[constraint]]` to linear inequalities between unknowns.
 
+use super::Parameter;
 use super::resolve::{EffectParameter, candidates};
-use super::{Parameter, Unit};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::{Constraint, Limit, LimitKind, Problem};
+use crate::quantity::Unit;
 
 /// lower ≤ Σ cₖ xₖ ≤ upper over unknowns xₖ; infinite where there is no limit.
 ///

@@ -14,6 +14,8 @@ pub use name::{ArmField, BeamField, JointField, Slot};
 pub use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
 
+use crate::quantity::Unit;
+
 /// A free parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
@@ -31,80 +33,6 @@ pub struct Parameter {
     pub lower: f64,
     /// Upper bound on x, +∞ where there is none.
     pub upper: f64,
-}
-
-/// What kind of quantity a parameter is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
-    /// [rad]
-    Angle,
-    /// [m]
-    Length,
-    /// [N·m/rad]
-    TorsionalStiffness,
-    /// EA [N]
-    AxialRigidity,
-    /// EI or GJ [N·m²]
-    FlexuralRigidity,
-    /// [rad/(N·m)]
-    Compliance,
-    /// [rad/(N·m)³]
-    CubicCompliance,
-    /// Of a bending beam [1/(N·m²)]
-    Flexibility,
-    /// [1/(m·K)]
-    CurvaturePerDegree,
-    /// [1/K]
-    PerDegree,
-    /// [rad/K]
-    AnglePerDegree,
-    /// [m/K]
-    LengthPerDegree,
-    /// [kg]
-    Mass,
-    /// [1/m]
-    PerLength,
-    /// [m/s]
-    Speed,
-    /// [m/rad]
-    LengthPerAngle,
-    /// [rad/m]
-    AnglePerLength,
-    /// A small part: rad/rad, m/m
-    Ratio,
-    /// A number of order 1
-    Number,
-}
-
-impl Unit {
-    /// SI unit in words.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Angle => "rad",
-            Self::Length => "m",
-            Self::TorsionalStiffness => "N·m/rad",
-            Self::AxialRigidity => "N",
-            Self::FlexuralRigidity => "N·m²",
-            Self::Compliance => "rad/(N·m)",
-            Self::CubicCompliance => "rad/(N·m)³",
-            Self::Flexibility => "1/(N·m²)",
-            Self::CurvaturePerDegree => "1/(m·K)",
-            Self::PerDegree => "1/K",
-            Self::AnglePerDegree => "rad/K",
-            Self::LengthPerDegree => "m/K",
-            Self::Mass => "kg",
-            Self::PerLength => "1/m",
-            Self::Speed => "m/s",
-            Self::LengthPerAngle => "m/rad",
-            Self::AnglePerLength => "rad/m",
-            Self::Ratio | Self::Number => "1",
-        }
-    }
-
-    /// Whether x is ln(value / nominal).
-    pub fn is_relative(self) -> bool {
-        matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
-    }
 }
 
 impl Parameter {

@@ -1,6 +1,6 @@
 //! Where a parameter enters the model, and what it is called.
 
-use super::Unit;
+use crate::quantity::Unit;
 
 /// Where a parameter enters the model; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

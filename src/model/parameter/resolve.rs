@@ -1,10 +1,11 @@
 //! From the rules of `[parameters]` to free parameters.
 
-use super::{BeamField, Driver, JointField, Parameter, Slot, Unit, unit};
+use super::{BeamField, Driver, JointField, Parameter, Slot, unit};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::effects;
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
+use crate::quantity::Unit;
 
 /// A scalar of the model that a rule may free.
 pub(super) struct Candidate {

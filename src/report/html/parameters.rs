@@ -6,7 +6,7 @@ use crate::identify::{Comparison, ErrorSummary, Estimate, Identification};
 use crate::least_squares::BlindCombination;
 use crate::least_squares::solver::AtBound;
 use crate::report::parameters::{blind_words, verdict};
-use crate::report::quantity::{Display, decimals, number};
+use crate::report::quantity::{decimals, number};
 use crate::report::waves::{Line, Shown, shown};
 
 /// Half the width of a bar in standard errors: wider changes run off it.
@@ -59,7 +59,7 @@ fn lines(lines: &[Line]) -> Markup {
 }
 
 fn row(estimate: &Estimate) -> Markup {
-    let unit = Display::of(estimate.unit, estimate.nominal);
+    let unit = estimate.unit.display(estimate.nominal);
     let error = estimate.std_error.map(|error| error * unit.factor);
     let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
     let show = |value: f64, digits: usize| number(value * unit.factor, digits).replace('-', "−");

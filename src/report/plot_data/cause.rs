@@ -9,8 +9,9 @@ use super::joint::{along, levers, telling};
 use super::states::{Arm, Sight};
 use crate::mechanics::Setup;
 use crate::model::effect;
-use crate::model::parameter::{EffectParameter, JointField, Slot, Unit};
+use crate::model::parameter::{EffectParameter, JointField, Slot};
 use crate::problem::{Effect, JointKind, Problem};
+use crate::quantity::Unit;
 
 /// Steps of a curve.
 const STEPS: u32 = 160;

@@ -6,7 +6,7 @@ use super::frame::{
     ACCENT, Axis, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
 };
 use super::{Figure, thinned};
-use crate::model::parameter::Unit;
+use crate::quantity::Unit;
 use crate::report::plot_data::{Abscissa, Cause, Ordinate, Point};
 
 /// Poses that are drawn at most.

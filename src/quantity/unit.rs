@@ -1,0 +1,238 @@
+//! One table of units: in the program, in files, and for display.
+
+use std::f64::consts::PI;
+
+/// What kind of quantity a number is, and its SI unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unit {
+    /// [rad]
+    Angle,
+    /// [m]
+    Length,
+    /// [kg]
+    Mass,
+    /// [N]
+    Force,
+    /// [m/s²]
+    Acceleration,
+    /// [°C]
+    Temperature,
+    /// [s]
+    Time,
+    /// [N·m/rad]
+    TorsionalStiffness,
+    /// EA [N]
+    AxialRigidity,
+    /// EI or GJ [N·m²]
+    FlexuralRigidity,
+    /// [rad/(N·m)]
+    Compliance,
+    /// [rad/(N·m)³]
+    CubicCompliance,
+    /// Of a bending beam [1/(N·m²)]
+    Flexibility,
+    /// [1/(m·K)]
+    CurvaturePerDegree,
+    /// Of a strain [1/K]
+    PerDegree,
+    /// [rad/K]
+    AnglePerDegree,
+    /// [m/K]
+    LengthPerDegree,
+    /// [1/m]
+    PerLength,
+    /// [m/s]
+    Speed,
+    /// [m/rad]
+    LengthPerAngle,
+    /// [rad/m]
+    AnglePerLength,
+    /// A small part: rad/rad, m/m
+    Ratio,
+    /// A number of order 1
+    Number,
+}
+
+/// A unit as files write it, behind an underscore: `alpha_deg`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Suffix {
+    /// Without its underscore.
+    pub name: &'static str,
+    /// Conversion to the SI unit.
+    pub to_si: fn(f64) -> f64,
+}
+
+/// A unit for people and the factor from SI to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Display {
+    /// From SI.
+    pub factor: f64,
+    /// The unit in words: `mm`, `kN·m²`.
+    pub symbol: String,
+}
+
+/// What is known of a unit.
+struct Row {
+    /// The quantity with its article, for messages.
+    noun: &'static str,
+    /// SI unit in words.
+    symbol: &'static str,
+    /// As files may write it, the SI unit among them; empty where no file does.
+    suffixes: &'static [Suffix],
+    shown: Shown,
+}
+
+/// How a unit is shown to people.
+enum Shown {
+    /// Times a factor, under another symbol.
+    As(f64, &'static str),
+    /// In SI.
+    Plain,
+    /// In SI with the prefix that suits the size: k, M or G.
+    Prefixed,
+}
+
+/// Degrees per radian.
+const DEGREES: f64 = 180.0 / PI;
+
+const fn si(name: &'static str) -> Suffix {
+    Suffix { name, to_si: std::convert::identity }
+}
+
+const fn suffix(name: &'static str, to_si: fn(f64) -> f64) -> Suffix {
+    Suffix { name, to_si }
+}
+
+const fn row(noun: &'static str, symbol: &'static str, suffixes: &'static [Suffix], shown: Shown) -> Row {
+    Row { noun, symbol, suffixes, shown }
+}
+
+impl Unit {
+    /// The table.
+    fn row(self) -> Row {
+        use Shown::{As, Plain, Prefixed};
+        match self {
+            Self::Angle => {
+                row("an angle", "rad", const { &[suffix("deg", f64::to_radians), si("rad")] }, As(DEGREES, "°"))
+            }
+            Self::Length => row("a length", "m", const { &[si("m"), suffix("mm", |x| x / 1000.0)] }, As(1e3, "mm")),
+            Self::Mass => row("a mass", "kg", const { &[si("kg")] }, Plain),
+            Self::Force => row("a force", "N", const { &[si("N")] }, Plain),
+            Self::Acceleration => row("an acceleration", "m/s²", const { &[si("m_s2")] }, Plain),
+            Self::Temperature => row("a temperature", "°C", const { &[si("C")] }, Plain),
+            Self::Time => row("a time", "s", const { &[si("s")] }, Plain),
+            Self::TorsionalStiffness => row("a stiffness", "N·m/rad", const { &[si("N_m_per_rad")] }, Prefixed),
+            Self::AxialRigidity => row("a force", "N", const { &[si("N")] }, Prefixed),
+            Self::FlexuralRigidity => row("a rigidity", "N·m²", const { &[si("N_m2")] }, Prefixed),
+            Self::Compliance => row("a compliance", "rad/(N·m)", const { &[si("rad_per_N_m")] }, As(1e6, "µrad/(N·m)")),
+            Self::CubicCompliance => {
+                let shown = As(1e9, "nrad/(N·m)³");
+                row("a cubic compliance", "rad/(N·m)³", const { &[si("rad_per_N3_m3")] }, shown)
+            }
+            Self::Flexibility => row("a flexibility", "1/(N·m²)", const { &[si("per_N_m2")] }, As(1e6, "1/(MN·m²)")),
+            Self::CurvaturePerDegree => {
+                row("a curvature per °C", "1/(m·K)", const { &[si("per_m_C")] }, As(1e6, "µrad/(m·K)"))
+            }
+            Self::PerDegree => row("a strain per °C", "1/K", const { &[si("per_C")] }, As(1e6, "10⁻⁶/K")),
+            Self::AnglePerDegree => {
+                let suffixes = const { &[suffix("deg_per_C", f64::to_radians), si("rad_per_C")] };
+                row("an angle per °C", "rad/K", suffixes, As(DEGREES, "°/K"))
+            }
+            Self::LengthPerDegree => {
+                let suffixes = const { &[si("m_per_C"), suffix("mm_per_C", |x| x / 1000.0)] };
+                row("a length per °C", "m/K", suffixes, As(1e3, "mm/K"))
+            }
+            Self::PerLength => row("a number per length", "1/m", const { &[si("per_m")] }, Plain),
+            Self::Speed => {
+                let suffixes =
+                    const { &[si("m_per_s"), suffix("mm_per_s", |x| x / 1000.0), suffix("mm_per_h", |x| x / 3.6e6)] };
+                row("a speed", "m/s", suffixes, As(3.6e6, "mm/h"))
+            }
+            Self::LengthPerAngle => row("a length per angle", "m/rad", &[], As(1e3, "mm/rad")),
+            Self::AnglePerLength => row("an angle per length", "rad/m", &[], As(DEGREES, "°/m")),
+            Self::Ratio => row("a ratio", "1", const { &[si("relative")] }, As(1e3, "‰")),
+            Self::Number => row("a ratio", "1", const { &[si("relative")] }, Plain),
+        }
+    }
+
+    /// SI unit in words.
+    pub fn symbol(self) -> &'static str {
+        self.row().symbol
+    }
+
+    /// Whether a parameter of this unit deviates by ln(value / nominal): stiffnesses and rigidities.
+    pub fn is_relative(self) -> bool {
+        matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
+    }
+
+    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` [SI].
+    pub fn display(self, magnitude: f64) -> Display {
+        let Row { symbol, shown, .. } = self.row();
+        match shown {
+            Shown::As(factor, symbol) => Display { factor, symbol: symbol.to_owned() },
+            Shown::Plain => Display { factor: 1.0, symbol: symbol.to_owned() },
+            Shown::Prefixed => {
+                let (factor, prefix) = match magnitude.abs() {
+                    m if m >= 1e9 => (1e-9, "G"),
+                    m if m >= 1e6 => (1e-6, "M"),
+                    m if m >= 1e3 => (1e-3, "k"),
+                    _ => (1.0, ""),
+                };
+                Display { factor, symbol: format!("{prefix}{symbol}") }
+            }
+        }
+    }
+
+    /// The unit in which files give a deviation from a value of this unit.
+    pub(crate) fn of_deviation(self) -> Self {
+        if self.is_relative() { Self::Ratio } else { self }
+    }
+
+    /// The quantity with its article, for messages.
+    pub(crate) fn noun(self) -> &'static str {
+        self.row().noun
+    }
+
+    /// As files may write it.
+    pub(crate) fn suffixes(self) -> &'static [Suffix] {
+        self.row().suffixes
+    }
+
+    /// The suffix of that name, if files may write this unit so.
+    pub(crate) fn suffix(self, name: &str) -> Option<Suffix> {
+        self.suffixes().iter().copied().find(|suffix| suffix.name == name)
+    }
+
+    /// Suffix of the SI unit.
+    pub(crate) fn si_suffix(self) -> &'static str {
+        let is_si = |suffix: &&Suffix| (suffix.to_si)(1.0).to_bits() == 1.0_f64.to_bits();
+        self.suffixes().iter().find(is_si).map_or("", |suffix| suffix.name)
+    }
+
+    /// A key or column with each of the suffixes.
+    pub(crate) fn spellings(self, base: &str) -> impl Iterator<Item = String> {
+        self.suffixes().iter().map(move |suffix| format!("{base}_{}", suffix.name))
+    }
+
+    /// How to write a quantity of this unit: `alpha_deg or alpha_rad`.
+    pub(crate) fn spelled(self, base: &str) -> String {
+        self.spellings(base).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// Every suffix that arms and measurements are written with.
+    pub(crate) fn all_suffixes() -> impl Iterator<Item = &'static str> {
+        let all = [
+            Self::Angle,
+            Self::Length,
+            Self::Mass,
+            Self::Force,
+            Self::FlexuralRigidity,
+            Self::TorsionalStiffness,
+            Self::Acceleration,
+            Self::Temperature,
+            Self::Time,
+        ];
+        all.into_iter().flat_map(Self::suffixes).map(|suffix| suffix.name)
+    }
+}
