@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use flexcal::identify::{Options, Placement, compensate, identify};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, Workspace};
 use flexcal::model::Model;
-use flexcal::problem::Problem;
+use flexcal::problem::{PoseView, Problem};
 use flexcal::report::{commands_csv, poses_csv};
 use flexcal::simulate::{Truth, simulate};
 use nalgebra::Vector3;
@@ -47,7 +47,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let mut targets = rows.clone();
     for row in 0..rows.len() {
         let set = &simulation.rows[row].conditions;
-        let setup = Setup { payload: set.payload, hoist: set.hoist, ..Setup::of(&set.configuration) };
+        let setup = PoseView { payload: set.payload, hoist: set.hoist, ..PoseView::of(&set.configuration) };
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }

@@ -5,7 +5,8 @@
 mod common;
 
 use common::arms::{golden, golden_problem, table_2};
-use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, Problem};
 use nalgebra::Vector3;
 
@@ -17,8 +18,8 @@ struct Row {
 }
 
 impl Row {
-    fn setup(&self) -> Setup<'_> {
-        Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..Setup::of(&self.q) }
+    fn setup(&self) -> PoseView<'_> {
+        PoseView { payload: Some(self.payload), hoist: Some(self.hoist), ..PoseView::of(&self.q) }
     }
 
     fn vector(&self, k: usize) -> Vector3<f64> {

@@ -1,8 +1,8 @@
 //! A rigid UR10 with errors drawn at random, measured with noise.
 
 use flexcal::least_squares::LeastSquares as _;
-use flexcal::mechanics::Setup;
 use flexcal::model::{Model, Pose, PoseResiduals};
+use flexcal::problem::PoseView;
 use flexcal::problem::Problem;
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -69,7 +69,7 @@ impl Ur10 {
 
     fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
         let poses = self.configurations.iter().zip(&self.measured).map(|(configuration, &measured)| Pose {
-            setup: Setup::of(configuration),
+            setup: PoseView::of(configuration),
             base: 0,
             target: 0,
             measured,

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use flexcal::design::{DesignError, Ranges};
+use flexcal::design::DesignError;
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
-use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{PoseRanges, Truth};
+use flexcal::problem::{Effect, PoseRanges, Problem};
+use flexcal::simulate::Truth;
 
 use super::diagnostic;
 
@@ -39,30 +39,22 @@ impl Source {
     }
 
     /// Where poses may lie, with all that may be set there.
-    pub fn all_ranges(&self, problem: &Problem) -> Result<Ranges, DesignError> {
-        let Some(file) = &self.truth else { return Ranges::of(problem) };
-        let PoseRanges { joints, payloads, hoist, temperature, approach, .. } = Truth::read(file, problem)?.poses;
-        Ok(Ranges { joints, payloads, hoist, temperature, approach })
+    pub fn all_ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
+        let Some(file) = &self.truth else { return PoseRanges::of(problem) };
+        Ok(Truth::read(file, problem)?.poses)
     }
 
     /// The same without temperatures and sides on which no declared effect depends: they need not be set.
-    pub fn ranges(&self, problem: &Problem) -> Result<Ranges, DesignError> {
+    pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         let all = self.all_ranges(problem)?;
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
-        let thermal = declared(|effect| {
-            matches!(
-                effect,
-                Effect::JointThermalDrift { .. }
-                    | Effect::LinkThermalBending { .. }
-                    | Effect::LinkThermalExpansion { .. }
-            )
-        });
+        let thermal = declared(Effect::is_thermal);
         let sided = declared(|effect| matches!(effect, Effect::Backlash { .. }));
-        Ok(Ranges { temperature: all.temperature.filter(|_| thermal), approach: all.approach && sided, ..all })
+        Ok(PoseRanges { temperature: all.temperature.filter(|_| thermal), approach: all.approach && sided, ..all })
     }
 
     /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
-    pub fn known_ranges(&self, problem: &Problem) -> Result<Option<Ranges>, DesignError> {
+    pub fn known_ranges(&self, problem: &Problem) -> Result<Option<PoseRanges>, DesignError> {
         match self.all_ranges(problem) {
             Err(DesignError::NoRange { .. }) => Ok(None),
             other => other.map(Some),

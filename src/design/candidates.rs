@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::DesignError;
 use crate::measurement::{Labels, Measurements};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{JointKind, PoseRanges, Problem};
 
 /// Angles are commanded in steps of this [°].
 const ANGLE_STEP: f64 = 1e-4;
@@ -19,21 +19,6 @@ const APART: u64 = 1 << 32;
 /// Forces and temperatures are set in steps of this [N], [°C].
 const SETTING_STEP: f64 = 0.1;
 
-/// From where poses are drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ranges {
-    /// Range of each joint, shape = (joints) [rad] or [m]; not used at fixed joints.
-    pub joints: Vec<(f64, f64)>,
-    /// Payloads to choose from [kg]; empty: as the problem declares.
-    pub payloads: Vec<f64>,
-    /// Range of the hoist's force [N]; `None`: as the problem declares.
-    pub hoist: Option<(f64, f64)>,
-    /// Range of the temperature [°C]; `None`: not known.
-    pub temperature: Option<(f64, f64)>,
-    /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
-    pub approach: bool,
-}
-
 /// Whether poses at the ends of the ranges are preferred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extremes {
@@ -43,7 +28,7 @@ pub enum Extremes {
     Often,
 }
 
-impl Ranges {
+impl PoseRanges {
     /// The limits of the joints that the problem declares.
     ///
     /// # Errors
@@ -145,7 +130,7 @@ struct Draft {
 
 impl Draft {
     /// A row that was drawn from these ranges.
-    fn of(ranges: &Ranges, poses: &Measurements, row: usize) -> Self {
+    fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
         let place = at(&poses.payload)
             .and_then(|mass| ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits()));
@@ -166,7 +151,7 @@ impl Draft {
 
 /// Poses as they are drawn, in steps that a controller can be given.
 struct Table<'a> {
-    ranges: &'a Ranges,
+    ranges: &'a PoseRanges,
     joints: usize,
     configurations: Vec<f64>,
     payload: Vec<f64>,
@@ -176,7 +161,7 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(ranges: &'a Ranges, joints: usize) -> Self {
+    fn new(ranges: &'a PoseRanges, joints: usize) -> Self {
         let (configurations, payload, hoist, temperature, approach) = Default::default();
         Self { ranges, joints, configurations, payload, hoist, temperature, approach }
     }

@@ -4,12 +4,12 @@
 //! drawn from the priors.
 
 use super::plan::choose;
-use super::{DesignError, Extremes, Forecast, Growth, Prediction, Ranges, Sensitivity, Site};
+use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Site};
 use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
 use crate::identify::Placement;
 use crate::measurement::{Dataset, Labels, Measurements, different};
-use crate::problem::Problem;
+use crate::problem::{PoseRanges, Problem};
 
 /// Poses in which predictions are judged.
 const WORKSPACE: usize = 500;
@@ -28,13 +28,13 @@ const ARM: u64 = 12;
 #[derive(Debug, Clone)]
 pub enum Judged {
     /// So many, drawn evenly within ranges.
-    Drawn(Ranges, usize),
+    Drawn(PoseRanges, usize),
     /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in the rows themselves.
     Table {
         /// The poses.
         poses: Box<Measurements>,
         /// Ranges in which predictions count.
-        within: Option<Ranges>,
+        within: Option<PoseRanges>,
         /// Rows in which predictions count, where no ranges are known.
         held_out: Option<Box<Measurements>>,
     },
@@ -79,7 +79,7 @@ pub struct Check {
 /// # Errors
 /// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of a table.
 pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, DesignError> {
-    let draw = |ranges: &Ranges, count, stream| ranges.draw(problem, count, Extremes::No, seed, stream);
+    let draw = |ranges: &PoseRanges, count, stream| ranges.draw(problem, count, Extremes::No, seed, stream);
     let (series, count, workspace, elsewhere) = match judged {
         Judged::Drawn(ranges, count) => {
             let series = draw(ranges, SERIES.max(2 * count), POSES);

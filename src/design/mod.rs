@@ -17,7 +17,7 @@ mod sensitivity;
 mod separate;
 mod site;
 
-pub use candidates::{Extremes, Ranges};
+pub use candidates::Extremes;
 pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
 pub use criterion::Criterion;
 pub use error::DesignError;

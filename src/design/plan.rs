@@ -5,9 +5,9 @@ use rand::{Rng, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Ranges, Sensitivity, Site};
+use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site};
 use crate::measurement::{Measurements, different};
-use crate::problem::Problem;
+use crate::problem::{PoseRanges, Problem};
 
 /// Candidates drawn from ranges, evenly and with a liking for the ends.
 pub(super) const DRAWN: [usize; 2] = [500, 2000];
@@ -32,7 +32,7 @@ pub(super) const FIRST_DRAW: u64 = 200;
 #[derive(Debug, Clone)]
 pub enum Candidates {
     /// Anywhere within ranges.
-    Within(Ranges),
+    Within(PoseRanges),
     /// Rows of a table.
     Rows(Box<Measurements>),
 }
@@ -98,7 +98,7 @@ pub fn plan(
     if poses == 0 {
         return Err(DesignError::NoPoses);
     }
-    let draw = |ranges: &Ranges, count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
+    let draw = |ranges: &PoseRanges, count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
     let (usual, ends) = match candidates {
         Candidates::Within(ranges) => {
             let ends = draw(ranges, DRAWN[1].max(2 * poses), Extremes::Often, AT_ENDS);
@@ -201,7 +201,7 @@ impl Found {
         mut self,
         problem: &Problem,
         site: &Site,
-        ranges: &Ranges,
+        ranges: &PoseRanges,
         exchange: &Exchange,
         (options, number): (&PlanOptions, u64),
     ) -> Self {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::covariate::Covariate;
 use super::residual_tests::CovariateValues;
 use crate::measurement::{Dataset, Measurements, Split};
-use crate::model::effect::Conditions;
+use crate::model::effect::DataCoverage;
 use crate::model::parameter::Quantity;
 use crate::problem::{JointKind, Problem};
 
@@ -109,7 +109,7 @@ impl<'a> Data<'a> {
     }
 
     /// What the identification poses have and vary.
-    pub fn conditions(&self, problem: &Problem) -> Conditions {
+    pub fn conditions(&self, problem: &Problem) -> DataCoverage {
         let measurements = self.measurements;
         let column = |joint: usize| {
             let values = self.rows().iter().map(move |&row| measurements.configuration(row)[joint]);
@@ -123,7 +123,7 @@ impl<'a> Data<'a> {
             let came = |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] * side > 0.0);
             measurements.approach.as_ref().is_some_and(came)
         };
-        Conditions {
+        DataCoverage {
             temperature: problem.data.reference_temperature.is_some() && temperature.is_some_and(varies),
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),

@@ -5,8 +5,8 @@ use nalgebra::DMatrix;
 use super::covariate::Place;
 use super::data::Data;
 use super::neighbourhood::Library;
-use crate::mechanics::Setup;
 use crate::model::parameter::{Driver, JointField, Quantity, Slot};
+use crate::problem::PoseView;
 use crate::problem::{JointKind, Problem};
 
 /// Numbers of intervals that are tried.
@@ -96,7 +96,7 @@ impl SmoothTerm {
     }
 
     /// Whether a pose is within the range that the identification poses cover.
-    pub fn reaches(&self, setup: &Setup) -> bool {
+    pub fn reaches(&self, setup: &PoseView) -> bool {
         (self.range.0..=self.range.1).contains(&self.of.value(setup))
     }
 

@@ -8,7 +8,7 @@ use super::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
 use crate::measurement::Dataset;
 use crate::paper::{self, EndPoint, Form, Measured};
-use crate::problem::Problem;
+use crate::problem::{PoseView, Problem};
 
 /// What the paper's closed forms and its iteration make of the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,10 +51,11 @@ pub(super) fn baseline(problem: &Problem, data: &Dataset, form: Form) -> Option<
         let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
         rows.iter()
             .map(|&row| Measured {
-                setup: paper::Setup {
+                setup: PoseView {
                     configuration: data.configuration(row),
                     payload: value(&data.payload, row),
                     hoist: value(&data.hoist, row),
+                    ..PoseView::default()
                 },
                 position: data.positions[row],
             })

@@ -6,8 +6,8 @@ use super::Placement;
 use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
-use crate::mechanics::Setup;
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::problem::PoseView;
 use crate::problem::Problem;
 
 use super::stage::StageError;
@@ -68,7 +68,7 @@ pub fn compensate(
         let seed = targets.configuration(row);
         let n = moving.len();
         let at = |configuration: &[f64]| {
-            let pose = Pose { setup: Setup { configuration, ..pose.setup }, ..pose };
+            let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
             PoseResiduals::new(&arm, vec![pose], Vec::new(), DVector::zeros(n)).position_errors(&DVector::zeros(0))[0]
         };
         let mut configuration = seed.to_vec();
@@ -79,7 +79,7 @@ pub fn compensate(
             };
             let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
             let away = DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
-            let pose = Pose { setup: Setup { configuration: &configuration, ..pose.setup }, ..pose };
+            let pose = Pose { setup: PoseView { configuration: &configuration, ..pose.setup }, ..pose };
             let residuals = PoseResiduals::new(&arm, vec![pose], unknowns.clone(), DVector::zeros(n));
             let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
             let fit = Fit::new(&residuals).with_rows(near)?;

@@ -1,9 +1,9 @@
 //! Which base and which target each row uses, and which of them appear in held-out rows only.
 
 use crate::measurement::{Measurements, Split};
-use crate::mechanics::Setup;
 use crate::model::parameter::Slot;
 use crate::model::{Model, Pose};
+use crate::problem::PoseView;
 use crate::problem::Problem;
 
 /// Scale of a coordinate's error where no σ is declared and none estimated yet [m].
@@ -57,7 +57,7 @@ impl Placement {
         let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
         rows.iter()
             .map(|&row| Pose {
-                setup: Setup {
+                setup: PoseView {
                     configuration: measurements.configuration(row),
                     payload: at(&measurements.payload, row),
                     hoist: at(&measurements.hoist, row),

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::Flexibility;
 use super::imperfection::{AddedMass, Rope, Thermal};
 use super::joint::Joint;
-use crate::problem::{self, Equilibrium, Problem};
+use crate::problem::{self, Equilibrium, PoseView, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
@@ -118,32 +118,6 @@ pub struct Arm<S> {
     pub reference_temperature: f64,
 }
 
-/// What the controller and the test bench set for one pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup<'a> {
-    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
-    pub configuration: &'a [f64],
-    /// Payload [kg], if it is known for this pose.
-    pub payload: Option<f64>,
-    /// Hoist force [N], if it is known for this pose.
-    pub hoist: Option<f64>,
-    /// Temperature [°C], if it is known for this pose.
-    pub temperature: Option<f64>,
-    /// Time [s].
-    pub time: f64,
-    /// Time since the first measured pose [s].
-    pub elapsed: f64,
-    /// Direction from which each joint came, shape = (joints), −1, 0 or +1, if it is known.
-    pub approach: Option<&'a [f64]>,
-}
-
-impl<'a> Setup<'a> {
-    /// A configuration, shape = (joints) [rad] or [m], of which nothing else is known.
-    pub fn of(configuration: &'a [f64]) -> Self {
-        Self { configuration, payload: None, hoist: None, temperature: None, time: 0.0, elapsed: 0.0, approach: None }
-    }
-}
-
 impl Arm<f64> {
     /// The arm as the problem declares it.
     pub fn nominal(problem: &Problem) -> Self {
@@ -188,12 +162,12 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Degrees above the reference [K]; 0 where the temperature is not known.
-    pub(super) fn warming(&self, setup: &Setup) -> f64 {
+    pub(super) fn warming(&self, setup: &PoseView) -> f64 {
         setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
     }
 
     /// The last frame of the arm that does not deflect, arm base frame.
-    pub(super) fn rigid_frame(&self, setup: &Setup) -> Frame<S> {
+    pub(super) fn rigid_frame(&self, setup: &PoseView) -> Frame<S> {
         let mut frame = Frame::identity();
         for (joint, &q) in self.joints.iter().zip(setup.configuration) {
             joint.advance(&mut frame, q);
@@ -202,7 +176,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Payload of a pose [kg].
-    pub(super) fn payload(&self, setup: &Setup) -> S {
+    pub(super) fn payload(&self, setup: &PoseView) -> S {
         let declared = setup.payload.unwrap_or(self.payload_mass);
         if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }
     }

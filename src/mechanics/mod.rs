@@ -18,6 +18,6 @@ pub use apart::Part;
 pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
 pub use imperfection::{AddedMass, Nonlinear, Rope, Strain, Thermal};
 pub use joint::{Angle, Coordinates, Joint};
-pub use link::{Arm, Beam, Hoist, PointMass, Setup};
+pub use link::{Arm, Beam, Hoist, PointMass};
 pub use sensitivity::Sensitivity;
 pub use statics::{Equilibrated, Response, StaticsError, Workspace};

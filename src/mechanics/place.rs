@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 use super::Wrench;
 use super::apart::{Cut, Part};
 use super::element::{Element, LinkLoad};
-use super::link::{Arm, Beam, Hoist, PointMass, Setup};
+use super::link::{Arm, Beam, Hoist, PointMass};
 use super::workspace::{Event, Workspace};
+use crate::problem::PoseView;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
@@ -26,7 +27,7 @@ pub(super) enum Bend<'a, S> {
 
 /// Where a walk has got to.
 struct Walk<'a, S> {
-    setup: &'a Setup<'a>,
+    setup: &'a PoseView<'a>,
     bend: Bend<'a, S>,
     frame: Frame<S>,
     /// Index of the next unknown moment.
@@ -81,7 +82,7 @@ impl<S: Scalar> Arm<S> {
     /// Forces of ropes, and beyond each link; only ropes that lean depend on how the arm bends, by the unknowns `state`.
     ///
     /// Before there is a state (empty) leaning ropes are taken as if their hooks were above the base.
-    pub(super) fn gather_forces(&self, setup: &Setup, state: &[S], ws: &mut Workspace<S>) {
+    pub(super) fn gather_forces(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
         let zero = Vector3::from_element(S::from(0.0));
         let mut hooks = state.chunks_exact(2);
         ws.ropes.clear();
@@ -107,7 +108,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Force of a rope [N].
-    fn pull(&self, hoist: &Hoist, setup: &Setup, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
+    fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
         let tension = setup.hoist.unwrap_or(hoist.force);
         match &self.rope {
             None => (hoist.direction * tension).map(S::from),
@@ -122,7 +123,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Walks to the last frame, arm base frame.
-    pub(super) fn walk(&self, setup: &Setup, bend: Bend<S>, ws: &mut Workspace<S>) -> Frame<S> {
+    pub(super) fn walk(&self, setup: &PoseView, bend: Bend<S>, ws: &mut Workspace<S>) -> Frame<S> {
         let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns() };
         ws.events.clear();
         ws.hooks.clear();

@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::apart::{Part, moment_lanes};
-use super::link::{Arm, Setup};
+use super::link::Arm;
 use super::place::Bend;
 use super::statics::Equilibrated;
 use super::trail::Trail;
 use super::workspace::Workspace;
-use crate::problem::Equilibrium;
+use crate::problem::{Equilibrium, PoseView};
 
 /// Differentiates poses at rest by the parameters of parts, each part by its own few directions.
 pub struct Sensitivity {
@@ -45,7 +45,7 @@ impl Sensitivity {
     }
 
     /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame, and finds all derivatives.
-    pub fn differentiate(&mut self, setup: &Setup, target: &Vector3<f64>, pose: &mut Equilibrated) {
+    pub fn differentiate(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
         let Self { arms, parameters, lanes, ws, trail } = self;
         let mut moments = std::mem::take(&mut ws.moments);
         for (lane, arm) in arms.iter().enumerate() {

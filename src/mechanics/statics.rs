@@ -13,9 +13,9 @@
 use nalgebra::Vector3;
 use num_dual::Dual64;
 
-use super::link::{Arm, Setup};
+use super::link::Arm;
 use super::place::Bend;
-use crate::problem::Equilibrium;
+use crate::problem::{Equilibrium, PoseView};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
@@ -56,7 +56,7 @@ impl Arm<f64> {
     /// The arm is too soft for its loads.
     pub fn equilibrate(
         &self,
-        setup: &Setup,
+        setup: &PoseView,
         ws: &mut Workspace<f64>,
         pose: &mut Equilibrated,
     ) -> Result<(), StaticsError> {
@@ -121,7 +121,7 @@ impl Response {
     }
 
     /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame.
-    pub fn adjoint(&mut self, setup: &Setup, target: &Vector3<f64>, pose: &mut Equilibrated) {
+    pub fn adjoint(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
         let n = pose.moments.len();
         if n == 0 || (self.arm.is_first_order() && self.arm.mixing.is_none()) {
             return;
@@ -185,7 +185,7 @@ impl<S: Scalar> Arm<S> {
     /// arm its Λ for the same target.
     pub fn target_position(
         &self,
-        setup: &Setup,
+        setup: &PoseView,
         target: &Vector3<f64>,
         pose: &Equilibrated,
         ws: &mut Workspace<S>,
@@ -218,7 +218,7 @@ impl<S: Scalar> Arm<S> {
     /// The position on the bent arm; `moments` is memory.
     fn at_rest(
         &self,
-        setup: &Setup,
+        setup: &PoseView,
         target: &Vector3<S>,
         pose: &Equilibrated,
         moments: &mut Vec<S>,
@@ -245,7 +245,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Gathers forces again where ropes lean with the unknowns.
-    fn lean_ropes(&self, setup: &Setup, state: &[S], ws: &mut Workspace<S>) {
+    fn lean_ropes(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
         if self.rope.is_some() {
             self.gather_forces(setup, state, ws);
         }

@@ -13,8 +13,8 @@ use super::observation::Observation;
 use super::rigid::Rigid;
 use super::{Model, Pose};
 use crate::least_squares::Block;
-use crate::mechanics::Setup;
 use crate::model::parameter::{Driver, Slot};
+use crate::problem::PoseView;
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, rotation_axes};
 
@@ -148,7 +148,7 @@ impl Rows<'_> {
 
     /// Writes the derivative with respect to an input for each parameter that acts there.
     #[inline]
-    pub fn put_input(&mut self, input: &Input, commanded: &Setup, derivative: &Vector3<f64>) {
+    pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
         if let Some(column) = input.column {
             self.put(column, derivative);
         }
@@ -166,8 +166,8 @@ impl Inner {
     #[inline]
     fn write(
         &mut self,
-        commanded: &Setup,
-        setup: &Setup,
+        commanded: &PoseView,
+        setup: &PoseView,
         base: &Base,
         target: &Target,
         rows: &mut Rows,

@@ -1,8 +1,8 @@
 //! What adds to the joints' commands, pose by pose.
 
 use super::Model;
-use crate::mechanics::Setup;
 use crate::model::parameter::{Driver, JointField, Slot};
+use crate::problem::PoseView;
 
 /// A known addition to a joint's coordinate: value × driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +48,7 @@ impl Commands {
 
     /// The pose as the joints take it.
     #[inline]
-    pub fn apply<'b>(&'b mut self, setup: &Setup<'b>) -> Setup<'b> {
+    pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
         if self.all.is_empty() {
             return *setup;
         }
@@ -57,6 +57,6 @@ impl Commands {
         for driven in &self.all {
             self.configuration[driven.joint] += driven.value * driven.driver.value(setup);
         }
-        Setup { configuration: &self.configuration, ..*setup }
+        PoseView { configuration: &self.configuration, ..*setup }
     }
 }

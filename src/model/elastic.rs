@@ -9,8 +9,9 @@ use num_dual::Dual64;
 use super::Model;
 use super::derivative::Rows;
 use super::inputs::Input;
-use crate::mechanics::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Setup, Workspace};
+use crate::mechanics::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Workspace};
 use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::problem::PoseView;
 use crate::spatial::Frame;
 
 /// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
@@ -67,8 +68,8 @@ impl Elastic {
     /// has no equilibrium.
     pub fn write(
         &mut self,
-        commanded: &Setup,
-        setup: &Setup,
+        commanded: &PoseView,
+        setup: &PoseView,
         base: &Frame<f64>,
         target: &Vector3<f64>,
         rows: &mut Rows,

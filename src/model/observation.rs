@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Model;
-use crate::mechanics::Setup;
 use crate::model::parameter::{Driver, Slot};
+use crate::problem::PoseView;
 
 /// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,7 +31,7 @@ impl Observation {
 
     /// What is measured of a position, measuring frame [m].
     #[inline]
-    pub fn of(&self, position: &Vector3<f64>, setup: &Setup) -> Vector3<f64> {
+    pub fn of(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {
         let mut seen = position * (1.0 + self.scale);
         for &(axis, driver, size) in &self.shifts {
             seen[axis] += size * driver.value(setup);

@@ -10,13 +10,14 @@ use super::derivative::Linearised;
 use super::driven::Commands;
 use super::observation::Observation;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
-use crate::mechanics::{Equilibrated, Setup, Workspace};
+use crate::mechanics::{Equilibrated, Workspace};
+use crate::problem::PoseView;
 
 /// One measured pose as the model sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose<'a> {
     /// What was set.
-    pub setup: Setup<'a>,
+    pub setup: PoseView<'a>,
     /// Which base.
     pub base: usize,
     /// Which target.

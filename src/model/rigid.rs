@@ -8,8 +8,9 @@ use num_dual::Dual64;
 
 use super::derivative::Rows;
 use super::inputs::Input;
-use crate::mechanics::{Angle, Arm, Coordinates, Joint, Setup};
+use crate::mechanics::{Angle, Arm, Coordinates, Joint};
 use crate::model::parameter::{JointField, Slot};
+use crate::problem::PoseView;
 use crate::spatial::{Frame, turn_x, turn_y, turn_z};
 
 /// A rigid arm, motion by motion.
@@ -50,8 +51,8 @@ impl Rigid {
     #[inline]
     pub fn write(
         &mut self,
-        commanded: &Setup,
-        setup: &Setup,
+        commanded: &PoseView,
+        setup: &PoseView,
         base: &Frame<f64>,
         target: &Vector3<f64>,
         rows: &mut Rows,

@@ -77,7 +77,7 @@ fn by_rig(arm: Problem, truth: &Truth, rows: &[Row]) -> Option<Vec<Vector3<f64>>
 /// What the virtual test rig measured, as a table of measurements.
 pub fn table(rows: &[Row]) -> Measurements {
     let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
-    let approach: Vec<f64> = rows.iter().flat_map(|row| row.conditions.approach.iter().copied()).collect();
+    let approach: Vec<f64> = rows.iter().flat_map(|row| row.conditions.approach.iter().flatten().copied()).collect();
     Measurements {
         files: vec![PathBuf::from("simulated")],
         origin: (1_u32..).take(rows.len()).map(|line| (0, line)).collect(),

@@ -102,7 +102,7 @@ fn truth(root: &mut Section<'_, '_>, problem: &Problem, folder: &Path) -> Result
         truth.random = problem.parameters.iter().map(prior).chain(truth.random).collect();
         truth
     };
-    (truth.noise_sigma, truth.poses.held_out) = (0.0, HeldOutRows::Share(0.0));
+    (truth.noise_sigma, truth.held_out) = (0.0, HeldOutRows::Share(0.0));
     Ok(truth)
 }
 

@@ -4,10 +4,10 @@ use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 
 use super::form::{Misprint, Reading};
 use super::kinematics::{Chain, split};
-use super::loads::{Loads, Setup};
+use super::loads::Loads;
 use super::parameters::Parameters;
 use super::{Elastic, geometric};
-use crate::problem::Problem;
+use crate::problem::{PoseView, Problem};
 
 /// A pose with everything the paper computes for it, at geometry E.
 #[derive(Debug, Clone)]
@@ -23,7 +23,7 @@ impl EndPoint {
     /// The arm of `problem` with the geometry of `parameters`, loaded and set as `setup` says.
     ///
     /// `parameters` has an entry for each joint; coordinates missing in the configuration are 0.
-    pub fn new(problem: &Problem, parameters: &Parameters, setup: &Setup, reading: &Reading) -> Self {
+    pub fn new(problem: &Problem, parameters: &Parameters, setup: &PoseView, reading: &Reading) -> Self {
         let chain = Chain::new(problem, &parameters.geometry, setup.configuration);
         let loads = Loads::new(problem, &chain, setup);
         Self { elastic: Elastic::new(&chain, &loads, reading), chain, reading: *reading }

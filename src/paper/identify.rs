@@ -3,18 +3,17 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::form::{Form, Misprint, Reading};
-use super::loads::Setup;
 use super::residuals::GeometryResiduals;
 use super::{EndPoint, Parameters};
 use crate::least_squares::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
 use crate::least_squares::{Block, Fit, Triangle};
-use crate::problem::Problem;
+use crate::problem::{PoseView, Problem};
 
 /// A pose with its measured position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured<'a> {
     /// What was set.
-    pub setup: Setup<'a>,
+    pub setup: PoseView<'a>,
     /// `PE_meas`, measuring frame [m].
     pub position: Vector3<f64>,
 }

@@ -7,18 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::kinematics::{Chain, split};
-use crate::problem::{Beam, Problem};
-
-/// What is set for one pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup<'a> {
-    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
-    pub configuration: &'a [f64],
-    /// Payload [kg]; `None`: as declared.
-    pub payload: Option<f64>,
-    /// Hoist force [N]; `None`: as declared.
-    pub hoist: Option<f64>,
-}
+use crate::problem::{Beam, PoseView, Problem};
 
 /// Force [N] and moment [N·m] at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -82,7 +71,7 @@ struct Load {
 
 impl Loads {
     /// Walks from the end point to the base: what acts on a section is all that lies beyond it.
-    pub fn new(problem: &Problem, chain: &Chain, setup: &Setup) -> Self {
+    pub fn new(problem: &Problem, chain: &Chain, setup: &PoseView) -> Self {
         let gravity = problem.gravity;
         let n = problem.joints.len();
         let mut forces = Vec::new();
@@ -123,7 +112,7 @@ impl Loads {
 }
 
 /// Places in the link's frame [m] and forces in the base frame [N] of what a beam carries.
-fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &Setup) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
+fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &PoseView) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
     let masses = beam.masses.iter().map(|mass| (mass.position, gravity * mass.mass, false));
     let hoist = beam.hoist.iter();
     masses.chain(hoist.map(|hoist| (hoist.at, hoist.direction * setup.hoist.unwrap_or(hoist.force), true))).collect()

@@ -4,6 +4,7 @@
 //! and never changed afterwards.
 
 mod arm;
+mod conditions;
 mod constraints;
 mod data;
 pub(crate) mod digest;
@@ -19,6 +20,7 @@ pub(crate) mod section;
 
 use nalgebra::Vector3;
 
+pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, HeldOut};
 pub use effect::{Effect, EffectDeclaration};

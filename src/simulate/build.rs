@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::Rig;
 use super::chain::{Chain, Force, Hinge};
 use super::effect::TrueEffect;
-use super::{Conditions, Rig};
-use crate::problem::{Effect, Joint, JointKind};
+use crate::problem::{Effect, Joint, JointKind, PoseConditions};
 use crate::spatial::rotate;
 
 /// An effect and its values.
@@ -13,7 +13,7 @@ pub(super) type Part<'a> = (&'a Effect, &'a [f64]);
 
 impl Rig {
     /// The chain of one pose, in the base frame.
-    pub(super) fn chain(&self, conditions: &Conditions) -> Chain {
+    pub(super) fn chain(&self, conditions: &PoseConditions) -> Chain {
         let gravity = self.gravity();
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut chain = Chain::new(self.base_hinge());
@@ -71,7 +71,7 @@ impl Rig {
     }
 
     /// The hinges of a joint: one that tilts it before it turns, and one about its z.
-    fn joint_hinges(&self, joint: &Joint, number: usize, conditions: &Conditions) -> (Hinge, Hinge) {
+    fn joint_hinges(&self, joint: &Joint, number: usize, conditions: &PoseConditions) -> (Hinge, Hinge) {
         let (mut before, mut about) = (Hinge::default(), Hinge::default());
         about.compliance.z = softness(joint.stiffness);
         for part in self.parts() {
@@ -85,7 +85,7 @@ impl Rig {
                 }
                 // A moment about its axis moves no joint along its slide.
                 (Effect::Backlash { joint: place }, [width])
-                    if *place == number && conditions.approach.is_empty() && joint.kind != JointKind::Prismatic =>
+                    if *place == number && conditions.approach.is_none() && joint.kind != JointKind::Prismatic =>
                 {
                     about.play += width;
                 }
@@ -96,7 +96,7 @@ impl Rig {
     }
 
     /// Payload [kg].
-    fn payload(&self, conditions: &Conditions) -> f64 {
+    fn payload(&self, conditions: &PoseConditions) -> f64 {
         let declared = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
         let more = |payload: f64, part: Part<'_>| match part {
             (Effect::PayloadMass, &[mass]) if declared > 0.0 => payload + mass,

@@ -1,14 +1,14 @@
 //! Where a joint really goes when it is told to go to q.
 
+use super::Rig;
 use super::effect::{Cause, Shape, TrueEffect};
-use super::{Conditions, Rig};
-use crate::problem::Effect;
+use crate::problem::{Effect, PoseConditions};
 
 impl Rig {
     /// By how much the coordinate of the joint with this number misses its command, without any load [rad] or [m].
     ///
     /// Errors of a prismatic joint add to its d.
-    pub(super) fn miss(&self, number: usize, conditions: &Conditions) -> f64 {
+    pub(super) fn miss(&self, number: usize, conditions: &PoseConditions) -> f64 {
         let of = |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
         let q = of(number);
         let part = |effect: &TrueEffect| match (effect.cause(), effect.values()) {
@@ -31,7 +31,8 @@ impl Rig {
                     .sum(),
                 (Effect::GearRatio { joint }, [error]) if *joint == number => error * q,
                 (Effect::Backlash { joint }, [width]) if *joint == number => {
-                    0.5 * width * conditions.approach.get(number - 1).copied().unwrap_or(0.0)
+                    0.5 * width
+                        * conditions.approach.as_ref().and_then(|sides| sides.get(number - 1)).copied().unwrap_or(0.0)
                 }
                 (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),
                 (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => factor * of(*from),
@@ -43,7 +44,7 @@ impl Rig {
     }
 
     /// T − T₀ [°C].
-    pub(super) fn warming(&self, conditions: &Conditions) -> f64 {
+    pub(super) fn warming(&self, conditions: &PoseConditions) -> f64 {
         match (conditions.temperature, self.arm.data.reference_temperature) {
             (Some(temperature), Some(reference)) => temperature - reference,
             _ => 0.0,

@@ -9,10 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::parameters::{self, TrueParameter};
-use super::truth::{PoseRanges, Truth};
-use super::{Conditions, NoRest, Rig};
+use super::truth::Truth;
+use super::{NoRest, Rig};
 use crate::problem::pattern::matches;
-use crate::problem::{HeldOut, Joint, JointKind, Problem};
+use crate::problem::{HeldOut, Joint, JointKind, PoseConditions, Problem};
 
 /// Streams of random numbers of one seed, so that none shifts when another is used more.
 const DEVIATIONS: u64 = 0;
@@ -24,7 +24,7 @@ const SPLIT: u64 = 3;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// What was set.
-    pub conditions: Conditions,
+    pub conditions: PoseConditions,
     /// What the tracker read, measuring frame [m].
     pub position: Vector3<f64>,
     /// Whether the row is held out.
@@ -81,7 +81,7 @@ pub struct Draw {
 /// More poses leave the arm and the first poses as they are; another σ of the noise scales it and changes nothing else.
 pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
     let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
-    let mut rows = draw_poses(problem, &truth.poses, poses, stream(seed, POSES));
+    let mut rows = draw_poses(problem, truth, poses, stream(seed, POSES));
     let mut noise = stream(seed, NOISE);
     for row in &mut rows {
         row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
@@ -96,7 +96,7 @@ pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
 pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Result<Simulation, SimulationError> {
     let Draw { arm, parameters, mut rows } = draw(problem, truth, poses, seed);
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
-    hold_out(&mut rows, truth.poses.held_out.count(poses), &mut stream(seed, SPLIT));
+    hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
     let seen: Vec<_> = rows.par_iter().map(|row| rig.position(&row.conditions)).collect();
     for (index, (row, seen)) in rows.iter_mut().zip(seen).enumerate() {
         row.position += seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
@@ -154,11 +154,12 @@ fn true_arm(problem: &Problem, truth: &Truth, mut random: ChaCha8Rng) -> (Proble
 }
 
 /// Draws poses; every number is rounded to what the file of measurements will hold.
-fn draw_poses(problem: &Problem, ranges: &PoseRanges, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
+fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
+    let ranges = &truth.poses;
     let mut rows: Vec<Row> = Vec::with_capacity(poses);
     let mut time = 0.0;
     for _ in 0..poses {
-        let mut conditions = Conditions::default();
+        let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
             let q = if joint.kind == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
             conditions.configuration.push(match joint.kind {
@@ -172,13 +173,14 @@ fn draw_poses(problem: &Problem, ranges: &PoseRanges, poses: usize, mut random: 
         conditions.payload = ranges.payloads.get(choice).copied();
         conditions.hoist = ranges.hoist.map(|range| rounded(between(&mut random, range), 3));
         conditions.temperature = ranges.temperature.map(|range| rounded(between(&mut random, range), 2));
-        time = rounded(time + between(&mut random, ranges.time_step), 1);
+        time = rounded(time + between(&mut random, truth.time_step), 1);
         conditions.time = time;
-        conditions.first_time = rows.first().map_or(time, |row| row.conditions.time);
+        conditions.elapsed = time - rows.first().map_or(time, |row| row.conditions.time);
         if ranges.approach {
             let side = |kind| if kind == JointKind::Fixed { 0.0 } else { 1.0 };
             let sides = problem.joints.iter().map(|joint| side(joint.kind));
-            conditions.approach = sides.map(|side| if random.random::<bool>() { side } else { -side }).collect();
+            let signed = sides.map(|side| if random.random::<bool>() { side } else { -side });
+            conditions.approach = Some(signed.collect());
         }
         rows.push(Row { conditions, position: Vector3::zeros(), held_out: false });
     }

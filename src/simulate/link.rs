@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::Rig;
 use super::build::softness;
 use super::chain::{Chain, Force, Hinge};
-use super::{Conditions, Rig};
-use crate::problem::{Beam, Effect, Joint};
+use crate::problem::{Beam, Effect, Joint, PoseConditions};
 
 /// A load on a link, at a point of the straight link's frame [m].
 type LinkLoad = (Vector3<f64>, Force);
@@ -22,7 +22,7 @@ impl Rig {
         joint: &Joint,
         number: usize,
         gravity: &Vector3<f64>,
-        conditions: &Conditions,
+        conditions: &PoseConditions,
         chain: &mut Chain,
     ) {
         let beam = joint.beam.as_ref();
@@ -51,7 +51,7 @@ impl Rig {
         joint: &Joint,
         number: usize,
         reach: f64,
-        conditions: &Conditions,
+        conditions: &PoseConditions,
         chain: &mut Chain,
     ) {
         let share = reach / joint.a.abs();
@@ -74,7 +74,7 @@ impl Rig {
     }
 
     /// The hinge that stands for `length` [m] of a link, which is negative along −x.
-    fn hinge(&self, beam: Option<&Beam>, number: usize, length: f64, conditions: &Conditions) -> Hinge {
+    fn hinge(&self, beam: Option<&Beam>, number: usize, length: f64, conditions: &PoseConditions) -> Hinge {
         let mut hinge = Hinge::default();
         let between = length.abs();
         if let Some(beam) = beam {
@@ -101,7 +101,7 @@ impl Rig {
     }
 
     /// What a beam of signed length `a` [m] carries besides its own weight.
-    fn link_loads(&self, beam: &Beam, a: f64, gravity: &Vector3<f64>, conditions: &Conditions) -> Vec<LinkLoad> {
+    fn link_loads(&self, beam: &Beam, a: f64, gravity: &Vector3<f64>, conditions: &PoseConditions) -> Vec<LinkLoad> {
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut loads: Vec<LinkLoad> =
             beam.masses.iter().map(|carried| (carried.position, weight(carried.mass))).collect();

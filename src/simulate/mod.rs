@@ -24,14 +24,14 @@ mod truth;
 
 use nalgebra::Vector3;
 
-use crate::problem::{Effect, Problem};
+use crate::problem::{Effect, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::AtRest;
 
 pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate};
 pub use effect::{Cause, Shape, TrueEffect, ValueCount};
 pub use parameters::TrueParameter;
-pub use truth::{Deviation, HeldOutRows, PoseRanges, RandomRule, Truth};
+pub use truth::{Deviation, HeldOutRows, RandomRule, Truth};
 
 /// Segments per beam where nobody asks for another number.
 pub const SEGMENTS: usize = 16;
@@ -42,25 +42,6 @@ pub struct Rig {
     arm: Problem,
     effects: Vec<TrueEffect>,
     segments: usize,
-}
-
-/// What the controller and the test bench set for one pose.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Conditions {
-    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
-    pub configuration: Vec<f64>,
-    /// Payload [kg]; `None`: as the problem declares.
-    pub payload: Option<f64>,
-    /// Hoist force [N]; `None`: as the problem declares.
-    pub hoist: Option<f64>,
-    /// Temperature [°C]; `None`: the reference.
-    pub temperature: Option<f64>,
-    /// Time [s].
-    pub time: f64,
-    /// Time of the first pose [s].
-    pub first_time: f64,
-    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; empty where nobody knows.
-    pub approach: Vec<f64>,
 }
 
 /// A pose in which the arm does not come to rest.
@@ -85,7 +66,7 @@ impl Rig {
     ///
     /// # Errors
     /// The arm is too soft for its loads.
-    pub fn position(&self, conditions: &Conditions) -> Result<Vector3<f64>, NoRest> {
+    pub fn position(&self, conditions: &PoseConditions) -> Result<Vector3<f64>, NoRest> {
         let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
         let seen = base.point(&rest.end.point(&self.arm.tool.target));
@@ -93,14 +74,14 @@ impl Rig {
     }
 
     /// What the tracker makes of a position [m].
-    fn track(&self, seen: Vector3<f64>, conditions: &Conditions) -> Vector3<f64> {
+    fn track(&self, seen: Vector3<f64>, conditions: &PoseConditions) -> Vector3<f64> {
         let mut scale = 1.0;
         let mut moved = Vector3::zeros();
         for part in self.effects.iter().filter_map(TrueEffect::parts) {
             match part {
                 (Effect::TrackerScale, [error]) => scale += error,
                 (Effect::TrackerDrift, [x, y, z]) => {
-                    moved += Vector3::new(*x, *y, *z) * (conditions.time - conditions.first_time);
+                    moved += Vector3::new(*x, *y, *z) * conditions.elapsed;
                 }
                 (Effect::StationShift { at_time }, [x, y, z]) if conditions.time >= *at_time => {
                     moved += Vector3::new(*x, *y, *z);

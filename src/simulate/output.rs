@@ -77,8 +77,8 @@ impl Simulation {
         cells.extend(set.hoist.map(|force| format!("{force:.3}")));
         cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
         cells.push(format!("{:.1}", set.time));
-        if self.truth.poses.approach {
-            cells.extend(self.moving().map(|(index, _)| set.approach[index].to_string()));
+        if let Some(approach) = &set.approach {
+            cells.extend(self.moving().map(|(index, _)| approach[index].to_string()));
         }
         cells
     }

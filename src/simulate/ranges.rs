@@ -1,10 +1,10 @@
 //! The section `[poses]`.
 
-use super::truth::{HeldOutRows, PoseRanges};
+use super::truth::HeldOutRows;
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
-use crate::problem::{Joint, JointKind};
+use crate::problem::{Joint, JointKind, PoseRanges};
 use crate::quantity::Unit;
 
 /// Part of the rows that is held out where the file says nothing.
@@ -12,7 +12,11 @@ const HELD_OUT: f64 = 0.3;
 /// Seconds between poses where the file says nothing.
 const TIME_STEP: f64 = 60.0;
 
-pub(super) fn read(mut section: Section<'_, '_>, joints: &[Joint]) -> Result<PoseRanges, InputError> {
+/// Ranges, the time from one pose to the next [s], and which rows are held out.
+pub(super) fn read(
+    mut section: Section<'_, '_>,
+    joints: &[Joint],
+) -> Result<(PoseRanges, (f64, f64), HeldOutRows), InputError> {
     let joints = joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.kind));
     let joints = joints.collect::<Result<_, _>>()?;
@@ -23,7 +27,7 @@ pub(super) fn read(mut section: Section<'_, '_>, joints: &[Joint]) -> Result<Pos
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
     section.finish()?;
-    Ok(PoseRanges { joints, payloads, hoist, temperature, time_step, approach, held_out })
+    Ok((PoseRanges { joints, payloads, hoist, temperature, approach }, time_step, held_out))
 }
 
 fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {

@@ -49,9 +49,9 @@ pub(super) fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<
     }?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", "[poses], the ranges of the joints"))?;
-    let poses = ranges::read(section, &problem.joints)?;
+    let (poses, time_step, held_out) = ranges::read(section, &problem.joints)?;
     let effects = strengths::read(root, problem, &poses)?;
-    Ok(Truth { parameters, random, effects, noise_sigma: 0.0, poses, segments })
+    Ok(Truth { parameters, random, effects, noise_sigma: 0.0, poses, time_step, held_out, segments })
 }
 
 fn noise(mut section: Section<'_, '_>) -> Result<f64, InputError> {

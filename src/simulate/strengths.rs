@@ -1,12 +1,11 @@
 //! The tables `[[effect]]` of a truth: an effect as the problem file declares it, and beside it how strong it is.
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
-use super::truth::PoseRanges;
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::effects::{NAMES, effect};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
-use crate::problem::{Effect, Problem};
+use crate::problem::{Effect, PoseRanges, Problem};
 
 /// The key of what no catalogue holds.
 const OUTSIDE: &str = "outside";

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::effect::TrueEffect;
 use super::read;
 use crate::error::InputError;
-use crate::problem::Problem;
 use crate::problem::section::Section;
+use crate::problem::{PoseRanges, Problem};
 use crate::quantity::Unit;
 
 /// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
@@ -20,8 +20,12 @@ pub struct Truth {
     pub effects: Vec<TrueEffect>,
     /// 1 σ of a measured coordinate [m].
     pub noise_sigma: f64,
-    /// `[poses]`.
+    /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
     pub poses: PoseRanges,
+    /// `[poses]`: range of the time from one pose to the next [s].
+    pub time_step: (f64, f64),
+    /// `[poses]`: which rows are held out.
+    pub held_out: HeldOutRows,
     /// Segments per beam.
     pub segments: usize,
 }
@@ -46,25 +50,6 @@ pub struct RandomRule {
     pub length: Option<f64>,
     /// 1 σ of ln(value / nominal) of stiffnesses and rigidities.
     pub relative: Option<f64>,
-}
-
-/// From where poses are drawn: ranges evenly, each quantity by itself.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PoseRanges {
-    /// Range of each joint, shape = (joints) [rad] or [m]; (0, 0) at fixed joints.
-    pub joints: Vec<(f64, f64)>,
-    /// Payloads to choose from [kg]; empty: no column.
-    pub payloads: Vec<f64>,
-    /// Range of the hoist's force [N].
-    pub hoist: Option<(f64, f64)>,
-    /// Range of the temperature [°C].
-    pub temperature: Option<(f64, f64)>,
-    /// Range of the time from one pose to the next [s].
-    pub time_step: (f64, f64),
-    /// Whether joints come from either side at random; otherwise nobody knows from where.
-    pub approach: bool,
-    /// Which rows are held out.
-    pub held_out: HeldOutRows,
 }
 
 /// How many rows are held out, chosen at random.

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use flexcal::design::Ranges;
 use flexcal::identify::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Measurements, Split};
-use flexcal::problem::Problem;
-use flexcal::simulate::{Conditions, Rig, Truth, simulate};
+use flexcal::problem::{PoseConditions, PoseRanges, Problem};
+use flexcal::simulate::{Rig, Truth, simulate};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -22,10 +21,8 @@ pub fn lunar() -> (Problem, Truth) {
 }
 
 /// The ranges of joints, payload and hoist from which the test rig draws.
-pub fn ranges(truth: &Truth) -> Ranges {
-    let poses = &truth.poses;
-    let (joints, payloads) = (poses.joints.clone(), poses.payloads.clone());
-    Ranges { joints, payloads, hoist: poses.hoist, temperature: None, approach: false }
+pub fn ranges(truth: &Truth) -> PoseRanges {
+    PoseRanges { temperature: None, approach: false, ..truth.poses.clone() }
 }
 
 /// Every row fitted, and the same rows as if held out.
@@ -53,11 +50,11 @@ pub fn measure(rig: &Rig, rows: &mut Measurements, sigma: f64, seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     for row in 0..rows.len() {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let conditions = Conditions {
+        let conditions = PoseConditions {
             configuration: rows.configuration(row).to_vec(),
             payload: at(&rows.payload),
             hoist: at(&rows.hoist),
-            ..Conditions::default()
+            ..PoseConditions::default()
         };
         let noise = Vector3::from_fn(|_, _| sigma * normal(&mut random));
         rows.positions[row] = rig.position(&conditions).unwrap() + noise;

@@ -5,8 +5,8 @@ use std::path::Path;
 use flexcal::error::Location;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
-use flexcal::problem::{Effect, EffectDeclaration, Equilibrium, JointKind, Problem};
-use flexcal::simulate::{Cause, Conditions, TrueEffect};
+use flexcal::problem::{Effect, EffectDeclaration, Equilibrium, JointKind, PoseConditions, Problem};
+use flexcal::simulate::{Cause, TrueEffect};
 use nalgebra::DVector;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -94,17 +94,17 @@ pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng
 }
 
 /// What was set in a row, for the rig.
-pub fn conditions(rows: &Measurements, row: usize) -> Conditions {
+pub fn conditions(rows: &Measurements, row: usize) -> PoseConditions {
     let n = rows.joints;
     let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-    Conditions {
+    PoseConditions {
         configuration: rows.configuration(row).to_vec(),
         payload: at(&rows.payload),
         hoist: at(&rows.hoist),
         temperature: at(&rows.temperature),
         time: rows.time[row],
-        first_time: rows.time[0],
-        approach: rows.approach.as_ref().map_or_else(Vec::new, |all| all[row * n..(row + 1) * n].to_vec()),
+        elapsed: rows.time[row] - rows.time[0],
+        approach: rows.approach.as_ref().map(|all| all[row * n..(row + 1) * n].to_vec()),
     }
 }
 

@@ -1,11 +1,10 @@
 //! The lunar sampler, its golden positions, and what the dual-number model says of it.
 
 use flexcal::least_squares::jacobian;
-use flexcal::mechanics;
 use flexcal::model::parameter::Parameter;
 use flexcal::model::{Model, Pose, PoseResiduals};
-use flexcal::paper::{EndPoint, Mdh, Parameters, Reading, Setup};
-use flexcal::problem::{Equilibrium, Freedom, Problem, Quantities};
+use flexcal::paper::{EndPoint, Mdh, Parameters, Reading};
+use flexcal::problem::{Equilibrium, Freedom, PoseView, Problem, Quantities};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
@@ -19,12 +18,8 @@ pub struct Row {
 }
 
 impl Row {
-    pub fn setup(&self) -> Setup<'_> {
-        Setup { configuration: &self.q, payload: Some(self.payload), hoist: Some(self.hoist) }
-    }
-
-    pub fn arm_setup(&self) -> mechanics::Setup<'_> {
-        mechanics::Setup { payload: Some(self.payload), hoist: Some(self.hoist), ..mechanics::Setup::of(&self.q) }
+    pub fn setup(&self) -> PoseView<'_> {
+        PoseView { payload: Some(self.payload), hoist: Some(self.hoist), ..PoseView::of(&self.q) }
     }
 }
 
@@ -117,7 +112,7 @@ pub fn model(problem: &Problem) -> Model {
 
 /// ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
 pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
-    let pose = Pose { setup: row.arm_setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0 };
+    let pose = Pose { setup: row.setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0 };
     let residuals = PoseResiduals::new(model, vec![pose], (0..x.len()).collect(), x.clone());
     -jacobian(&residuals, x)
 }

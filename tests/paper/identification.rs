@@ -23,7 +23,7 @@ fn measured<'a>(problem: &Problem, rows: &'a [Row], part: f64, stiffness: f64) -
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     rows.iter()
         .map(|row| {
-            arm.equilibrate(&row.arm_setup(), &mut ws, &mut rest).unwrap();
+            arm.equilibrate(&row.setup(), &mut ws, &mut rest).unwrap();
             Measured { setup: row.setup(), position: rest.frame.point(&problem.tool.target) }
         })
         .collect()

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, Conditions, Rig, TrueEffect};
+use flexcal::problem::{Effect, PoseConditions, Problem};
+use flexcal::simulate::{Cause, Rig, TrueEffect};
 use nalgebra::Vector3;
 
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -21,13 +21,13 @@ pub fn effect(arm: &Problem, effect: Effect, values: &[f64]) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect), values, &arm.joints).unwrap()
 }
 
-pub fn position(arm: &Problem, effects: Vec<TrueEffect>, conditions: &Conditions) -> Vector3<f64> {
+pub fn position(arm: &Problem, effects: Vec<TrueEffect>, conditions: &PoseConditions) -> Vector3<f64> {
     Rig::new(arm.clone(), effects).position(conditions).unwrap()
 }
 
 /// A row of `tests/golden`: what was set, and the columns of values [mm].
 pub struct Golden {
-    pub conditions: Conditions,
+    pub conditions: PoseConditions,
     pub values: Vec<f64>,
 }
 
@@ -42,11 +42,11 @@ pub fn golden(name: &str) -> Vec<Golden> {
     let mut reader = csv::Reader::from_path(Path::new(ROOT).join("tests/golden").join(name)).unwrap();
     let row = |record: Result<csv::StringRecord, _>| {
         let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
-        let conditions = Conditions {
+        let conditions = PoseConditions {
             configuration: v[..4].iter().map(|q| q.to_radians()).collect(),
             payload: Some(v[4]),
             hoist: Some(v[5]),
-            ..Conditions::default()
+            ..PoseConditions::default()
         };
         Golden { conditions, values: v[6..].to_vec() }
     };

@@ -1,20 +1,20 @@
 //! Every effect is inert at zero, moves positions when it is not, and does what its law says.
 
-use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, Conditions, Shape, TrueEffect};
+use flexcal::problem::{Effect, PoseConditions, Problem};
+use flexcal::simulate::{Cause, Shape, TrueEffect};
 use nalgebra::Vector3;
 
 use super::bench::{effect, golden, lunar_sampler, position};
 use super::common::effects::{Strong, of_lunar_sampler};
 
 /// The lunar sampler as FORMAT declares it, with a rigid link, and a pose in which everything acts.
-fn bench() -> (Problem, Conditions) {
+fn bench() -> (Problem, PoseConditions) {
     let mut arm = lunar_sampler();
     arm.joints[1].a = 0.3;
     let mut conditions = golden("equilibrium.csv").swap_remove(0).conditions;
     conditions.temperature = Some(28.0);
-    conditions.approach = vec![1.0, -1.0, 1.0, -1.0];
-    (conditions.time, conditions.first_time) = (900.0, 60.0);
+    conditions.approach = Some(vec![1.0, -1.0, 1.0, -1.0]);
+    (conditions.time, conditions.elapsed) = (900.0, 840.0);
     (arm, conditions)
 }
 
@@ -61,7 +61,7 @@ fn the_wrong_number_of_values_is_refused() {
 }
 
 /// Checks that an effect does the same as a change of the arm or of what was set.
-fn check(cause: &Effect, values: &[f64], change: impl Fn(&mut Problem, &mut Conditions)) {
+fn check(cause: &Effect, values: &[f64], change: impl Fn(&mut Problem, &mut PoseConditions)) {
     let (arm, conditions) = bench();
     let with = position(&arm, vec![effect(&arm, cause.clone(), values)], &conditions);
     let (mut changed, mut set) = (arm, conditions);
@@ -73,7 +73,9 @@ fn check(cause: &Effect, values: &[f64], change: impl Fn(&mut Problem, &mut Cond
 #[test]
 fn errors_of_a_joint_are_errors_of_its_angle() {
     let turn = |joint: usize, error: fn(f64) -> f64| {
-        move |_: &mut Problem, set: &mut Conditions| set.configuration[joint - 1] += error(set.configuration[joint - 1])
+        move |_: &mut Problem, set: &mut PoseConditions| {
+            set.configuration[joint - 1] += error(set.configuration[joint - 1]);
+        }
     };
     check(&Effect::GearRatio { joint: 3 }, &[4e-4], turn(3, |q| 4e-4 * q));
     check(
@@ -155,7 +157,7 @@ fn the_rope_of_a_trolley_leans_with_its_hook() {
 #[test]
 fn without_approaches_backlash_follows_the_moment() {
     let (arm, mut conditions) = bench();
-    conditions.approach.clear();
+    conditions.approach = None;
     let without = position(&arm, Vec::new(), &conditions);
     let with = position(&arm, vec![effect(&arm, Effect::Backlash { joint: 2 }, &[1e-3])], &conditions);
     assert!(with.z < without.z - 1e-4, "the shoulder drops into its play");

@@ -1,7 +1,6 @@
 //! Results that can be checked by hand: a straight arm of one link, clamped or on one joint.
 
-use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::Conditions;
+use flexcal::problem::{Effect, PoseConditions, Problem};
 use nalgebra::Vector3;
 
 use super::bench::{effect, position, problem};
@@ -29,8 +28,8 @@ fn rigid() -> Problem {
     )
 }
 
-fn at(payload: f64) -> Conditions {
-    Conditions { configuration: vec![0.0; 2], payload: Some(payload), ..Conditions::default() }
+fn at(payload: f64) -> PoseConditions {
+    PoseConditions { configuration: vec![0.0; 2], payload: Some(payload), ..PoseConditions::default() }
 }
 
 fn near(is: f64, expected: f64, relative: f64) {
@@ -105,7 +104,7 @@ fn a_hanging_soft_joint_comes_to_rest_and_a_column_that_buckles_does_not() {
 
 #[test]
 fn warmth_lengthens_and_bows_a_link() {
-    let warm = Conditions { temperature: Some(35.0), ..at(0.0) };
+    let warm = PoseConditions { temperature: Some(35.0), ..at(0.0) };
     for a in [LENGTH, -LENGTH] {
         let arm = cantilever(a, "", "");
         let link = || "A".to_owned();
@@ -144,7 +143,7 @@ fn compliances_tilt_by_the_moment() {
 #[test]
 fn the_tracker_scales_drifts_and_shifts() {
     let arm = rigid();
-    let late = Conditions { time: 500.0, first_time: 100.0, ..at(0.0) };
+    let late = PoseConditions { time: 500.0, elapsed: 400.0, ..at(0.0) };
     let shift = |cause, values: &[f64], conditions| {
         position(&arm, vec![effect(&arm, cause, values)], conditions) - Vector3::new(2.0, 0.0, 0.0)
     };

@@ -1,8 +1,8 @@
 //! The closed-form beams against the rig, on arms with everything that a problem may declare.
 
-use flexcal::mechanics::{Arm, Equilibrated, Setup, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, Workspace};
 use flexcal::problem::Problem;
-use flexcal::simulate::Conditions;
+use flexcal::problem::{PoseConditions, PoseView};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -61,10 +61,10 @@ target_m = [0.2, 0.1, -0.1]
 payload_at_m = [0.1, 0.0, 0.3]
 ";
 
-fn closed_form(problem: &Problem, set: &Conditions) -> Vector3<f64> {
+fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
     let mut arm = Arm::nominal(problem);
     arm.beam_elements = 12;
-    let setup = Setup { payload: set.payload, hoist: set.hoist, ..Setup::of(&set.configuration) };
+    let setup = PoseView { payload: set.payload, hoist: set.hoist, ..PoseView::of(&set.configuration) };
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)
@@ -78,11 +78,11 @@ fn closed_forms_and_segments_agree_on_every_kind_of_arm() {
     for _ in 0..40 {
         let mut configuration: Vec<f64> = (0..5).map(|_| random.random_range(-1.5..1.5)).collect();
         (configuration[2], configuration[3]) = (0.2 * configuration[2], 0.0);
-        let set = Conditions {
+        let set = PoseConditions {
             configuration,
             payload: Some(random.random_range(0.0..3.0)),
             hoist: Some(random.random_range(30.0..60.0)),
-            ..Conditions::default()
+            ..PoseConditions::default()
         };
         let seen = position(&arm, Vec::new(), &set);
         worst = worst.max((seen - closed_form(&arm, &set)).norm() * 1e3);

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
-use flexcal::simulate::{Conditions, Rig, Simulation, Truth, simulate};
+use flexcal::problem::{PoseConditions, Problem};
+use flexcal::simulate::{Rig, Simulation, Truth, simulate};
 use serde_json::Value;
 
 use super::bench::{ROOT, problem};
@@ -63,7 +63,7 @@ fn what_is_written_is_what_was_measured() {
         assert_eq!(measurements.hoist.as_ref().unwrap()[k], set.hoist.unwrap());
         assert_eq!(measurements.temperature.as_ref().unwrap()[k], set.temperature.unwrap());
         assert_eq!(measurements.time[k], set.time);
-        assert_eq!(&measurements.approach.as_ref().unwrap()[4 * k..4 * k + 4], set.approach);
+        assert_eq!(&measurements.approach.as_ref().unwrap()[4 * k..4 * k + 4], set.approach.as_deref().unwrap());
         assert!((measurements.positions[k] - row.position).norm() < 1e-9);
     }
 }
@@ -100,9 +100,9 @@ fn prismatic_and_fixed_joints_have_their_columns() {
     assert_eq!(header, "pose,split,q1_m,q3_deg,x_mm,y_mm,z_mm,time_s,approach1,approach3");
     assert_eq!(read(&simulation, &problem).len(), 5);
     let row = &simulation.rows[0];
-    let (q, side) = (row.conditions.configuration[0], row.conditions.approach[0]);
+    let (q, side) = (row.conditions.configuration[0], row.conditions.approach.as_ref().unwrap()[0]);
     let straight =
-        Conditions { configuration: vec![0.0, 0.0, row.conditions.configuration[2]], ..Conditions::default() };
+        PoseConditions { configuration: vec![0.0, 0.0, row.conditions.configuration[2]], ..PoseConditions::default() };
     let rest = Rig::new(problem, Vec::new()).position(&straight).unwrap();
     assert!((row.position.z - rest.z - q - 1e-4 * side).abs() < 1e-12);
 }

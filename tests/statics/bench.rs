@@ -1,6 +1,7 @@
 //! What the tests of this theme share.
 
-use flexcal::mechanics::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, Setup, StaticsError, Workspace};
+use flexcal::mechanics::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, StaticsError, Workspace};
+use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, JointKind};
 use flexcal::spatial::Frame;
 use nalgebra::Vector3;
@@ -59,7 +60,7 @@ pub fn frame(arm: &Arm<f64>, q: &[f64]) -> Result<Frame<f64>, StaticsError> {
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     let still = vec![0.0; arm.joints.len()];
     let configuration = if q.is_empty() { &still } else { q };
-    arm.equilibrate(&Setup::of(configuration), &mut ws, &mut rest)?;
+    arm.equilibrate(&PoseView::of(configuration), &mut ws, &mut rest)?;
     Ok(rest.frame)
 }
 

@@ -1,9 +1,10 @@
 //! Many elements, no loads, small deflections, and loads too great for an equilibrium.
 
 use flexcal::identify::Placement;
-use flexcal::mechanics::{Arm, Equilibrated, Setup, StaticsError, Workspace};
+use flexcal::mechanics::{Arm, Equilibrated, StaticsError, Workspace};
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Equilibrium;
+use flexcal::problem::PoseView;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -111,7 +112,7 @@ fn an_arm_that_its_hoist_balances_comes_to_rest() {
         for hoist in [39.2266, 39.227, 39.2] {
             let angle = f64::from(step) * 0.017;
             let configuration = [0.3, angle, -0.7 * angle, 0.2];
-            let setup = Setup { hoist: Some(hoist), ..Setup::of(&configuration) };
+            let setup = PoseView { hoist: Some(hoist), ..PoseView::of(&configuration) };
             arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         }
     }

@@ -96,7 +96,7 @@ pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
     let mut truth = Truth::parse(&format!("{given}{DRAWN}"), Path::new("truth.toml"), &arm).unwrap();
     truth.effects = effects.to_vec();
-    truth.poses.held_out = flexcal::simulate::HeldOutRows::AllBut(size.identification);
+    truth.held_out = flexcal::simulate::HeldOutRows::AllBut(size.identification);
     let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();
     let rows = simulated.rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);

@@ -1,6 +1,6 @@
 //! `backlash`: play, Δθ = (b/2)·approach; without directions of approach the moment M_z decides.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::place::{commanded, slides};
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
@@ -18,16 +18,16 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let candidate = |joint: usize| {
             let effect = Effect::Backlash { joint };
-            if conditions.approach {
-                let both = conditions.both_sides.get(joint - 1).copied().unwrap_or(false);
+            if data.approach {
+                let both = data.both_sides.get(joint - 1).copied().unwrap_or(false);
                 Candidate::needing(effect, both, "the joint was not approached from both sides")
             } else if slides(problem, joint) {
                 Candidate::needing(effect, false, "no directions of approach, and moments move nothing along a slide")
             } else {
-                Candidate::needing(effect, conditions.weighs(), NO_LOADS)
+                Candidate::needing(effect, data.weighs(), NO_LOADS)
             }
         };
         commanded(problem).map(candidate).collect()

@@ -1,6 +1,6 @@
 //! `base-compliance`: the base turns by (C_x M_x, C_y M_y, 0) under the moments at the base.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
@@ -15,7 +15,7 @@ pub(super) const FAMILY: Family = Family {
         ],
         _ => Vec::new(),
     },
-    candidates: |_, conditions| vec![Candidate::needing(Effect::BaseCompliance, conditions.weighs(), NO_LOADS)],
+    candidates: |_, data| vec![Candidate::needing(Effect::BaseCompliance, data.weighs(), NO_LOADS)],
     describe: |effect| match effect {
         Effect::BaseCompliance => "the base tilts under the load".to_owned(),
         _ => String::new(),

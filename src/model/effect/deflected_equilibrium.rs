@@ -1,6 +1,6 @@
 //! `deflected-equilibrium`: λ from 0, loads on the rigid arm, to 1, loads on the bent arm.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::{Effect, Equilibrium};
@@ -14,10 +14,10 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let first_order = problem.statics.equilibrium == Equilibrium::Undeflected;
         let effect = Effect::DeflectedEquilibrium;
-        first_order.then(|| Candidate::needing(effect, conditions.weighs(), NO_LOADS)).into_iter().collect()
+        first_order.then(|| Candidate::needing(effect, data.weighs(), NO_LOADS)).into_iter().collect()
     },
     describe: |effect| match effect {
         Effect::DeflectedEquilibrium => "the loads act on the bent arm".to_owned(),

@@ -1,6 +1,6 @@
 //! `gear-ratio`: the transmission ratio is off, Δθ = ε θ with θ = q as commanded.
 
-use super::conditions::STANDS_STILL;
+use super::coverage::STANDS_STILL;
 use super::place::{command, commanded, coordinate};
 use super::{Candidate, Family, Term};
 use crate::problem::Effect;
@@ -14,9 +14,8 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
-        let candidate =
-            |joint| Candidate::needing(Effect::GearRatio { joint }, conditions.moves(joint - 1), STANDS_STILL);
+    candidates: |problem, data| {
+        let candidate = |joint| Candidate::needing(Effect::GearRatio { joint }, data.moves(joint - 1), STANDS_STILL);
         commanded(problem).map(candidate).collect()
     },
     describe: |effect| match effect {

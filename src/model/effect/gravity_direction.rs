@@ -1,6 +1,6 @@
 //! `gravity-direction`: gravity is turned by (r_x, r_y, 0).
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
@@ -15,7 +15,7 @@ pub(super) const FAMILY: Family = Family {
         ],
         _ => Vec::new(),
     },
-    candidates: |_, conditions| vec![Candidate::needing(Effect::GravityDirection, conditions.weighs(), NO_LOADS)],
+    candidates: |_, data| vec![Candidate::needing(Effect::GravityDirection, data.weighs(), NO_LOADS)],
     describe: |effect| match effect {
         Effect::GravityDirection => "the base does not stand level".to_owned(),
         _ => String::new(),

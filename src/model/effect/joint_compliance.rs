@@ -1,6 +1,6 @@
 //! `joint-compliance`: a joint declared rigid turns by Δθ = c M_z.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
@@ -15,10 +15,10 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.stiffness.is_none());
         let effect = |(index, _)| Effect::JointCompliance { joint: index + 1 };
-        rigid.map(|joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS)).collect()
+        rigid.map(|joint| Candidate::needing(effect(joint), data.weighs(), NO_LOADS)).collect()
     },
     describe: |effect| match effect {
         Effect::JointCompliance { joint } => format!("joint {joint} gives way about its axis"),

@@ -1,6 +1,6 @@
 //! `joint-coupling`: one joint moves another, Δθ_joint = k q_from.
 
-use super::conditions::STANDS_STILL;
+use super::coverage::STANDS_STILL;
 use super::place::{command, commanded, coordinate};
 use super::{Candidate, Family, Term};
 use crate::problem::Effect;
@@ -14,12 +14,12 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let pairs = commanded(problem).flat_map(|joint| commanded(problem).map(move |from| (joint, from)));
         pairs
             .filter(|(joint, from)| joint != from)
             .map(|(joint, from)| {
-                Candidate::needing(Effect::JointCoupling { joint, from }, conditions.moves(from - 1), STANDS_STILL)
+                Candidate::needing(Effect::JointCoupling { joint, from }, data.moves(from - 1), STANDS_STILL)
             })
             .collect()
     },

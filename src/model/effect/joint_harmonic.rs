@@ -1,6 +1,6 @@
 //! `joint-harmonic`: an error that repeats with the joint, Δθ = Σ_k a_k sin kθ + b_k cos kθ with θ = q as commanded.
 
-use super::conditions::STANDS_STILL;
+use super::coverage::STANDS_STILL;
 use super::place::coordinate;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::Driver;
@@ -23,13 +23,12 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let revolute = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointKind::Revolute);
         let effects = |(index, _)| {
             (1..=HIGHEST_ORDER).map(move |order| Effect::JointHarmonic { joint: index + 1, orders: vec![order] })
         };
-        let moves =
-            |effect: &Effect| matches!(effect, Effect::JointHarmonic { joint, .. } if conditions.moves(joint - 1));
+        let moves = |effect: &Effect| matches!(effect, Effect::JointHarmonic { joint, .. } if data.moves(joint - 1));
         let candidate = |effect: Effect| {
             let moves = moves(&effect);
             Candidate::needing(effect, moves, STANDS_STILL)

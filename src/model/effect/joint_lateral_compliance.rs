@@ -1,6 +1,6 @@
 //! `joint-lateral-compliance`: bearings tilt by (c_x M_x, c_y M_y, 0) before the joint turns.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::place::commanded;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
@@ -19,9 +19,9 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let effect = |joint| Effect::JointLateralCompliance { joint };
-        commanded(problem).map(|joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS)).collect()
+        commanded(problem).map(|joint| Candidate::needing(effect(joint), data.weighs(), NO_LOADS)).collect()
     },
     describe: |effect| match effect {
         Effect::JointLateralCompliance { joint } => format!("joint {joint} tilts across its axis"),

@@ -1,6 +1,6 @@
 //! `joint-nonlinear-stiffness`: Δθ = c₃ M_z³ beyond the linear torsion.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::place::greatest_moment;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
@@ -21,9 +21,9 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let effect = |joint| Effect::JointNonlinearStiffness { joint };
-        let candidate = |joint| Candidate::needing(effect(joint), conditions.weighs(), NO_LOADS);
+        let candidate = |joint| Candidate::needing(effect(joint), data.weighs(), NO_LOADS);
         (1..=problem.joints.len()).map(candidate).collect()
     },
     describe: |effect| match effect {

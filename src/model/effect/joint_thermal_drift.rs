@@ -1,6 +1,6 @@
 //! `joint-thermal-drift`: Δθ = k (T − T₀).
 
-use super::conditions::NO_TEMPERATURE;
+use super::coverage::NO_TEMPERATURE;
 use super::place::{commanded, coordinate};
 use super::{Candidate, Family, Term};
 use crate::model::parameter::Driver;
@@ -16,11 +16,9 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let effect = |joint| Effect::JointThermalDrift { joint };
-        commanded(problem)
-            .map(|joint| Candidate::needing(effect(joint), conditions.temperature, NO_TEMPERATURE))
-            .collect()
+        commanded(problem).map(|joint| Candidate::needing(effect(joint), data.temperature, NO_TEMPERATURE)).collect()
     },
     describe: |effect| match effect {
         Effect::JointThermalDrift { joint } => format!("zero of joint {joint} drifts with temperature"),

@@ -1,6 +1,6 @@
 //! `link-bending`: uniform flexibility 1/EI of a link declared rigid.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
@@ -15,13 +15,13 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let bends = |joint: &crate::problem::Joint| {
             joint.beam.as_ref().is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
         };
         let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.a != 0.0 && !bends(joint));
         let effect = |(index, _)| Effect::LinkBending { joint: index + 1 };
-        rigid.map(|link| Candidate::needing(effect(link), conditions.weighs(), NO_LOADS)).collect()
+        rigid.map(|link| Candidate::needing(effect(link), data.weighs(), NO_LOADS)).collect()
     },
     describe: |effect| match effect {
         Effect::LinkBending { joint } => format!("the link before joint {joint} bends"),

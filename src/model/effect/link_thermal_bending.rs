@@ -1,6 +1,6 @@
 //! `link-thermal-bending`: curvature (k_y, k_z)·(T − T₀) along a beam.
 
-use super::conditions::NO_TEMPERATURE;
+use super::coverage::NO_TEMPERATURE;
 use super::place::{carrier, links};
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
@@ -19,9 +19,9 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let effect = |link| Effect::LinkThermalBending { link };
-        links(problem).map(|link| Candidate::needing(effect(link), conditions.temperature, NO_TEMPERATURE)).collect()
+        links(problem).map(|link| Candidate::needing(effect(link), data.temperature, NO_TEMPERATURE)).collect()
     },
     describe: |effect| match effect {
         Effect::LinkThermalBending { link } => format!("link {link} bows with temperature"),

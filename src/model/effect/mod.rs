@@ -9,7 +9,7 @@
 
 mod backlash;
 mod base_compliance;
-mod conditions;
+mod coverage;
 mod deflected_equilibrium;
 mod gear_ratio;
 mod gravity_direction;
@@ -34,7 +34,7 @@ mod unmodelled_mass;
 use crate::model::parameter::{Driver, EffectParameter, Slot};
 use crate::problem::{Effect, Problem};
 
-pub use conditions::Conditions;
+pub use coverage::DataCoverage;
 pub use place::{Argument, arguments, name, place};
 
 /// A kind of effect.
@@ -45,7 +45,7 @@ pub struct Family {
     /// The parameters of an effect of this family, none for one of another.
     pub terms: fn(&Effect, &Problem) -> Vec<Term>,
     /// The effects of this family that are conceivable on an arm, each with the reason why these data cannot show it.
-    pub candidates: fn(&Problem, &Conditions) -> Vec<Candidate>,
+    pub candidates: fn(&Problem, &DataCoverage) -> Vec<Candidate>,
     /// What an effect is, in words for people: "transmission ratio of joint 3".
     pub describe: fn(&Effect) -> String,
 }

@@ -11,12 +11,8 @@ pub(super) const FAMILY: Family = Family {
         Effect::PayloadMass => vec![Term::constant("mass", Slot::Arm(ArmField::Payload), 2.0)],
         _ => Vec::new(),
     },
-    candidates: |_, conditions| {
-        vec![Candidate::needing(
-            Effect::PayloadMass,
-            conditions.payload && conditions.weighs(),
-            "no payload is carried",
-        )]
+    candidates: |_, data| {
+        vec![Candidate::needing(Effect::PayloadMass, data.payload && data.weighs(), "no payload is carried")]
     },
     describe: |effect| match effect {
         Effect::PayloadMass => "payloads are heavier than declared".to_owned(),

@@ -15,9 +15,7 @@ pub(super) const FAMILY: Family = Family {
             .collect(),
         _ => Vec::new(),
     },
-    candidates: |_, conditions| {
-        conditions.times.iter().map(|&at_time| Candidate::of(Effect::StationShift { at_time })).collect()
-    },
+    candidates: |_, data| data.times.iter().map(|&at_time| Candidate::of(Effect::StationShift { at_time })).collect(),
     describe: |effect| match effect {
         Effect::StationShift { at_time } => format!("the measuring station moved at {at_time} s"),
         _ => String::new(),

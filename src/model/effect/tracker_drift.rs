@@ -15,8 +15,8 @@ pub(super) const FAMILY: Family = Family {
             .collect(),
         _ => Vec::new(),
     },
-    candidates: |_, conditions| {
-        let there = !conditions.times.is_empty();
+    candidates: |_, data| {
+        let there = !data.times.is_empty();
         vec![Candidate::needing(Effect::TrackerDrift, there, "too few poses before or after any time")]
     },
     describe: |effect| match effect {

@@ -1,6 +1,6 @@
 //! `unmodelled-mass`: a mass m at s along a beam.
 
-use super::conditions::NO_LOADS;
+use super::coverage::NO_LOADS;
 use super::place::{carrier, links};
 use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
@@ -24,9 +24,9 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => Vec::new(),
     },
-    candidates: |problem, conditions| {
+    candidates: |problem, data| {
         let effect = |link| Effect::UnmodelledMass { link };
-        links(problem).map(|link| Candidate::needing(effect(link), conditions.weighs(), NO_LOADS)).collect()
+        links(problem).map(|link| Candidate::needing(effect(link), data.weighs(), NO_LOADS)).collect()
     },
     describe: |effect| match effect {
         Effect::UnmodelledMass { link } => format!("link {link} carries a mass that is not declared"),

@@ -1,6 +1,6 @@
 //! What a parameter is multiplied by, pose by pose.
 
-use crate::mechanics::Setup;
+use crate::problem::PoseView;
 
 /// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the observation.
 ///
@@ -74,7 +74,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// Its value in a pose; 0 where nobody knows.
-    pub fn value(self, setup: &Setup) -> f64 {
+    pub fn value(self, setup: &PoseView) -> f64 {
         match self {
             Self::Command(joint) => setup.configuration[joint],
             Self::Temperature => setup.temperature.unwrap_or(0.0),
@@ -87,7 +87,7 @@ impl Quantity {
 
 impl Driver {
     /// Its value in a pose.
-    pub fn value(self, setup: &Setup) -> f64 {
+    pub fn value(self, setup: &PoseView) -> f64 {
         match self {
             Self::Constant | Self::Unit => 1.0,
             Self::Command(joint) | Self::Travel(joint) => setup.configuration[joint],

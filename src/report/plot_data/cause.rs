@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use super::joint::{along, levers, telling};
 use super::states::{Arm, Sight};
-use crate::mechanics::Setup;
 use crate::model::effect;
 use crate::model::parameter::{EffectParameter, JointField, Slot};
+use crate::problem::PoseView;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::Unit;
 
@@ -109,7 +109,7 @@ struct View<'a> {
 
 /// Every row with its conditions and what an effect does to it.
 struct Rows<'a> {
-    setups: Vec<Setup<'a>>,
+    setups: Vec<PoseView<'a>>,
     /// The effect's displacement [m].
     own: Vec<Vector3<f64>>,
     /// The residual with that displacement put back [m].
@@ -196,27 +196,28 @@ fn joint_law<'a>(
             Box::new(move |k| rows.setups[k].configuration[joint - 1]),
             Box::new(move |q| {
                 let configuration = vec![q; rows.setups[0].configuration.len()];
-                driven(parameters, values, &Setup::of(&configuration))
+                driven(parameters, values, &PoseView::of(&configuration))
             }),
         ),
         _ => (
             Box::new(move |k| rows.setups[k].temperature.unwrap_or_default()),
-            Box::new(move |t| driven(parameters, values, &Setup { temperature: Some(t), ..Setup::of(&[]) })),
+            Box::new(move |t| driven(parameters, values, &PoseView { temperature: Some(t), ..PoseView::of(&[]) })),
         ),
     }
 }
 
 /// Σ value · driver.
-fn driven(parameters: &[EffectParameter], values: &[f64], setup: &Setup) -> f64 {
+fn driven(parameters: &[EffectParameter], values: &[f64], setup: &PoseView) -> f64 {
     parameters.iter().zip(values).map(|(parameter, value)| value * parameter.driver.value(setup)).sum()
 }
 
 /// How an effect is looked at that is at no joint's coordinate.
 fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows, values: &[f64]) -> View<'a> {
     let size = values.iter().map(|value| value * value).sum::<f64>().sqrt();
-    let scaled = |by: &dyn Fn(&Setup) -> f64| -> Vec<Vector3<f64>> {
-        let lever =
-            |(own, setup): (&Vector3<f64>, &Setup)| if by(setup) == 0.0 { Vector3::zeros() } else { own / by(setup) };
+    let scaled = |by: &dyn Fn(&PoseView) -> f64| -> Vec<Vector3<f64>> {
+        let lever = |(own, setup): (&Vector3<f64>, &PoseView)| {
+            if by(setup) == 0.0 { Vector3::zeros() } else { own / by(setup) }
+        };
         rows.own.iter().zip(&rows.setups).map(lever).collect()
     };
     let elapsed: OfRow = Box::new(|k: usize| rows.setups[k].elapsed);

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 /// Which drivers of effects the poses at hand have, and vary.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Conditions {
+pub struct DataCoverage {
     /// Whether the temperature is known and changes.
     pub temperature: bool,
     /// Whether directions of approach are known.
@@ -21,7 +21,7 @@ pub struct Conditions {
     pub gravity: Vector3<f64>,
 }
 
-impl Conditions {
+impl DataCoverage {
     /// Whether a joint, counted from 0, moves at all.
     pub fn moves(&self, joint: usize) -> bool {
         self.ranges.get(joint).is_some_and(|(low, high)| high > low)

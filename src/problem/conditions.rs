@@ -1,0 +1,62 @@
+//! Under which conditions a pose is measured, and from which ranges poses are drawn.
+
+/// What the controller and the test bench set for one pose.
+///
+/// V holds one number per joint: a `Vec<f64>` where poses are made, a `&[f64]` where they are read ([`PoseView`]).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PoseConditions<V = Vec<f64>> {
+    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
+    pub configuration: V,
+    /// Payload [kg]; `None`: as the problem declares.
+    pub payload: Option<f64>,
+    /// Hoist force [N]; `None`: as the problem declares.
+    pub hoist: Option<f64>,
+    /// Temperature [°C]; `None`: the reference.
+    pub temperature: Option<f64>,
+    /// Time [s].
+    pub time: f64,
+    /// Time since the first pose [s].
+    pub elapsed: f64,
+    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
+    pub approach: Option<V>,
+}
+
+/// Conditions of a pose whose numbers are kept elsewhere.
+pub type PoseView<'a> = PoseConditions<&'a [f64]>;
+
+impl<'a> PoseView<'a> {
+    /// A configuration, shape = (joints) [rad] or [m], of which nothing else is known.
+    pub fn of(configuration: &'a [f64]) -> Self {
+        Self { configuration, ..Self::default() }
+    }
+}
+
+impl PoseConditions {
+    /// The same for who only reads them.
+    pub fn view(&self) -> PoseView<'_> {
+        PoseView {
+            configuration: &self.configuration,
+            payload: self.payload,
+            hoist: self.hoist,
+            temperature: self.temperature,
+            time: self.time,
+            elapsed: self.elapsed,
+            approach: self.approach.as_deref(),
+        }
+    }
+}
+
+/// From where poses are drawn: ranges evenly, each quantity by itself.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PoseRanges {
+    /// Range of each joint, shape = (joints) [rad] or [m]; not used at fixed joints.
+    pub joints: Vec<(f64, f64)>,
+    /// Payloads to choose from [kg]; empty: as the problem declares.
+    pub payloads: Vec<f64>,
+    /// Range of the hoist's force [N]; `None`: as the problem declares.
+    pub hoist: Option<(f64, f64)>,
+    /// Range of the temperature [°C]; `None`: not known.
+    pub temperature: Option<(f64, f64)>,
+    /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
+    pub approach: bool,
+}
