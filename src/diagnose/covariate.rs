@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::model::parameter::{JointField, Quantity, Slot, Unit};
+use crate::model::parameter::{JointField, Quantity, Slot};
+use crate::quantity::Unit;
 
 /// What is known of every pose and a residual may depend on; joints are counted from 0. Its `Display` is the name in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

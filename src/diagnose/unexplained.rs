@@ -12,8 +12,9 @@ use super::smooth_term::SmoothTerm;
 use crate::identify::ErrorSummary;
 use crate::model::Pose;
 use crate::model::effect;
-use crate::model::parameter::{JointField, Quantity, Slot, Unit};
+use crate::model::parameter::{JointField, Quantity, Slot};
 use crate::problem::Effect;
+use crate::quantity::Unit;
 
 /// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
 const BETTER: f64 = 6.0;
