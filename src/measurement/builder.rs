@@ -74,12 +74,15 @@ pub struct DatasetBuilder {
     held_out: Vec<usize>,
 }
 
-impl DatasetBuilder {
-    pub(super) fn new<C: AsRef<[f64]>>(
+impl Dataset {
+    /// From plain arrays: configurations, shape = (rows)(joints) [rad] or [m], fixed joints included with any value, and
+    /// measured positions, shape = (rows), measuring frame [m]. Other columns follow by name; no row is held out unless
+    /// [`held_out`](DatasetBuilder::held_out) says so.
+    pub fn builder<C: AsRef<[f64]>>(
         configurations: impl IntoIterator<Item = C>,
         positions: impl IntoIterator<Item = Vector3<f64>>,
-    ) -> Self {
-        Self {
+    ) -> DatasetBuilder {
+        DatasetBuilder {
             configurations: rows_of(configurations),
             positions: positions.into_iter().collect(),
             sigma: None,
@@ -93,7 +96,9 @@ impl DatasetBuilder {
             held_out: Vec::new(),
         }
     }
+}
 
+impl DatasetBuilder {
     /// 1 σ of each coordinate of a position, above 0 [m].
     #[must_use]
     pub fn sigma(mut self, sigma: Vec<f64>) -> Self {

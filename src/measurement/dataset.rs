@@ -2,9 +2,7 @@
 
 use std::path::PathBuf;
 
-use nalgebra::Vector3;
-
-use super::{DatasetBuilder, Measurements, Split};
+use super::{Measurements, Split};
 use crate::error::{InputError, Warning};
 use crate::problem::Problem;
 
@@ -58,15 +56,5 @@ impl Dataset {
     pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, warnings) = Measurements::read(files, problem)?;
         Ok((Self::of(problem, measurements)?, warnings))
-    }
-
-    /// From plain arrays: configurations, shape = (rows)(joints) [rad] or [m], fixed joints included with any value, and
-    /// measured positions, shape = (rows), measuring frame [m]. Other columns follow by name; no row is held out unless
-    /// [`held_out`](DatasetBuilder::held_out) says so.
-    pub fn builder<C: AsRef<[f64]>>(
-        configurations: impl IntoIterator<Item = C>,
-        positions: impl IntoIterator<Item = Vector3<f64>>,
-    ) -> DatasetBuilder {
-        DatasetBuilder::new(configurations, positions)
     }
 }
