@@ -79,7 +79,7 @@ fn a_closed_loop_shows_what_it_found() {
     }
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let shown = plot_data::of_closure(&problem, &data, &closure).unwrap();
-    let page = report::closure_page(&problem, &closure, &shown);
+    let page = report::loop_page(&problem, &closure, &shown);
     check(&page);
     assert!(closure.effects.iter().any(|found| flexcal::model::effect::name(&found.effect) == "tracker-drift"));
     assert_eq!(shown.causes.len(), closure.effects.len());
@@ -96,10 +96,10 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((slope * 3600.0 / 0.707e-3 - 1.0).abs() < 0.25, "{slope}");
     let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
-    let again = report::closure_page(&problem, &closure, &shown);
+    let again = report::loop_page(&problem, &closure, &shown);
     assert_eq!(page, again);
     let other = plot_data::of_closure(&problem, &data, &closure).unwrap();
-    assert_eq!(report::closure_page(&problem, &closure, &other).html, page.html);
+    assert_eq!(report::loop_page(&problem, &closure, &other).html, page.html);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     for check in &shown.findings.tests {
         assert!(page.html.contains(&check.to_string().replace('&', "&amp;")), "{check}");
     }
-    let told = report::identification_markdown(&problem, &found, &shown.findings);
+    let told = report::identification_markdown(&problem, &found, &shown);
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
@@ -156,9 +156,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let whole = plot_data::of_identification(&problem, &data, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
     assert_eq!(dots(&page) + 12, dots(&report::identification_page(&problem, &found, &whole)));
-    for text in
-        [report::identification_markdown(&problem, &found, &shown.findings), report::estimate_text(&problem, &found)]
-    {
+    for text in [report::identification_markdown(&problem, &found, &shown), report::estimate_text(&problem, &found)] {
         assert!(text.contains(&words) && !text.contains("NaN"), "{text}");
     }
 }

@@ -42,13 +42,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::loop_json(&problem, &closure);
     let folder = output::folder(&common.folder(&problem))?;
     let files = common.files(&problem).iter().map(|file| seen_from(&folder, file)).collect::<Result<Vec<_>, _>>()?;
+    let shown = plot_data::of_closure(&problem, &data, &closure)?;
     let results = [
         ("loop.json", json.as_str()),
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
-        ("report.md", &report::loop_markdown(&problem, &closure)),
+        ("report.md", &report::loop_markdown(&problem, &closure, &shown)),
     ];
-    let shown = plot_data::of_closure(&problem, &data, &closure)?;
-    let page = report::closure_page(&problem, &closure, &shown);
+    let page = report::loop_page(&problem, &closure, &shown);
     output::write_report(&folder, &results, &page)?;
     if common.json {
         output::print(&json)?;

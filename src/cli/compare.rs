@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
     let shown = plot_data::of_comparison(&problem, &data, &comparison)?;
-    let told = report::comparison_markdown(&problem, &comparison, &shown.findings);
+    let told = report::comparison_markdown(&problem, &comparison, &shown);
     let page = report::comparison_page(&problem, &comparison, &shown);
     output::write_report(&folder, &[("compare.json", &json), ("report.md", &told)], &page)?;
     if common.json {

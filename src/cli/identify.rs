@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
     let shown = plot_data::of_identification(&problem, &data, &identification)?;
-    let told = report::identification_markdown(&problem, &identification, &shown.findings);
+    let told = report::identification_markdown(&problem, &identification, &shown);
     let page = report::identification_page(&problem, &identification, &shown);
     output::write_report(&folder, &[("estimate.json", &json), ("report.md", &told)], &page)?;
     if common.json {

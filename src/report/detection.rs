@@ -1,110 +1,72 @@
 //! Which effects poses would show, for programs and for people.
 
-use serde::Serialize;
-
-use super::document::{Block, Table, to_text};
+use super::document::{Block, Table};
 use super::effect;
-use super::quantity::{decimals, number};
+use super::forecast::size as shown;
+use super::json::object;
 use crate::diagnose::{Detectable, Detection, Size};
 use crate::model::effect::{name, place};
 use crate::problem::Effect;
 
 /// Effects of a family on a screen.
 const SHOWN: usize = 3;
-/// Decimals of any size at most.
-const MOST: usize = 6;
 
-/// All of it.
-#[derive(Debug, Serialize)]
-pub(super) struct Entry<'a> {
-    power: f64,
-    level: f64,
-    effects: Vec<EffectEntry<'a>>,
-    untestable: Vec<UntestableEntry<'a>>,
+object! {
+    /// All of it.
+    Entry<'a>(detection: &'a Detection) {
+        power: f64 = detection.power,
+        level: f64 = detection.level,
+        effects: Vec<EffectEntry<'a>> = detection.effects.iter().map(EffectEntry::of).collect(),
+        untestable: Vec<effect::Untestable<'a>> = detection.untestable.iter().map(effect::Untestable::of).collect(),
+    }
 }
-
-#[derive(Debug, Serialize)]
-struct EffectEntry<'a> {
-    #[serde(flatten)]
-    effect: effect::Entry<'a>,
-    sizes: Vec<SizeEntry<'a>>,
+object! {
+    EffectEntry<'a>(own: &'a Detectable) {
+        #[serde(flatten)]
+        effect: effect::Entry<'a> = effect::Entry(&own.effect),
+        sizes: Vec<SizeEntry<'a>> = own.sizes.iter().map(SizeEntry::of).collect(),
+    }
 }
-
-/// SI.
-#[derive(Debug, Serialize)]
-struct SizeEntry<'a> {
-    parameters: &'a [String],
-    unit: &'static str,
-    prior_sigma: f64,
-    found_from: Option<f64>,
-    found_from_at_best: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct UntestableEntry<'a> {
-    #[serde(flatten)]
-    effect: effect::Entry<'a>,
-    reason: &'static str,
-}
-
-impl<'a> Entry<'a> {
-    pub fn of(detection: &'a Detection) -> Self {
-        let size = |size: &'a Size| SizeEntry {
-            parameters: &size.parameters,
-            unit: size.unit.symbol(),
-            prior_sigma: size.prior,
-            found_from: size.worst,
-            found_from_at_best: size.best,
-        };
-        let effect = |own: &'a Detectable| EffectEntry {
-            effect: effect::Entry(&own.effect),
-            sizes: own.sizes.iter().map(size).collect(),
-        };
-        let untestable =
-            |(effect, reason): &'a (Effect, &'static str)| UntestableEntry { effect: effect::Entry(effect), reason };
-        Self {
-            power: detection.power,
-            level: detection.level,
-            effects: detection.effects.iter().map(effect).collect(),
-            untestable: detection.untestable.iter().map(untestable).collect(),
-        }
+object! {
+    /// SI.
+    SizeEntry<'a>(size: &'a Size) {
+        parameters: &'a [String] = &size.parameters,
+        unit: &'static str = size.unit.symbol(),
+        prior_sigma: f64 = size.prior,
+        found_from: Option<f64> = size.worst,
+        found_from_at_best: Option<f64> = size.best,
     }
 }
 
-/// The hardest of each family, and what is not to be seen, ending in a line break.
-pub(super) fn text(detection: &Detection) -> String {
+/// The hardest of each family, and what is not to be seen.
+pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let seen = |own: &&Detectable| own.sizes.iter().any(Size::is_within_prior);
-    let (shown, hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
-    let (mut rows, mut families): (Vec<Vec<String>>, Vec<&str>) = Default::default();
-    for own in &shown {
-        let family = name(&own.effect);
-        if !families.contains(&family) {
-            families.push(family);
-            rows.extend(hardest(&shown, family));
+    let (visible, hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
+    let mut families: Vec<&str> = Vec::new();
+    for own in &visible {
+        if !families.contains(&name(&own.effect)) {
+            families.push(name(&own.effect));
         }
     }
+    let rows: Vec<Vec<String>> = families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
         "How large an effect must be to be found (in {:.0} of 100 such sets, at the level of the loop), the {SHOWN} hardest of \
          each family:",
         detection.power * 100.0
     ))];
     if !rows.is_empty() {
-        let header = vec!["effect", "found from", "at best", "prior ± 1 σ", "unit", "parameters"];
-        blocks.push(Block::Table(Table { header, rows, left: vec![0, 4, 5] }));
+        let header = ["effect", "found from", "at best", "prior ± 1 σ", "unit", "parameters"];
+        blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5])));
     }
-    let list = |effects: Vec<Effect>| {
-        let groups = effect::grouped(effects.into_iter().map(|effect| (effect, ())));
-        groups.into_iter().map(|(words, ())| words).collect::<Vec<_>>().join("; ")
-    };
     if !hidden.is_empty() {
-        let hidden = hidden.into_iter().map(|own| own.effect.clone()).collect();
-        blocks.push(Block::Text(format!("Not with these poses, even at the size of their prior: {}.", list(hidden))));
+        let list = effect::listed(hidden.into_iter().map(|own| &own.effect)).join("; ");
+        blocks.push(Block::Text(format!("Not with these poses, even at the size of their prior: {list}.")));
     }
-    let groups = effect::grouped(detection.untestable.iter().cloned());
-    blocks.extend((!groups.is_empty()).then(|| Block::heading("Not with measurements of this kind")));
+    if !detection.untestable.is_empty() {
+        blocks.push(Block::heading("Not with measurements of this kind"));
+        blocks.push(Block::List(effect::reasons(detection.untestable.iter().cloned())));
+    }
     blocks
-        .extend((!groups.is_empty()).then(|| Block::list(groups.iter().map(|(words, why)| format!("{words}: {why}")))));
-    to_text(&blocks)
 }
 
 /// Rows of a family: the effect at each place that is hardest to see, the hardest first.
@@ -130,16 +92,12 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
 
 fn row(effect: &Effect, size: &Size) -> Vec<String> {
     let unit = size.unit.display(size.prior);
-    let show = |value: Option<f64>| {
-        let scaled = value.map(|value| value * unit.factor);
-        scaled.map_or_else(|| "–".to_owned(), |value| number(value, decimals(value, MOST)))
-    };
     let short = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
     vec![
         effect::declaration(effect),
-        show(size.worst),
-        show(size.best),
-        show(Some(size.prior)),
+        shown(size.worst, &unit),
+        shown(size.best, &unit),
+        shown(Some(size.prior), &unit),
         unit.symbol.clone(),
         size.parameters.iter().map(short).collect::<Vec<_>>().join(", "),
     ]

@@ -1,179 +1,132 @@
-//! A story in headings, paragraphs, lists and tables, told once and shown on terminals and as Markdown.
+//! A report in blocks: told once, shown on terminals, as Markdown and as a page.
 //!
-//! Words between backticks are code: Markdown shows them so, a terminal shows them plain.
+//! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone; [`Block::Page`] and
+//! [`Block::Words`] hold what only one kind of reader gets.
 
-use std::fmt::Write as _;
+use super::figures::Figure;
 
-use super::quantity::table;
+/// Marks of code in words: control characters, so that no title has them on purpose and terminals drop them.
+pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 
-/// Columns that text on a terminal is wrapped to; tables may be wider.
-const WIDTH: usize = 110;
-
-/// A part of a story.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Block {
+/// A part of a report.
+#[derive(Debug, Clone)]
+pub(super) enum Block<'a> {
     /// Title of what follows.
     Heading(String),
     /// Running text.
     Text(String),
+    /// What to beware of.
+    Note(String),
+    /// Lines that a terminal shows as they are broken here, and points below them.
+    Lines(String, Vec<String>),
     /// Points, each with its details.
     List(Vec<Point>),
     /// Points that are numbered from 1.
     Ranking(Vec<Point>),
     /// Numbers.
     Table(Table),
+    /// What it came to, at one glance; on the page alone.
+    Headline(Headline),
+    /// Drawings side by side; on the page alone.
+    Figures(Vec<Figure<'a>>),
+    /// What a page shows on demand: its title, what it holds, and where it is found on paper; on the page alone.
+    Folded(String, Vec<Block<'a>>, String),
+    /// On the page alone.
+    Page(Vec<Block<'a>>),
+    /// Everywhere but on the page.
+    Words(Vec<Block<'a>>),
 }
 
 /// A point of a list.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Point {
     pub text: String,
     pub details: Vec<String>,
+    /// How a test went, if it is one.
+    pub mark: Option<Mark>,
+}
+
+/// How a test went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mark {
+    Failed,
+    Passed,
+    Untested,
 }
 
 /// Rows and columns; numbers stand to the right, the columns in `left` to the left.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Table {
     pub header: Vec<&'static str>,
     pub rows: Vec<Vec<String>>,
     pub left: Vec<usize>,
+    /// How to read it: below it on terminals, above it on the page.
+    pub notes: Vec<String>,
+    /// Columns that a narrow page leaves out.
+    pub minor: Vec<usize>,
+    /// A last column that is drawn, on the page alone.
+    pub bars: Option<(&'static str, Vec<Bar>)>,
 }
 
-impl Block {
+/// A change in units of its standard error.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Bar {
+    pub change: Option<f64>,
+    /// Where it rests: 0 its lower bound, 1 its upper one.
+    pub bound: Option<f64>,
+}
+
+/// What it came to, at one glance.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Headline {
+    /// Before and after, with unit.
+    pub change: (String, String),
+    /// Of what.
+    pub of: String,
+    pub facts: Vec<(&'static str, String)>,
+}
+
+impl Block<'_> {
     pub fn heading(text: &str) -> Self {
         Self::Heading(text.to_owned())
     }
 
     /// Points without details.
     pub fn list(points: impl IntoIterator<Item = String>) -> Self {
-        Self::List(points.into_iter().map(|text| Point { text, details: Vec::new() }).collect())
+        Self::List(points.into_iter().map(Point::from).collect())
+    }
+
+    /// Lines without points.
+    pub fn lines(words: impl Into<String>) -> Self {
+        Self::Lines(words.into(), Vec::new())
     }
 }
 
-/// The story for a terminal, ending in a line break.
-pub(super) fn to_text(blocks: &[Block]) -> String {
-    let mut text = String::new();
-    for (k, block) in blocks.iter().enumerate() {
-        let follows_heading = k > 0 && matches!(blocks[k - 1], Block::Heading(_));
-        if k > 0 && !follows_heading {
-            text.push('\n');
-        }
-        match block {
-            Block::Heading(words) => text.push_str(&wrapped(words, "", "")),
-            Block::Text(words) => {
-                let indent = if follows_heading { "  " } else { "" };
-                text.push_str(&wrapped(words, indent, indent));
-            }
-            Block::List(points) => points.iter().for_each(|point| point_text(&mut text, "- ", point)),
-            Block::Ranking(points) => {
-                let numbered = points.iter().enumerate();
-                numbered.for_each(|(k, point)| point_text(&mut text, &format!("{}. ", k + 1), point));
-            }
-            Block::Table(Table { header, rows, left }) => text.push_str(&table(header, rows.clone(), left)),
-        }
-    }
-    text
-}
-
-fn point_text(text: &mut String, mark: &str, point: &Point) {
-    let (first, further) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
-    text.push_str(&wrapped(&point.text, &first, &further));
-    for detail in &point.details {
-        text.push_str(&wrapped(detail, &further, &format!("{further}  ")));
+impl From<String> for Point {
+    fn from(text: String) -> Self {
+        Self { text, ..Self::default() }
     }
 }
 
-/// Lines of words, each ending in a line break; a break in the words stays one.
-fn wrapped(words: &str, first: &str, further: &str) -> String {
-    let plain = words.replace('`', "");
-    let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(further).break_words(false);
-    textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
-}
-
-/// The story as Markdown with GitHub's tables, `title` above it.
-pub(super) fn to_markdown(title: &str, blocks: &[Block]) -> String {
-    let mut text = format!("# {}\n", escaped(&one_line(title)));
-    for block in blocks {
-        text.push('\n');
-        match block {
-            // A text or a String takes whatever is written to it.
-            Block::Heading(words) => _ = writeln!(text, "## {}", escaped(words)),
-            Block::Text(words) => _ = writeln!(text, "{}", escaped(words)),
-            Block::List(points) => points.iter().for_each(|point| point_markdown(&mut text, "- ", point)),
-            Block::Ranking(points) => {
-                let numbered = points.iter().enumerate();
-                numbered.for_each(|(k, point)| point_markdown(&mut text, &format!("{}. ", k + 1), point));
-            }
-            Block::Table(table) => table_markdown(&mut text, table),
-        }
+impl Table {
+    pub fn new(header: &[&'static str], rows: Vec<Vec<String>>, left: &[usize]) -> Self {
+        Self { header: header.to_vec(), rows, left: left.to_vec(), ..Self::default() }
     }
-    text
-}
 
-fn point_markdown(text: &mut String, mark: &str, point: &Point) {
-    let indent = " ".repeat(mark.len());
-    let _ = writeln!(text, "{mark}{}", escaped(&point.text));
-    for detail in &point.details {
-        let _ = writeln!(text, "{indent}- {}", escaped(detail));
+    pub fn noted(self, notes: &[&str]) -> Self {
+        Self { notes: notes.iter().map(|&note| note.to_owned()).collect(), ..self }
     }
 }
 
-fn table_markdown(text: &mut String, table: &Table) {
-    let row = |cells: &mut dyn Iterator<Item = String>| format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "));
-    text.push_str(&row(&mut table.header.iter().map(|cell| in_table(cell))));
-    let rule = |k: usize| if table.left.contains(&k) { ":--" } else { "--:" };
-    text.push_str(&row(&mut (0..table.header.len()).map(|k| rule(k).to_owned())));
-    for cells in &table.rows {
-        text.push_str(&row(&mut cells.iter().map(|cell| in_table(cell))));
-    }
+/// Words as code.
+pub(super) fn code(words: &str) -> String {
+    format!("{}{words}{}", CODE.0, CODE.1)
 }
 
-fn in_table(cell: &str) -> String {
-    escaped(&one_line(cell)).replace('|', "\\|")
-}
-
-fn one_line(words: &str) -> String {
-    words.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// Words with the marks that Markdown would take for its own, code left as it is.
-fn escaped(words: &str) -> String {
-    let mut text = String::with_capacity(words.len());
-    let mut code = false;
-    for c in words.chars() {
-        code ^= c == '`';
-        if !code && matches!(c, '*' | '<' | '\\') {
-            text.push('\\');
-        }
-        text.push(c);
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_story_is_shown_both_ways() {
-        let point = Point { text: "found `a*b`".to_owned(), details: vec!["2 < 3".to_owned()] };
-        let rows = vec![vec!["a|b".to_owned(), "1".to_owned()]];
-        let story = [
-            Block::heading("Found"),
-            Block::Ranking(vec![point]),
-            Block::Table(Table { header: vec!["name", "value"], rows, left: vec![0] }),
-        ];
-        assert_eq!(to_text(&story), "Found\n  1. found a*b\n     2 < 3\n\n  name  value\n  a|b       1\n");
-        let expected = "# The *arm*\n\n## Found\n\n1. found `a*b`\n   - 2 \\< 3\n\n\
-                        | name | value |\n| :-- | --: |\n| a\\|b | 1 |\n";
-        assert_eq!(to_markdown("The *arm*", &story), expected.replace("*arm*", "\\*arm\\*"));
-    }
-
-    #[test]
-    fn long_text_is_wrapped_under_its_mark() {
-        let words = "word ".repeat(40);
-        let text = to_text(&[Block::list([words])]);
-        let lines: Vec<&str> = text.lines().collect();
-        assert!(lines.len() == 2 && lines[0].starts_with("  - word") && lines[1].starts_with("    word"), "{text}");
-    }
+/// The first `most` of some words, and how many more there are.
+pub(super) fn some_of(words: impl IntoIterator<Item = String>, most: usize) -> (Vec<String>, usize) {
+    let mut all: Vec<String> = words.into_iter().collect();
+    let more = all.len().saturating_sub(most);
+    all.truncate(most);
+    (all, more)
 }

@@ -2,8 +2,10 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
+use super::document::{Point, code};
+use super::json::object;
 use super::quantity::{decimals, number};
-use crate::diagnose::Trace;
+use crate::diagnose::{Found, Trace};
 use crate::identify::Estimate;
 use crate::model::effect::{self, Argument};
 use crate::problem::Effect;
@@ -14,9 +16,6 @@ const MOST: usize = 6;
 pub(super) const MOST_LISTED: usize = 8;
 /// Waves of a joint that are shown of more.
 pub(super) const SHOWN_WAVES: usize = 4;
-/// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
-const LEAST_P: f64 = 1e-16;
-
 /// Its name and its arguments: `{"effect": "gear-ratio", "joint": 3}`.
 #[derive(Debug)]
 pub(super) struct Entry<'a>(pub &'a Effect);
@@ -35,6 +34,15 @@ impl Serialize for Entry<'_> {
             }
         }
         map.end()
+    }
+}
+
+object! {
+    /// An effect that these data cannot show.
+    Untestable<'a>(own: &'a (Effect, &'static str)) {
+        #[serde(flatten)]
+        effect: Entry<'a> = Entry(&own.0),
+        reason: &'static str = own.1,
     }
 }
 
@@ -57,52 +65,37 @@ pub(super) fn declaration(effect: &Effect) -> String {
 pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
     match effect {
         Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => trace.describe(effect),
-        _ => format!("{}: `{}`", trace.describe(effect), declaration(effect)),
+        _ => format!("{}: {}", trace.describe(effect), code(&declaration(effect))),
     }
 }
 
-/// The parameters of an effect with their values; of many waves the highest, by their height.
-#[derive(Debug)]
-pub(super) struct Values {
-    /// Names and values.
-    pub shown: Vec<(String, String)>,
-    /// What is left out, in words.
-    pub rest: Option<String>,
-}
-
-impl Values {
-    pub fn of(estimates: &[Estimate]) -> Self {
-        if estimates.len() <= MOST_LISTED {
-            let shown = estimates.iter().map(|estimate| (estimate.name.clone(), value(estimate))).collect();
-            return Self { shown, rest: None };
-        }
-        let mut waves: Vec<(String, Estimate)> = estimates.chunks_exact(2).filter_map(wave).collect();
-        waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-        let shown = waves.iter().take(SHOWN_WAVES).map(|(name, height)| (name.clone(), value(height))).collect();
-        let lower = waves.len().saturating_sub(SHOWN_WAVES);
-        Self { shown, rest: (lower > 0).then(|| format!("and {lower} lower waves, in loop.json")) }
+/// The parameters of an effect that was found with their values, a line each; of many waves the highest, by their height.
+pub(super) fn values(found: &Found) -> Vec<String> {
+    let line = |name: &str, estimate: &Estimate| format!("{name} = {}", value(estimate));
+    let estimates = &found.estimates;
+    let orders = orders(&found.effect).unwrap_or_default();
+    if estimates.len() <= MOST_LISTED || estimates.len() != 2 * orders.len() {
+        return estimates.iter().map(|estimate| line(&estimate.name, estimate)).collect();
     }
-
-    /// One line for each.
-    pub fn lines(self) -> Vec<String> {
-        self.shown.into_iter().map(|(name, value)| format!("{name} = {value}")).chain(self.rest).collect()
-    }
+    let mut waves: Vec<(u32, Estimate)> = orders.iter().copied().zip(estimates.chunks_exact(2).map(height)).collect();
+    waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
+    let highest = waves.iter().take(SHOWN_WAVES).map(|(order, height)| line(&format!("wave of order {order}"), height));
+    let lower = waves.len().saturating_sub(SHOWN_WAVES);
+    highest.chain((lower > 0).then(|| format!("and {lower} lower waves, in loop.json"))).collect()
 }
 
 /// Height of a sine and a cosine of one order, with its standard error; the two taken as uncorrelated.
-fn wave(pair: &[Estimate]) -> Option<(String, Estimate)> {
-    let [sine, cosine] = pair else { return None };
+fn height(pair: &[Estimate]) -> Estimate {
+    let (sine, cosine) = (&pair[0], &pair[1]);
     let height = sine.estimate.hypot(cosine.estimate);
     let error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
         (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine) / height.max(f64::MIN_POSITIVE)
     });
-    let order = sine.name.rsplit_once(".sin").map_or("", |(_, order)| order);
-    let height = Estimate { estimate: height, std_error: error, ..sine.clone() };
-    Some((format!("wave of order {order}"), height))
+    Estimate { estimate: height, std_error: error, ..sine.clone() }
 }
 
 /// A parameter with its error in a unit for people: `4.12 ± 0.05 µrad/(m·K)`.
-pub(super) fn value(estimate: &Estimate) -> String {
+fn value(estimate: &Estimate) -> String {
     let unit = estimate.unit.display(estimate.estimate);
     let scaled = estimate.estimate * unit.factor;
     match estimate.std_error.map(|error| error * unit.factor) {
@@ -114,13 +107,14 @@ pub(super) fn value(estimate: &Estimate) -> String {
     }
 }
 
-/// `p 0.003`, `p 2e-9`, `p below 1e-16`.
-pub(super) fn p(value: f64) -> String {
-    match value {
-        p if p < LEAST_P => "p below 1e-16".to_owned(),
-        p if p < 1e-3 => format!("p {p:.0e}"),
-        p => format!("p {p:.3}"),
-    }
+/// Points of effects in groups, each with its reason.
+pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
+    grouped(effects).into_iter().map(|(words, why)| Point::from(format!("{words}: {why}"))).collect()
+}
+
+/// Effects in groups, in one line.
+pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<String> {
+    grouped(effects.into_iter().map(|effect| (effect.clone(), ()))).into_iter().map(|(words, ())| words).collect()
 }
 
 /// Effects with the harmonics of one joint that share a reason taken together, in the order in which they come.
@@ -166,7 +160,7 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
 fn group(members: &[Effect]) -> String {
     let name = effect::name(&members[0]);
     if let (Effect::StationShift { .. }, true) = (&members[0], members.len() > 1) {
-        return format!("`{name}` at {} times", members.len());
+        return format!("{} at {} times", code(name), members.len());
     }
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
@@ -180,7 +174,7 @@ fn group(members: &[Effect]) -> String {
         Some(("link", _)) if members.len() > 1 => "of links ",
         Some(("link", _)) => "of link ",
         Some(_) => "at ",
-        None => return format!("`{name}`"),
+        None => return code(name),
     };
     let orders = match orders(&members[0]) {
         Some([one]) => format!(", order {one}"),
@@ -190,7 +184,7 @@ fn group(members: &[Effect]) -> String {
         Some(all) => format!(", orders {}", all.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")),
         None => String::new(),
     };
-    format!("`{name}` {of}{places}{orders}")
+    format!("{} {of}{places}{orders}", code(name))
 }
 
 #[cfg(test)]
@@ -214,11 +208,11 @@ mod tests {
             (1..=2).flat_map(|joint| (1..=60).map(move |order| Effect::JointHarmonic { joint, orders: vec![order] }));
         let others = [Effect::Backlash { joint: 3 }, Effect::JointCoupling { joint: 2, from: 1 }];
         let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())));
-        let words: Vec<&str> = lines.iter().map(|(words, ())| words.as_str()).collect();
+        let words: Vec<String> = lines.into_iter().map(|(words, ())| words).collect();
         let expected = [
-            "`joint-harmonic` of joints 1, 2, orders 1 to 60",
-            "`backlash` of joint 3",
-            "`joint-coupling` of joint 2 by 1",
+            format!("{} of joints 1, 2, orders 1 to 60", code("joint-harmonic")),
+            format!("{} of joint 3", code("backlash")),
+            format!("{} of joint 2 by 1", code("joint-coupling")),
         ];
         assert_eq!(words, expected);
     }

@@ -1,6 +1,21 @@
-//! Poses whose errors nobody knows.
+//! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
+use super::quantity::mm;
 use crate::identify::{ErrorSummary, Errors};
+
+/// The arm before anything was identified.
+pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
+
+/// Cells of a table of errors: whose, on which poses, mean, rms and largest distance [mm].
+pub(super) fn row(poses: &str, arm: &str, of: &ErrorSummary) -> Vec<String> {
+    let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| mm(value, 4));
+    [vec![poses.to_owned(), arm.to_owned()], values.to_vec()].concat()
+}
+
+/// "mean 0.1 mm, rms 0.2 mm".
+pub(super) fn mean_and_rms(of: &ErrorSummary) -> String {
+    format!("mean {} mm, rms {} mm", mm(of.mean.norm, 4), mm(of.rms.norm, 4))
+}
 
 /// For each arm by name the poses that have no equilibrium with it, so that no mean over their errors exists; `None` where
 /// all errors are known.

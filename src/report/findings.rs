@@ -1,37 +1,21 @@
-//! Checks of what a fit leaves, for programs and for people.
+//! Tests of what a fit leaves, for programs and for people.
 
-use serde::Serialize;
-
+use super::document::{Block, Mark, Point};
+use super::json::object;
 use super::quantity::number;
 use crate::diagnose::{Covariate, Findings, ResidualTest, Test};
 
-/// One check.
-#[derive(Debug, Serialize)]
-pub(super) struct Entry {
-    check: &'static str,
-    about: Option<String>,
-    structure: bool,
-    failed: bool,
-    statistic: Option<f64>,
-    /// Where chance keeps the statistic.
-    bounds: Option<[f64; 2]>,
-    p_value: Option<f64>,
-    words: String,
-}
-
-impl From<&ResidualTest> for Entry {
-    fn from(check: &ResidualTest) -> Self {
-        let outcome = check.outcome.as_ref().ok();
-        Self {
-            check: check.name(),
-            about: check.about().map(named),
-            structure: check.is_structure(),
-            failed: check.failed(),
-            statistic: outcome.map(|outcome| outcome.statistic),
-            bounds: outcome.map(|outcome| outcome.bounds.into()),
-            p_value: outcome.map(|outcome| outcome.p_value),
-            words: check.to_string(),
-        }
+object! {
+    /// One test; `bounds`: where chance keeps the statistic.
+    Entry(check: &ResidualTest) {
+        check: &'static str = check.name(),
+        about: Option<String> = check.about().map(named),
+        structure: bool = check.is_structure(),
+        failed: bool = check.failed(),
+        statistic: Option<f64> = check.outcome.as_ref().ok().map(|outcome| outcome.statistic),
+        bounds: Option<[f64; 2]> = check.outcome.as_ref().ok().map(|outcome| outcome.bounds.into()),
+        p_value: Option<f64> = check.outcome.as_ref().ok().map(|outcome| outcome.p_value),
+        words: String = check.to_string(),
     }
 }
 
@@ -40,39 +24,60 @@ fn named(covariate: Covariate) -> String {
     if covariate == Covariate::Row { "rows".to_owned() } else { covariate.to_string() }
 }
 
-/// Every check.
+/// Every test.
 pub(super) fn entries(findings: &Findings) -> Vec<Entry> {
-    findings.tests.iter().map(Entry::from).collect()
+    findings.tests.iter().map(Entry::of).collect()
 }
 
-/// The checks that failed, in words.
+/// The tests that failed, in words.
 pub(super) fn failed(findings: &Findings) -> Vec<String> {
     findings.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// Why the checks name another χ²/ν than the fit's own `chi2`; nothing where both read the same.
-pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<&'static str> {
+/// Why the tests name another χ²/ν than the fit's own `chi2`; nothing where both read the same.
+pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<String> {
     let size = findings.tests.iter().find(|check| check.test == Test::ReducedChiSquared)?.outcome.as_ref().ok()?;
-    (number(size.statistic, 2) != number(chi2?, 2)).then_some(
+    (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
         "The checks have a χ²/ν of their own: they leave outliers out and let stiffnesses that the problem holds equal \
-         differ.",
-    )
+         differ."
+            .to_owned()
+    })
 }
 
-/// Every check in words with its verdict: those that failed, those that passed, those that could not be made.
-pub(super) fn all(findings: &Findings) -> Vec<String> {
-    let checks = findings.tests.iter();
-    let mut lines: Vec<String> =
-        checks.clone().filter(|check| check.failed()).map(|check| format!("failed: {check}")).collect();
-    let passed = checks.clone().filter(|check| check.outcome.is_ok() && !check.failed());
-    // Drivers that nothing depends on fill one line.
-    let (free, other): (Vec<&ResidualTest>, Vec<&ResidualTest>) =
-        passed.partition(|check| matches!(check.test, Test::Dependence { .. }));
-    lines.extend(other.iter().map(|check| format!("passed: {check}")));
-    if !free.is_empty() {
-        let drivers: Vec<String> = free.iter().filter_map(|check| Some(check.about()?.to_string())).collect();
-        lines.push(format!("passed: residuals do not depend beyond chance on {}", drivers.join(", ")));
-    }
-    lines.extend(checks.filter(|check| check.outcome.is_err()).map(ToString::to_string));
-    lines
+fn point(check: &ResidualTest) -> Point {
+    let mark = match (&check.outcome, check.failed()) {
+        (Err(_), _) => Mark::Untested,
+        (Ok(_), true) => Mark::Failed,
+        (Ok(_), false) => Mark::Passed,
+    };
+    Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
+}
+
+/// Every test with its verdict: those that failed, those that passed, those that could not be made; covariates that nothing
+/// depends on in one line.
+pub(super) fn all(findings: &Findings) -> Vec<Point> {
+    let of = |mark: Mark| {
+        findings.tests.iter().map(|check| (check, point(check))).filter(move |(_, own)| own.mark == Some(mark))
+    };
+    let (free, other): (Vec<_>, Vec<_>) =
+        of(Mark::Passed).partition(|(check, _)| matches!(check.test, Test::Dependence { .. }));
+    let free: Vec<String> = free.iter().filter_map(|(check, _)| Some(check.about()?.to_string())).collect();
+    let free = (!free.is_empty()).then(|| Point {
+        text: format!("residuals do not depend beyond chance on {}", free.join(", ")),
+        mark: Some(Mark::Passed),
+        ..Point::default()
+    });
+    let points = of(Mark::Failed).chain(other).map(|(_, point)| point).chain(free);
+    points.chain(of(Mark::Untested).map(|(_, point)| point)).collect()
+}
+
+/// Every test in the order in which they were made.
+pub(super) fn each(findings: &Findings) -> Vec<Point> {
+    findings.tests.iter().map(point).collect()
+}
+
+/// Every test: in brief in words, each by itself on the page.
+pub(super) fn blocks<'a>(findings: &Findings) -> Vec<Block<'a>> {
+    let (brief, page) = (Block::List(all(findings)), Block::List(each(findings)));
+    vec![Block::Words(vec![brief]), Block::Page(vec![page])]
 }

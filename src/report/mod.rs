@@ -1,48 +1,41 @@
 //! Results as people and programs read them.
 //!
-//! - [`estimate_text`], [`compare_text`], [`commands_text`]: tables of one command each, with their JSON beside them.
-//! - [`trace`](trace_text), [`closing`](loop_text): the residual's story, as text, JSON, Markdown and a problem file.
+//! One file a command: its facts as JSON and as blocks ([`document`]), which `render` shows on terminals, as Markdown and
+//! as a page. `figures` draws what only a page shows.
 
-mod cells;
 mod check;
-mod closing;
-mod commands;
-mod compare_json;
-mod compare_text;
+mod closed_loop;
+mod closed_problem;
+mod compare;
+mod compensate;
 mod detection;
 mod document;
 mod effect;
 mod errors;
-mod expected;
+mod figures;
 mod findings;
-mod html;
+mod forecast;
+mod identify;
 mod json;
-mod markdown;
 mod parameters;
 mod plan;
 pub mod plot_data;
 mod poses;
 mod quantity;
+mod render;
 mod separation;
-mod study_json;
-mod study_tables;
-mod study_text;
-mod text;
+mod study;
 mod trace;
-mod waves;
 
 pub use check::{check_json, check_text, why_not_sufficient};
-pub use closing::{closed_problem, loop_json, loop_markdown, loop_text};
-pub use commands::{commands_csv, commands_json, commands_text};
-pub use compare_json::compare_json;
-pub use compare_text::compare_text;
-pub use html::{Page, closure_page, comparison_page, identification_page, is_figure};
-pub use json::estimate_json;
-pub use markdown::{comparison_markdown, identification_markdown};
+pub use closed_loop::{loop_json, loop_markdown, loop_page, loop_text};
+pub use closed_problem::closed_problem;
+pub use compare::{compare_json, compare_text, comparison_markdown, comparison_page};
+pub use compensate::{commands_csv, commands_json, commands_text};
+pub use figures::is_figure;
+pub use identify::{estimate_json, estimate_text, identification_markdown, identification_page, why_not_trusted};
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
-pub use study_json::study_json;
-pub use study_tables::{study_csv, study_parameters_csv, study_timing_csv};
-pub use study_text::study_text;
-pub use text::{estimate_text, why_not_trusted};
+pub use render::Page;
+pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};
 pub use trace::{trace_json, trace_text};

@@ -1,13 +1,16 @@
 //! The table of parameters, and what the data cannot tell.
 
-use std::fmt::Write as _;
+use std::collections::BTreeMap;
 
-use super::document::{Block, Table};
-use super::quantity::{decimals, number, table};
-use super::waves::{Line, shown};
+use super::document::{Bar, Block, Table, some_of};
+use super::effect::{MOST_LISTED, SHOWN_WAVES};
+use super::quantity::{decimals, number, or_dash};
 use crate::identify::{Estimate, Identification};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{BlindCombination, Identifiability};
+use crate::model::effect;
+use crate::model::parameter::Driver;
+use crate::problem::Problem;
 use crate::quantity::Unit;
 
 /// Decimals of a value that has no error.
@@ -18,74 +21,121 @@ const MOST: usize = 6;
 const NAMED: f64 = 0.02;
 /// Terms of a blind combination that are named, the largest.
 const MOST_NAMED: usize = 8;
-/// Blind combinations that fit on a screen.
-const SHOWN_BLIND: usize = 12;
-/// Correlations that fit on a screen.
-const SHOWN_CORRELATIONS: usize = 12;
-
+/// Blind combinations and correlations that fit on a screen.
+const SHOWN: usize = 12;
 /// Columns of the table of parameters.
 const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
-/// Those of them that hold words.
-const LEFT: [usize; 3] = [0, 5, 6];
 
-/// Nominal, estimate, change and standard error of every free parameter.
-pub(super) fn parameter_table(result: &Identification) -> String {
-    let mut text = table(&HEADER, parameter_rows(result), &LEFT);
-    if !shown(&result.estimates).lower.is_empty() {
-        text.push_str("  lower waves: in estimate.json\n");
-    }
-    if result.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
-        text.push_str(
-            "  –: no standard error: the data say nothing of it or see it in a blind combination only, a bound holds it, or it \
-             was not fitted\n",
-        );
-    }
-    text.push_str(
-        "  identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations\n",
-    );
-    text
+/// Joint, from 1, and order of every coefficient of a harmonic that `problem` declares, by the parameter's name.
+fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
+    let of = |driver: &Driver| match *driver {
+        Driver::Sine(joint, order) | Driver::Cosine(joint, order) => Some((joint + 1, order)),
+        _ => None,
+    };
+    effect::parameters(problem).into_iter().filter_map(|own| Some((own.name, of(&own.driver)?))).collect()
 }
 
-/// The same without words on its columns, and the file that holds what is left out.
-pub(super) fn parameter_blocks(result: &Identification, file: &str) -> Vec<Block> {
-    let (header, left) = (HEADER.to_vec(), LEFT.to_vec());
-    let mut blocks = vec![Block::Table(Table { header, rows: parameter_rows(result), left })];
-    if !shown(&result.estimates).lower.is_empty() {
-        blocks.push(Block::Text(format!("Lower waves: in {file}.")));
+/// The harmonics of joints that have more coefficients than are listed one by one: for each of these joints the orders that
+/// are shown, the highest waves, and how many lower ones there are.
+fn highest(estimates: &[Estimate], harmonics: &BTreeMap<String, (usize, u32)>) -> BTreeMap<usize, (Vec<u32>, usize)> {
+    let mut joints: BTreeMap<usize, (usize, BTreeMap<u32, f64>)> = BTreeMap::new();
+    for estimate in estimates {
+        if let Some((joint, order)) = harmonics.get(&estimate.name) {
+            let (count, heights) = joints.entry(*joint).or_default();
+            *count += 1;
+            *heights.entry(*order).or_default() += estimate.estimate * estimate.estimate;
+        }
+    }
+    joints.retain(|_, (count, _)| *count > MOST_LISTED);
+    let shown = |(joint, (_, heights)): (usize, (usize, BTreeMap<u32, f64>))| {
+        let mut orders: Vec<u32> = heights.keys().copied().collect();
+        orders.sort_by(|a, b| heights[b].total_cmp(&heights[a]));
+        orders.truncate(SHOWN_WAVES);
+        (joint, (orders, heights.len().saturating_sub(SHOWN_WAVES)))
+    };
+    joints.into_iter().map(shown).collect()
+}
+
+/// Nominal, estimate, change and standard error of every free parameter; of many waves of a joint the highest. The others are
+/// in `file`, and folded on the page.
+pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &str) -> Vec<Block<'a>> {
+    let harmonics = harmonics(problem);
+    let high = highest(&found.estimates, &harmonics);
+    let (mut shown, mut lower): (Vec<(Vec<String>, Bar)>, Vec<(Vec<String>, Bar)>) = Default::default();
+    for (k, estimate) in found.estimates.iter().enumerate() {
+        let wave = harmonics.get(&estimate.name).and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
+        let own = (row(estimate), bar(estimate));
+        match wave {
+            Some((_, order, (orders, _))) if !orders.contains(order) => lower.push(own),
+            _ => shown.push(own),
+        }
+        let Some((joint, _, (_, more))) = wave else { continue };
+        let later = &found.estimates[k + 1..];
+        if *more > 0 && !later.iter().any(|other| harmonics.get(&other.name).is_some_and(|(own, _)| own == joint)) {
+            let mut cells = vec![String::new(); HEADER.len()];
+            cells[0] = format!("and {more} lower waves of joint {joint}");
+            shown.push((cells, Bar::default()));
+        }
+    }
+    let table = |rows: Vec<(Vec<String>, Bar)>| {
+        let (rows, bars) = rows.into_iter().unzip();
+        Table { minor: vec![1, 3, 6], bars: Some(("change / σ", bars)), ..Table::new(&HEADER, rows, &[0, 5, 6]) }
+    };
+    let count = lower.len();
+    let mut notes: Vec<String> = (count > 0).then(|| format!("lower waves: in {file}")).into_iter().collect();
+    if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
+        notes.push(
+            "–: no standard error: the data say nothing of it or see it in a blind combination only, a bound holds it, or it \
+             was not fitted"
+                .to_owned(),
+        );
+    }
+    notes.push(
+        "identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations"
+            .to_owned(),
+    );
+    let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
+    if count > 0 {
+        let on_paper = format!("The lower waves are left out on paper: they are in {file}.");
+        let folded = vec![Block::Table(table(lower))];
+        blocks.push(Block::Folded(format!("The lower waves: {count} coefficients"), folded, on_paper));
     }
     blocks
 }
 
-/// The rows of that table.
-fn parameter_rows(result: &Identification) -> Vec<Vec<String>> {
-    let row = |estimate: &Estimate| {
-        let unit = estimate.unit.display(estimate.nominal);
-        let error = estimate.std_error.map(|error| error * unit.factor);
-        let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
-        let show = |value: f64| number(value * unit.factor, digits);
-        vec![
-            estimate.name.clone(),
-            number(estimate.nominal * unit.factor, digits.min(PLAIN)),
-            show(estimate.estimate),
-            show(estimate.estimate - estimate.nominal),
-            error.map_or_else(|| "–".to_owned(), |error| number(error, digits)),
-            unit.symbol,
-            verdict(estimate),
-        ]
-    };
-    let line = |line: &Line| match line {
-        Line::Parameter(estimate) => row(estimate),
-        Line::Lower(waves, joint) => {
-            let mut cells = vec![String::new(); HEADER.len()];
-            cells[0] = format!("and {waves} lower waves of joint {joint}");
-            cells
-        }
-    };
-    shown(&result.estimates).lines.iter().map(line).collect()
+/// What Markdown says below the table where waves are left out.
+pub(super) fn lower_waves<'a>(problem: &Problem, found: &Identification, file: &str) -> Option<Block<'a>> {
+    let some = highest(&found.estimates, &harmonics(problem)).values().any(|(_, more)| *more > 0);
+    some.then(|| Block::Words(vec![Block::Text(format!("Lower waves: in {file}."))]))
+}
+
+fn row(estimate: &Estimate) -> Vec<String> {
+    let unit = estimate.unit.display(estimate.nominal);
+    let error = estimate.std_error.map(|error| error * unit.factor);
+    let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
+    let show = |value: f64| number(value * unit.factor, digits);
+    vec![
+        estimate.name.clone(),
+        number(estimate.nominal * unit.factor, digits.min(PLAIN)),
+        show(estimate.estimate),
+        show(estimate.estimate - estimate.nominal),
+        or_dash(error, |error| number(error, digits)),
+        unit.symbol,
+        verdict(estimate),
+    ]
+}
+
+/// The change in standard errors.
+fn bar(estimate: &Estimate) -> Bar {
+    let error = estimate.std_error.filter(|error| *error > 0.0);
+    Bar {
+        change: error.map(|error| (estimate.estimate - estimate.nominal) / error),
+        bound: estimate.at_bound.map(|bound| if bound == AtBound::Lower { 0.0 } else { 1.0 }),
+    }
 }
 
 /// How well a parameter is identified, in a word and a share.
-pub(super) fn verdict(estimate: &Estimate) -> String {
+fn verdict(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match (estimate.at_bound, estimate.fitted) {
         (Some(AtBound::Lower), _) => "at its lower bound".to_owned(),
@@ -112,28 +162,33 @@ fn is_vague(estimate: &Estimate) -> bool {
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
-/// The combinations that no measurement sees, in words; `file` holds them all.
-pub(super) fn blind_text(found: &Identifiability, unknowns: &[String], file: &str) -> String {
+/// The combinations that no measurement sees; `file` holds them all.
+pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str) -> Block<'a> {
     let blind = &found.blind;
     if blind.is_empty() {
-        return "The data see every combination of the parameters there.\n".to_owned();
+        return Block::lines("The data see every combination of the parameters there.");
     }
-    let mut text = format!(
+    let words = format!(
         "{} of {} combinations cannot be seen there (their parameters can change together in these\n\
-         proportions, each scaled by its effect, and no predicted position moves):\n",
+         proportions, each scaled by its effect, and no predicted position moves):",
         blind.len(),
         unknowns.len()
     );
-    for combination in blind.iter().take(SHOWN_BLIND) {
-        let _ = writeln!(text, "  {}", blind_words(combination, unknowns));
-    }
-    if blind.len() > SHOWN_BLIND {
-        let _ = writeln!(text, "  and {} more in {file}", blind.len() - SHOWN_BLIND);
-    }
-    text
+    let (mut points, more) = some_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN);
+    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    Block::Lines(words, points)
 }
 
-pub(super) fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
+/// Those that [`blind`] leaves out, on the page.
+pub(super) fn more_blind<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
+    let blind = found.identifiability.blind.iter().skip(SHOWN);
+    let words: Vec<String> = blind.map(|own| blind_words(own, &found.unknowns)).collect();
+    let count = words.len();
+    let on_paper = format!("{count} more are left out on paper: they are in {file}.");
+    (count > 0).then(|| Block::Folded(format!("{count} more combinations"), vec![Block::list(words)], on_paper))
+}
+
+fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
     let name = |k: usize| unknowns[k].as_str();
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));
@@ -154,24 +209,32 @@ pub(super) fn blind_words(combination: &BlindCombination, unknowns: &[String]) -
 }
 
 /// Pairs of parameters that go together; `file` holds them all.
-pub(super) fn correlation_text(result: &Identification, file: &str) -> String {
+pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
     // What one blind combination ties together is told above.
     let tied = |a: &str, b: &str| {
         let holds =
-            |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| result.unknowns[k] == name);
-        result.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
+            |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
+        found.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
     };
-    let pairs: Vec<_> = result.correlations.iter().filter(|(a, b, _)| !tied(a, b)).collect();
-    if pairs.is_empty() {
-        return "No two other parameters are correlated by more than 0.9.\n".to_owned();
-    }
-    let mut text = "Correlated by more than 0.9 (their sum or difference is known better than each):\n".to_owned();
-    for (a, b, correlation) in pairs.iter().copied().take(SHOWN_CORRELATIONS) {
+    let pairs = found.correlations.iter().filter(|(a, b, _)| !tied(a, b)).map(|(a, b, correlation)| {
         let sign = if *correlation < 0.0 { '−' } else { '+' };
-        let _ = writeln!(text, "  {a} and {b}: {sign}{:.3}", correlation.abs());
-    }
-    if pairs.len() > SHOWN_CORRELATIONS {
-        let _ = writeln!(text, "  and {} more in {file}", pairs.len() - SHOWN_CORRELATIONS);
-    }
-    text
+        format!("{a} and {b}: {sign}{:.3}", correlation.abs())
+    });
+    let (mut points, more) = some_of(pairs, SHOWN);
+    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    let words = match points.as_slice() {
+        [] => "No two other parameters are correlated by more than 0.9.",
+        _ => "Correlated by more than 0.9 (their sum or difference is known better than each):",
+    };
+    Block::Lines(words.to_owned(), points)
+}
+
+/// Rank, condition number and observability indices, in one line.
+pub(super) fn conditioning<'a>(found: &Identifiability, unknowns: usize, coordinates: usize) -> Block<'a> {
+    let [o1, o2, o3, o4, o5] = found.observability(coordinates);
+    Block::lines(format!(
+        "At the nominal arm: rank {} of {unknowns}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}",
+        found.rank,
+        found.condition_number(),
+    ))
 }

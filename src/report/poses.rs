@@ -1,7 +1,6 @@
 //! Poses to measure, as a table.
 
-use super::cells::quoted;
-use super::quantity::fixed;
+use super::quantity::{fixed, quoted};
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{HeldOut, JointKind, Problem};
 

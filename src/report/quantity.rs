@@ -2,6 +2,8 @@
 
 /// From here on numbers are written with a power of ten.
 const HUGE: f64 = 1e12;
+/// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
+const LEAST_P: f64 = 1e-16;
 
 /// Decimals that show `error` with two significant digits, at most `most`.
 pub(super) fn decimals(error: f64, most: usize) -> usize {
@@ -32,20 +34,28 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A rows-and-columns text, numbers to the right, without lines around it.
-pub(super) fn table(header: &[&str], rows: Vec<Vec<String>>, left: &[usize]) -> String {
-    use comfy_table::{CellAlignment, Table, presets::NOTHING};
-    let mut table = Table::new();
-    table.load_style(NOTHING).set_header(header.to_vec()).add_rows(rows);
-    for (index, column) in table.column_iter_mut().enumerate() {
-        column.set_padding((if index == 0 { 2 } else { 1 }, 1));
-        column.set_cell_alignment(if left.contains(&index) { CellAlignment::Left } else { CellAlignment::Right });
+/// A length [m] in mm with `decimals`.
+pub(super) fn mm(length: f64, decimals: usize) -> String {
+    number(length * 1e3, decimals)
+}
+
+/// What is there, in words; "–" where there is nothing.
+pub(super) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| "–".to_owned(), words)
+}
+
+/// A p-value: `0.003`, `2e-9`, `below 1e-16`.
+pub(super) fn p_value(p: f64) -> String {
+    match p {
+        p if p < LEAST_P => "below 1e-16".to_owned(),
+        p if p < 1e-3 => format!("{p:.0e}"),
+        p => format!("{p:.3}"),
     }
-    let mut text: String = table.lines().flat_map(|line| [line.trim_end().to_owned(), "\n".to_owned()]).collect();
-    if !text.ends_with('\n') {
-        text.push('\n');
-    }
-    text
+}
+
+/// A word as a cell of CSV: in quotes where it holds a comma, a quote or the end of a line.
+pub(super) fn quoted(word: &str) -> String {
+    if word.contains([',', '"', '\n', '\r']) { format!("\"{}\"", word.replace('"', "\"\"")) } else { word.to_owned() }
 }
 
 #[cfg(test)]

@@ -1,45 +1,43 @@
 //! How well a plan tells two effects apart, for programs and for people.
 
-use serde::Serialize;
-
-use super::document::{Block, Table, to_text};
+use super::document::{Block, Table};
 use super::effect;
-use super::quantity::{decimals, number};
+use super::forecast::size as shown;
+use super::json::object;
+use super::quantity::{number, or_dash, p_value};
 use crate::design::Separated;
 use crate::diagnose::{Separation, Side};
 
-/// Decimals of any size at most.
-const MOST: usize = 6;
-
-/// All of it.
-#[derive(Debug, Serialize)]
-pub(super) struct Entry<'a> {
-    /// Largest principal angle between the two.
-    angle_deg: Option<f64>,
-    random_angle_deg: Option<f64>,
-    effects: [SideEntry<'a>; 2],
+object! {
+    /// All of it.
+    Entry<'a>(separated: &'a Separated) {
+        /// Largest principal angle between the two.
+        angle_deg: Option<f64> = separated.planned.angle.map(f64::to_degrees),
+        random_angle_deg: Option<f64> = random_angle(separated).map(f64::to_degrees),
+        effects: [SideEntry<'a>; 2] = [0, 1].map(|side| SideEntry::of(separated, side, &Figures::of(separated, side))),
+    }
 }
-
-/// One of the two, sizes in SI; beside each figure the median over random poses.
-#[derive(Debug, Serialize)]
-struct SideEntry<'a> {
-    #[serde(flatten)]
-    effect: effect::Entry<'a>,
-    parameters: &'a [String],
-    unit: &'static str,
-    found_from: Option<f64>,
-    random_found_from: Option<f64>,
-    /// The other in its place is ruled out.
-    told_from: Option<f64>,
-    random_told_from: Option<f64>,
-    /// The size of `p_value` and `random_p_value`: from which random poses find it, or its prior.
-    size: f64,
-    p_value: f64,
-    random_p_value: f64,
+object! {
+    /// One of the two, sizes in SI; beside each figure the median over random poses.
+    SideEntry<'a>(separated: &'a Separated, side: usize, figures: &Figures<'a>) {
+        #[serde(flatten)]
+        effect: effect::Entry<'a> = effect::Entry(&separated.effects[side]),
+        parameters: &'a [String] = &figures.planned.found.parameters,
+        unit: &'static str = figures.planned.found.unit.symbol(),
+        found_from: Option<f64> = figures.planned.found.worst,
+        random_found_from: Option<f64> = figures.random_found,
+        /// The other in its place is ruled out.
+        told_from: Option<f64> = figures.planned.told.worst,
+        random_told_from: Option<f64> = figures.random_told,
+        /// The size of `p_value` and `random_p_value`: from which random poses find it, or its prior.
+        size: f64 = figures.size,
+        p_value: f64 = figures.p,
+        random_p_value: f64 = figures.random_p,
+    }
 }
 
 /// Figures about one of the two.
-struct Figures<'a> {
+pub(super) struct Figures<'a> {
     planned: &'a Side,
     random_found: Option<f64>,
     random_told: Option<f64>,
@@ -71,59 +69,29 @@ fn random_angle(separated: &Separated) -> Option<f64> {
     Some(separated.random(|own: &Separation| own.angle)).filter(|angle| angle.is_finite())
 }
 
-impl<'a> Entry<'a> {
-    pub fn of(separated: &'a Separated) -> Self {
-        let side = |k: usize| {
-            let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, k);
-            SideEntry {
-                effect: effect::Entry(&separated.effects[k]),
-                parameters: &planned.found.parameters,
-                unit: planned.found.unit.symbol(),
-                found_from: planned.found.worst,
-                random_found_from: random_found,
-                told_from: planned.told.worst,
-                random_told_from: random_told,
-                size,
-                p_value: p,
-                random_p_value: random_p,
-            }
-        };
-        Self {
-            angle_deg: separated.planned.angle.map(f64::to_degrees),
-            random_angle_deg: random_angle(separated).map(f64::to_degrees),
-            effects: [side(0), side(1)],
-        }
-    }
-}
-
-/// A table of the two, random poses beside planned ones, ending in a line break.
-pub(super) fn text(separated: &Separated) -> String {
-    let angle = |angle: Option<f64>| angle.map_or_else(|| "–".to_owned(), |angle| number(angle.to_degrees(), 1));
+/// A table of the two, random poses beside planned ones.
+pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
+    let angle = |angle: Option<f64>| or_dash(angle, |angle| number(angle.to_degrees(), 1));
     let cells = |cells: [&str; 4]| cells.map(str::to_owned).to_vec();
     let planned = separated.planned.angle;
     let mut rows = vec![cells(["angle between them", &angle(random_angle(separated)), &angle(planned), "°"])];
     for (k, own) in separated.effects.iter().enumerate() {
         let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, k);
         let unit = planned.found.unit.display(planned.found.prior);
-        let show = |value: Option<f64>| {
-            let scaled = value.map(|value| value * unit.factor);
-            scaled.map_or_else(|| "–".to_owned(), |value| number(value, decimals(value, MOST)))
-        };
+        let show = |value: Option<f64>| shown(value, &unit);
         rows.push(cells([&effect::declaration(own), "", "", ""]));
         rows.push(cells(["  found from", &show(random_found), &show(planned.found.worst), &unit.symbol]));
         rows.push(cells(["  told from the other from", &show(random_told), &show(planned.told.worst), &unit.symbol]));
         let at = format!("  p beside the other at {} {}", show(Some(size)), unit.symbol);
-        let short = |p: f64| effect::p(p).trim_start_matches("p ").to_owned();
-        rows.push(cells([&at, &short(random_p), &short(p), ""]));
+        rows.push(cells([&at, &p_value(random_p), &p_value(p), ""]));
     }
-    let header = vec!["told apart", "random", "planned", "unit"];
-    to_text(&[
-        Block::Table(Table { header, rows, left: vec![0, 3] }),
+    vec![
+        Block::Table(Table::new(&["told apart", "random", "planned", "unit"], rows, &[0, 3])),
         Block::Text(
             "The angle is that between the two once all parameters have been fitted: at 0° nothing tells them apart, at 90° they \
              have nothing in common. Sizes are those found, or told from the other, in 80 of 100 such sets; p is what to expect \
              for the other in its place. Random: median over as many random poses, drawn again and again."
                 .to_owned(),
         ),
-    ])
+    ]
 }

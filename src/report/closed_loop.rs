@@ -1,0 +1,421 @@
+//! What `loop` says and writes: what was found, before and after, and what remains.
+
+use std::fmt::Write as _;
+
+use super::document::{Block, Headline, Point, Table, code, some_of};
+use super::errors::{NOMINAL, mean_and_rms, row, unpredicted};
+use super::figures::{Figure, PlotData};
+use super::identify::{change, fitted_parameters, poses, short_mm, size, spread, told, why_not_trusted};
+use super::json::{Both, Summary, object, to_text};
+use super::parameters::{lower_waves, parameters};
+use super::quantity::{decimals, mm, number, p_value};
+use super::render::{Page, markdown, page, text};
+use super::{effect, findings, trace};
+use crate::diagnose::{
+    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Unexplained, Verdict,
+};
+use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
+use crate::problem::{JointKind, Problem};
+
+/// Alternatives that are named in words; the page names twice as many.
+const SHOWN_ALTERNATIVES: usize = 4;
+/// Candidates that a report shows.
+const SHOWN: usize = 8;
+
+object! {
+    Document<'a>(problem: &'a Problem, closure: &'a ClosedLoop) {
+        problem: &'a str = &problem.name,
+        verdict: &'static str = verdict_word(closure.verdict),
+        trusted: bool = closure.after.is_trusted(),
+        /// Whether structure in the residual could be tested for.
+        tested: bool = closure.findings.is_testable(),
+        registered: Both = Both::of(&closure.before.fit.registered),
+        before: FitEntry = FitEntry::of(&closure.before.fit),
+        after: FitEntry = FitEntry::of(&closure.after),
+        /// Mean reduction of the error on held-out poses.
+        held_out_gain_mm: IntervalEntry = IntervalEntry::of(&closure.gain),
+        effects: Vec<FoundEntry<'a>> = closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
+        unexplained: Option<UnexplainedEntry> = closure.unexplained.as_ref().map(UnexplainedEntry::of),
+        /// 1 σ of the prior that waves of joints were given [rad].
+        wave_prior_rad: Option<f64> = closure.harmonic_sigma,
+        steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
+        checks_before: Vec<findings::Entry> = findings::entries(&closure.before.findings),
+        checks_after: Vec<findings::Entry> = findings::entries(&closure.findings),
+    }
+}
+object! {
+    FitEntry(fit: &Identification) {
+        #[serde(flatten)]
+        errors: Both = Both::of(&fit.fitted),
+        reduced_chi2: Option<f64> = fit.reduced_chi2,
+    }
+}
+object! {
+    IntervalEntry(gain: &Interval) {
+        mean: f64 = gain.value * 1e3,
+        /// 95 of 100 such intervals hold the true one.
+        interval_95: [f64; 2] = [gain.low * 1e3, gain.high * 1e3],
+    }
+}
+object! {
+    FoundEntry<'a>(found: &'a Found, closure: &ClosedLoop) {
+        #[serde(flatten)]
+        effect: effect::Entry<'a> = effect::Entry(&found.effect),
+        description: String = closure.before.describe(&found.effect),
+        p_value: f64 = found.p_value,
+        parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
+        alternatives: Vec<effect::Entry<'a>> = found.alternatives.iter().map(effect::Entry).collect(),
+        held_out_after: Summary = Summary::of(&found.held_out_after),
+    }
+}
+object! {
+    ParameterEntry<'a>(estimate: &'a Estimate) {
+        name: &'a str = &estimate.name,
+        unit: &'static str = estimate.unit.symbol(),
+        estimate: f64 = estimate.estimate,
+        std_error: Option<f64> = estimate.std_error,
+    }
+}
+object! {
+    UnexplainedEntry(own: &Unexplained) {
+        #[serde(rename = "where")]
+        place: String = own.place.to_string(),
+        depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
+        p_value: f64 = own.p_value,
+        held_out_with_empirical_correction: Option<Summary> = own.correction.as_ref().map(|own| Summary::of(&own.held_out)),
+        correction: Option<CorrectionEntry> = own.correction.as_ref().map(CorrectionEntry::of),
+    }
+}
+object! {
+    CorrectionEntry(own: &Correction) {
+        /// Of what it depends on, SI; beyond it nothing is corrected.
+        range: [f64; 2] = own.range.into(),
+        held_out_beyond: usize = own.beyond,
+        /// Root mean squared error of poses left out in turn, before and with the correction.
+        cross_validated_rms_mm: [f64; 2] = [own.cross_validated.0 * 1e3, own.cross_validated.1 * 1e3],
+    }
+}
+object! {
+    StepEntry<'a>(step: &'a Round) {
+        effects: Vec<effect::Entry<'a>> = step.effects.iter().map(effect::Entry).collect(),
+        identification: Summary = Summary::of(&step.identification),
+        held_out: Summary = Summary::of(&step.held_out),
+    }
+}
+
+/// What the loop came to as JSON text, ending in a line break; SI units except where a key says otherwise.
+pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
+    to_text(&Document::of(problem, closure))
+}
+
+/// What the loop came to as text, ending in a line break.
+pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
+    let poses = &closure.before.fit.fitted;
+    let (n, held_out) = (poses.identification.n, poses.held_out.n);
+    let mut blocks = vec![
+        Block::Text(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
+        Block::Text(verdict(closure)),
+    ];
+    blocks.extend(distrust(closure));
+    blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
+    let failed = findings::failed(&closure.before.findings);
+    if !failed.is_empty() {
+        blocks.push(Block::heading("What the declared problem leaves (checks that failed)"));
+        blocks.push(Block::list(failed));
+    }
+    blocks.extend(found(closure, SHOWN_ALTERNATIVES));
+    let failed = findings::failed(&closure.findings);
+    if closure.unexplained.is_some() || (!failed.is_empty() && !closure.effects.is_empty()) {
+        blocks.push(Block::heading("What remains"));
+        let unexplained = unexplained(problem, closure).into_iter();
+        // Without effects the checks are those above.
+        let failed = failed.into_iter().filter(|_| !closure.effects.is_empty());
+        blocks.push(Block::list(unexplained.chain(failed)));
+    }
+    text(&blocks)
+}
+
+/// The whole story of the loop as Markdown, ending in a line break.
+pub fn loop_markdown(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> String {
+    markdown(&problem.title, &report(problem, closure, plots))
+}
+
+/// The report of the loop.
+pub fn loop_page(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Page {
+    page(problem, "closed loop", &report(problem, closure, plots))
+}
+
+fn report<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -> Vec<Block<'a>> {
+    let (fit, after) = (&closure.before.fit, &closure.after);
+    let file = format!("the estimate.json of {}", code("flexcal identify problem.closed.toml"));
+    let counts = format!(
+        "{} parameters from {} poses; {} poses held out, which took no part in any choice.",
+        fit.unknowns.len(),
+        fit.fitted.identification.n,
+        fit.fitted.held_out.n
+    );
+    let mut blocks =
+        vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
+    blocks.extend(distrust(closure));
+    blocks.extend([
+        Block::Table(errors(closure)),
+        Block::Text(gain(closure)),
+        Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]),
+        Block::heading("What the declared problem leaves"),
+    ]);
+    blocks.extend(findings::blocks(&closure.before.findings));
+    let every = format!("{} writes them all", code("flexcal trace"));
+    let mut ranking = trace::ranking(problem, &closure.before, SHOWN, &every);
+    ranking.insert(1, Block::Figures(vec![Figure::Ranking(&closure.before)]));
+    blocks.extend(ranking);
+    blocks.push(Block::Page(trace::not_seen(&closure.before)));
+    blocks.extend(rounds(closure));
+    blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
+    blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
+    let causes = plots.causes.iter().enumerate().map(|(k, cause)| Figure::Cause(cause, k + 1));
+    blocks.push(Block::Figures(causes.collect()));
+    blocks.push(Block::heading("What remains"));
+    let unexplained = unexplained(problem, closure).into_iter().map(Point::from);
+    let (tests, page) = (findings::all(&closure.findings), findings::each(&closure.findings));
+    blocks.extend([
+        Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
+        Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
+        Block::Figures(
+            plots.trend.iter().map(Figure::Trend).chain([Figure::Histogram(plots), Figure::Order(plots)]).collect(),
+        ),
+        Block::heading("Parameters of the final fit"),
+    ]);
+    blocks.extend(parameters(&closure.closed, after, &file));
+    blocks.extend(lower_waves(&closure.closed, after, &file));
+    let mut seen = vec![
+        Block::heading("What the poses can tell"),
+        Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&after.identifiability)]),
+    ];
+    seen.extend(told(after, &file));
+    blocks.push(Block::Page(seen));
+    blocks
+}
+
+/// What it came to at one glance: with the correction, if there is one.
+fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
+    let (fit, after) = (&closure.before.fit, &closure.after);
+    let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
+    let correction = closure.unexplained.as_ref().and_then(|left| left.correction.as_ref());
+    let (best, with) = match correction {
+        Some(correction) => (correction.held_out, ", empirical correction included"),
+        None => (last, ""),
+    };
+    let gain = closure.gain;
+    let digits = decimals((gain.high - gain.low) * 1e3, 4).max(2);
+    let mut facts = vec![
+        ("Verdict", verdict_word(closure.verdict).replace('-', " ")),
+        ("Effects found", closure.effects.len().to_string()),
+        poses(after),
+        fitted_parameters(after),
+        size("Residual before", fit),
+        size("Residual after", after),
+        ("Held out, after", spread(&last)),
+    ];
+    facts.extend(correction.map(|_| ("Without the correction", format!("{} mm", short_mm(last.mean.norm)))));
+    facts.extend((!closure.effects.is_empty() && gain.value.is_finite()).then(|| {
+        let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| mm(value, digits));
+        ("Gain of the effects", format!("{value} mm, 95 % interval {low} to {high} mm"))
+    }));
+    facts.push(("Nominal arm", format!("{} mm", short_mm(fit.registered.held_out.mean.norm))));
+    facts.extend((!problem.effects.is_empty()).then(|| ("Effects declared", problem.effects.len().to_string())));
+    let of = format!("{} held-out poses, as declared and after the loop{with}", last.n);
+    Headline { change: change(&first, &best), of, facts }
+}
+
+/// What it came to, in a word.
+fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::NothingFound => "nothing-found",
+        Verdict::Explained => "explained",
+        Verdict::Unexplained => "unexplained",
+    }
+}
+
+/// The outcome in a sentence or two.
+fn verdict(closure: &ClosedLoop) -> String {
+    let found = match closure.effects.as_slice() {
+        [] => "No effect was found".to_owned(),
+        [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
+        several => format!("{} effects were found", several.len()),
+    };
+    match (closure.verdict, closure.findings.is_testable()) {
+        (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
+        (_, false) => format!("{found}; whether structure is left could not be tested."),
+        (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
+        (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
+    }
+}
+
+fn lower(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// Why the final fit is not to be trusted.
+fn distrust<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
+    let after = &closure.after;
+    (!after.is_trusted()).then(|| Block::Note(format!("Beware: {}.", why_not_trusted(after))))
+}
+
+/// Errors of the nominal arm, the declared problem and the closed one.
+fn errors(closure: &ClosedLoop) -> Table {
+    let (before, after) = (&closure.before.fit, &closure.after);
+    let mut rows = Vec::new();
+    for (poses, of, is_fitted) in [
+        ("held out", (|errors: &Errors| errors.held_out) as fn(&Errors) -> ErrorSummary, false),
+        ("identification", |errors| errors.identification, true),
+    ] {
+        let chi2 = |fit: &Identification| {
+            fit.reduced_chi2.filter(|_| is_fitted).map_or_else(String::new, |chi2| number(chi2, 2))
+        };
+        rows.extend([
+            [row(poses, NOMINAL, &of(&before.registered)), vec![String::new()]].concat(),
+            [row("", "as declared, fitted", &of(&before.fitted)), vec![chi2(before)]].concat(),
+            [row("", "with what was found", &of(&after.fitted)), vec![chi2(after)]].concat(),
+        ]);
+    }
+    if closure.effects.is_empty() {
+        rows.retain(|row| row[1] != "with what was found");
+    }
+    Table::new(&["error, mm", "", "mean", "rms", "max", "χ²/ν"], rows, &[0, 1])
+}
+
+/// How the figures are to be read, with the gain and how sure it is.
+fn gain(closure: &ClosedLoop) -> String {
+    let (before, after) = (&closure.before, &closure.after);
+    let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
+        .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
+    let mut arms =
+        vec![("the nominal arm", &before.fit.registered), ("the arm as declared, fitted", &before.fit.fitted)];
+    arms.extend((!closure.effects.is_empty()).then_some(("what was found", &after.fitted)));
+    let unknown = unpredicted(&arms);
+    let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
+    let notes = [Some(chi2.to_owned()), another, unknown].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let gain = closure.gain;
+    if closure.effects.is_empty() || !gain.value.is_finite() {
+        return notes;
+    }
+    format!(
+        "What was found takes {} mm off the mean error of the {} held-out poses (95 % interval {} to {} mm). They took no \
+         part in any choice. {notes}",
+        mm(gain.value, 4),
+        closure.after.fitted.held_out.n,
+        mm(gain.low, 4),
+        mm(gain.high, 4),
+    )
+}
+
+/// Every effect that was found.
+fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
+    if closure.effects.is_empty() {
+        return Vec::new();
+    }
+    let mut blocks = vec![
+        Block::heading("What was found"),
+        Block::Ranking(closure.effects.iter().map(|found| point(closure, found, alternatives)).collect()),
+    ];
+    if let Some(sigma) = closure.harmonic_sigma {
+        blocks.push(Block::Text(format!(
+            "Waves of joints are many: every order up to the highest that stands out is in the model, with one prior of {} ° \
+             for all. With it, poses are predicted best where whole parts of a joint's range are left out.",
+            number(sigma.to_degrees(), 6)
+        )));
+    }
+    blocks
+}
+
+fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
+    let mut details = effect::values(found);
+    let mut chance = format!("p {}, the probability that it is chance", p_value(found.p_value));
+    if let Some(then) = closure.held_out_once(found) {
+        let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
+    }
+    details.push(chance);
+    if !found.alternatives.is_empty() {
+        let named = found.alternatives.iter().map(|other| closure.before.describe(other));
+        let (mut named, more) = some_of(named, alternatives);
+        named.extend((more > 0).then(|| format!("and {more} more")));
+        details.push(format!("these data do not tell it from: {}", named.join("; ")));
+    }
+    Point { text: effect::both(&found.effect, &closure.before), details, mark: None }
+}
+
+/// What each round of fit, trace and refit came to.
+fn rounds<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
+    if closure.rounds.is_empty() {
+        return Vec::new();
+    }
+    let row = |(k, step): (usize, &Round)| {
+        let effects: Vec<String> = step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
+        let effects = if effects.is_empty() { "none".to_owned() } else { effects.join("; ") };
+        let errors = [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm];
+        [vec![(k + 1).to_string(), effects], errors.map(|error| mm(error, 4)).to_vec()].concat()
+    };
+    let header = ["round", "effects in the model", "identification rms, mm", "held out mean", "held out rms"];
+    let rows = closure.rounds.iter().enumerate().map(row).collect();
+    vec![Block::heading("Rounds"), Block::Table(Table::new(&header, rows, &[1]))]
+}
+
+/// What no effect explains.
+fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
+    let Some(unexplained) = &closure.unexplained else { return Vec::new() };
+    let Unexplained { place, depends_on, p_value: p, correction } = unexplained;
+    let on = depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let mut sentences = vec![match on.as_str() {
+        "" => format!("Structure is left: {place} (p {}).", p_value(*p)),
+        on => format!("Structure is left: {place}, depending on {on} (p {}).", p_value(*p)),
+    }];
+    let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();
+    let mut catalogue = "No effect of the catalogue explains it".to_owned();
+    for (why, words) in [(HELD_FIXED, "holds them fixed"), (REFUSED, "speaks of them in another unit")] {
+        match untried(why) {
+            0 => {}
+            count => _ = write!(catalogue, "; {count} were not tried because [parameters] {words}"),
+        }
+    }
+    sentences.push(catalogue + ".");
+    match correction {
+        None => {
+            sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
+        }
+        Some(Correction { covariate, range, beyond, cross_validated: (without, with), held_out, .. }) => {
+            sentences.push(format!(
+                "A smooth correction there as a function of {on} would bring the held-out error to {} mm in the mean, rms \
+                 {} mm, and that of identification poses left out in turn from rms {} to {} mm. It names no cause and is \
+                 not part of {}.",
+                mm(held_out.mean.norm, 4),
+                mm(held_out.rms.norm, 4),
+                mm(*without, 4),
+                mm(*with, 4),
+                code("problem.closed.toml"),
+            ));
+            let (factor, unit) = unit(problem, *covariate);
+            sentences.push(format!(
+                "It holds for {on} from {} to {}{unit}, as far as the identification poses reach; nothing is corrected beyond \
+                 ({beyond} of {} held-out poses).",
+                number(range.0 * factor, 2),
+                number(range.1 * factor, 2),
+                held_out.n
+            ));
+        }
+    }
+    sentences
+}
+
+/// Factor from SI to the unit in which people read a quantity of the poses.
+fn unit(problem: &Problem, covariate: Covariate) -> (f64, &'static str) {
+    match covariate {
+        Covariate::Temperature => (1.0, " °C"),
+        Covariate::Time => (1.0 / 3600.0, " h"),
+        Covariate::Payload => (1.0, " kg"),
+        Covariate::Hoist => (1.0, " N"),
+        Covariate::Command(joint) if problem.joints[joint].kind == JointKind::Prismatic => (1e3, " mm"),
+        Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
+        _ => (1.0, ""),
+    }
+}

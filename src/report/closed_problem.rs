@@ -1,0 +1,229 @@
+//! `problem.closed.toml`: the problem as its author wrote it, with what was found declared.
+
+use std::path::PathBuf;
+
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
+
+use super::effect::values;
+use super::quantity::p_value;
+use crate::diagnose::{ClosedLoop, Found, HARMONICS, Trace};
+use crate::model::effect::{self, Argument};
+use crate::problem::{Effect, Problem};
+
+/// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text
+/// will stand; everything else stays as it was written, comments included.
+///
+/// # Errors
+/// The text is not TOML.
+pub fn closed_problem(
+    text: &str,
+    problem: &Problem,
+    closure: &ClosedLoop,
+    files: &[PathBuf],
+) -> Result<String, TomlError> {
+    let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
+    let closed = closure.closed.effects.iter().map(|declared| {
+        let found = closure.effects.iter().find(|found| found.effect == declared.effect);
+        (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
+    });
+    let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
+    match closure.harmonic_sigma {
+        Some(sigma) => with_rule(&edited, sigma),
+        None => Ok(edited),
+    }
+}
+
+/// The text with a prior of σ [rad] for all waves of joints at the end of `[parameters]`.
+fn with_rule(text: &str, sigma: f64) -> Result<String, TomlError> {
+    let mut document: DocumentMut = text.parse()?;
+    let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
+    if let Some(parameters) = parameters.as_table_like_mut() {
+        let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
+        parameters.insert(HARMONICS, Item::Value(Value::InlineTable(sigma)));
+    }
+    // A table in one line has no room for a comment.
+    if let Some(mut key) =
+        document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(HARMONICS))
+    {
+        key.leaf_decor_mut()
+            .set_prefix("# Found by flexcal loop: with this prior, what is left out is predicted best.\n");
+    }
+    Ok(document.to_string())
+}
+
+/// The text with the effects `closed`, each with comments, in the place of those `declared`.
+///
+/// The loop keeps what was declared in its order, gives it further orders at most, and adds behind it.
+fn edited(
+    text: &str,
+    declared: &[Effect],
+    closed: &[(Effect, Vec<String>)],
+    files: &[PathBuf],
+) -> Result<String, TomlError> {
+    let mut document: DocumentMut = text.parse()?;
+    if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
+        name_files(data, files);
+    }
+    for (k, (effect, comments)) in closed.iter().enumerate() {
+        match declared.get(k) {
+            Some(known) if known == effect => {}
+            Some(_) => replace(&mut document, k, effect),
+            None => add(&mut document, effect, comments),
+        }
+    }
+    Ok(document.to_string())
+}
+
+/// Writes the names of the data files.
+fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
+    let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
+    let mut names = Value::Array(files.iter().map(slashes).collect());
+    match data.get_mut("files") {
+        Some(Item::Value(known)) => {
+            *names.decor_mut() = known.decor().clone();
+            *known = names;
+        }
+        _ => _ = data.insert("files", Item::Value(names)),
+    }
+}
+
+/// Appends an effect with comments above it.
+fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
+    let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
+    if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
+        let mut value = Value::InlineTable(InlineTable::from_iter([(effect::name(effect), arguments(effect))]));
+        value.decor_mut().set_prefix(format!("\n{lines}"));
+        known.push_formatted(value);
+        return;
+    }
+    // What stands at the end of the file stays before what is added.
+    let rest = document.trailing().as_str().unwrap_or_default().to_owned();
+    document.set_trailing(RawString::default());
+    let mut table = Table::new();
+    table.insert(effect::name(effect), Item::Value(arguments(effect)));
+    table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
+    let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
+    table.set_position(Some(last + 1));
+    let known = document.entry("effect").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+    if let Some(known) = known.as_array_of_tables_mut() {
+        known.push(table);
+    }
+}
+
+/// The last place in the file where one of an item's tables stands.
+fn last_position(item: &Item) -> isize {
+    let of_table = |table: &Table| {
+        let below = table.iter().map(|(_, item)| last_position(item)).max();
+        table.position().unwrap_or(0).max(below.unwrap_or(0))
+    };
+    match item {
+        Item::Table(table) => of_table(table),
+        Item::ArrayOfTables(tables) => tables.iter().map(of_table).max().unwrap_or(0),
+        Item::None | Item::Value(_) => 0,
+    }
+}
+
+/// Gives the effect that was declared as number `k` other arguments.
+fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
+    let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
+        Some(Item::ArrayOfTables(tables)) => tables.get_mut(k).map(|table| table as &mut dyn TableLike),
+        Some(Item::Value(Value::Array(values))) => {
+            values.get_mut(k).and_then(Value::as_inline_table_mut).map(|table| table as &mut dyn TableLike)
+        }
+        _ => None,
+    };
+    if let Some(declared) = declared {
+        declared.insert(effect::name(effect), Item::Value(arguments(effect)));
+    }
+}
+
+/// The arguments of an effect; `true` stands for none.
+fn arguments(effect: &Effect) -> Value {
+    let arguments = effect::arguments(effect);
+    if arguments.is_empty() {
+        return Value::from(true);
+    }
+    let whole = |number: usize| Value::from(i64::try_from(number).unwrap_or(i64::MAX));
+    let value = |(key, argument): (&'static str, Argument)| {
+        let value = match argument {
+            Argument::Joint(joint) => whole(joint),
+            Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
+            Argument::Link(link) => Value::from(link),
+            Argument::Time(time) => Value::from(time),
+        };
+        (key, value)
+    };
+    Value::InlineTable(arguments.into_iter().map(value).collect())
+}
+
+/// What is known of an effect that was found, line by line.
+fn comments(found: &Found, trace: &Trace) -> Vec<String> {
+    let first = format!("Found by flexcal loop: {}, p {}.", trace.describe(&found.effect), p_value(found.p_value));
+    std::iter::once(first).chain(values(found)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILES: [&str; 1] = ["../data.csv"];
+
+    fn edit(text: &str, declared: &[Effect], closed: &[Effect]) -> String {
+        let closed: Vec<_> = closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
+        edited(text, declared, &closed, &FILES.map(PathBuf::from)).unwrap()
+    }
+
+    fn gear() -> Effect {
+        Effect::GearRatio { joint: 3 }
+    }
+
+    #[test]
+    fn what_was_written_stays() {
+        let text =
+            "name = \"x\" # a name\n\n[data]\nfiles = [\"data.csv\"] # measured in May\nsigma = 1\n\n# the end\n";
+        let expected = "name = \"x\" # a name\n\n[data]\nfiles = [\"../data.csv\"] # measured in May\nsigma = 1\n\n# the end\n\n\
+                        # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n[[effect]]\nhoist-force = true\n";
+        assert_eq!(edit(text, &[], &[gear(), Effect::HoistForce]), expected);
+        assert_eq!(edit(text, &[], &[]), text.replace("data.csv", "../data.csv"));
+    }
+
+    #[test]
+    fn effects_follow_those_declared() {
+        let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
+        let declared = [harmonic(&[1]), Effect::PayloadMass];
+        let closed = [harmonic(&[1, 2]), Effect::PayloadMass, gear()];
+        let text = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[[effect]]\npayload-mass = true\n\n[data]\nfiles = []\n";
+        let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[[effect]]\npayload-mass = true\n\n[data]\n\
+                        files = [\"../data.csv\"]\n\n# found\n[[effect]]\ngear-ratio = { joint = 3 }\n";
+        assert_eq!(edit(text, &declared, &closed), expected);
+        let text =
+            "effect = [{ joint-harmonic = { joint = 1, orders = [1] } }, { payload-mass = true }]\ndata.files = []\n";
+        let edited = edit(text, &declared, &closed);
+        let read: toml::Table = edited.parse().unwrap();
+        assert_eq!(read["effect"].as_array().unwrap().len(), 3, "{edited}");
+        assert_eq!(read["effect"][0]["joint-harmonic"]["orders"].as_array().unwrap().len(), 2);
+        assert_eq!(read["effect"][2]["gear-ratio"]["joint"].as_integer(), Some(3));
+        assert_eq!(read["data"]["files"][0].as_str(), Some("../data.csv"));
+    }
+
+    #[test]
+    fn a_prior_of_waves_is_a_rule() {
+        for text in [
+            "[parameters]\n\"base.*\" = { free = true }\n\n[data]\nfiles = []\n",
+            "parameters = {}\n",
+            "name = \"x\"\n",
+        ] {
+            let ruled = with_rule(text, 2.5e-5).unwrap();
+            let read: toml::Table = ruled.parse().unwrap();
+            assert_eq!(read["parameters"][HARMONICS]["sigma_rad"].as_float(), Some(2.5e-5), "{ruled}");
+        }
+    }
+
+    #[test]
+    fn other_ends_of_lines_do_no_harm() {
+        let text = "name = \"x\"\r\n[data]\r\nfiles = [\"data.csv\"]\r\n";
+        let read: toml::Table = edit(text, &[], &[gear()]).parse().unwrap();
+        assert_eq!(read["effect"][0]["gear-ratio"]["joint"].as_integer(), Some(3));
+        assert!(edited("name = ", &[], &[], &[]).is_err());
+    }
+}

@@ -1,0 +1,287 @@
+//! What `compare` says and writes: the paper's tables 2 and 3 for the problem at hand, every strategy and every ablation.
+
+use super::document::{Block, Headline, Table, code};
+use super::figures::{Figure, PlotData};
+use super::identify::{change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
+use super::json::{Both, object, to_text};
+use super::quantity::{mm, number};
+use super::render::{Page, markdown, page, text};
+use crate::identify::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
+use crate::least_squares::solver::Termination;
+use crate::model::Ablation;
+use crate::problem::Problem;
+
+/// Table 3 of [Chen2021], 50 poses, mm: before, with elasticity, geometry alone; x, y, z and sum of each.
+const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [
+    ("max", [[20.91, 22.72, 39.54, 48.9644], [2.5783, 3.4383, 4.3451, 5.5416], [7.8739, 4.1964, 5.9496, 6.4815]]),
+    ("mean", [[6.1646, 13.3304, 21.9786, 27.2506], [0.6845, 0.9578, 1.5093, 2.1358], [1.1303, 1.7519, 2.6873, 3.9673]]),
+];
+const TABLE_3: [&str; 8] =
+    ["held out, mm", "axis", "before", "with elasticity", "ignoring it", "paper: before", "with", "ignoring"];
+const TABLE_2: [&str; 16] = [
+    "joint",
+    "α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+    "→ α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+    "Δ α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+];
+/// Columns of the rows of a comparison, after the first; the time differs from run to run.
+const ROWS: [&str; 9] =
+    ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", "ms", "condition", "termination"];
+/// Place of the time among all columns.
+const TIME: usize = 7;
+
+/// One fit among others.
+pub(super) struct Fit<'a> {
+    strategy: &'a str,
+    solver: &'a str,
+    errors: &'a Errors,
+    steps: u64,
+    evaluations: u64,
+    seconds: f64,
+    termination: Termination,
+    trusted: bool,
+    chi2: Option<f64>,
+    condition: Option<f64>,
+}
+
+impl<'a> From<&'a Identification> for Fit<'a> {
+    fn from(own: &'a Identification) -> Self {
+        Self {
+            strategy: own.strategy.as_str(),
+            solver: own.solver.as_str(),
+            errors: &own.fitted,
+            steps: own.iterations,
+            evaluations: own.evaluations,
+            seconds: own.seconds,
+            termination: own.termination,
+            trusted: own.is_trusted(),
+            chi2: own.reduced_chi2,
+            condition: Some(own.identifiability.condition_number()),
+        }
+    }
+}
+
+impl<'a> From<&'a Baseline> for Fit<'a> {
+    fn from(own: &'a Baseline) -> Self {
+        Self {
+            strategy: own.strategy(),
+            solver: SolverChoice::PseudoInverse.as_str(),
+            errors: &own.errors,
+            steps: own.iterations,
+            evaluations: own.evaluations,
+            seconds: own.seconds,
+            termination: own.termination,
+            trusted: own.termination.converged(),
+            chi2: None,
+            condition: None,
+        }
+    }
+}
+
+/// Every strategy and solver, the paper's own last.
+fn fits(comparison: &Comparison) -> Vec<Fit<'_>> {
+    comparison.strategies.iter().map(Fit::from).chain(comparison.paper.iter().map(Fit::from)).collect()
+}
+
+object! {
+    Document<'a>(problem: &'a Problem, comparison: &'a Comparison) {
+        problem: &'a str = &problem.name,
+        registered: Both = Both::of(&comparison.joint.registered),
+        rows: Vec<Row<'a>> = fits(comparison).iter().map(Row::of).collect(),
+        ablations: Vec<Ablated<'a>> = comparison.ablations.iter().map(Ablated::of).collect(),
+    }
+}
+object! {
+    Row<'a>(fit: &Fit<'a>) {
+        strategy: &'a str = fit.strategy,
+        solver: &'a str = fit.solver,
+        #[serde(flatten)]
+        errors: Both = Both::of(fit.errors),
+        iterations: u64 = fit.steps,
+        evaluations: u64 = fit.evaluations,
+        seconds: f64 = fit.seconds,
+        termination: &'a str = fit.termination.as_str(),
+        trusted: bool = fit.trusted,
+        reduced_chi2: Option<f64> = fit.chi2,
+        condition_number: Option<f64> = fit.condition,
+    }
+}
+object! {
+    /// One part of the elasticity that is kept, strategy joint.
+    Ablated<'a>(own: &'a (Ablation, Identification)) {
+        elasticity: &'a str = own.0.as_str(),
+        parameters: usize = own.1.unknowns.len(),
+        #[serde(flatten)]
+        row: Row<'a> = Row::of(&Fit::from(&own.1)),
+    }
+}
+
+/// A comparison as JSON text, ending in a line break.
+pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
+    to_text(&Document::of(problem, comparison))
+}
+
+/// A comparison as text, ending in a line break.
+pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
+    let Comparison { joint, rigid, paper, ablations, .. } = comparison;
+    let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
+    let mut blocks = vec![
+        Block::lines(format!("{}\n{poses} poses to identify, {held_out} held out", problem.title)),
+        Block::heading("Geometry, nominal → identified, and the difference"),
+        Block::Table(geometry(problem, joint)),
+        Block::Table(table_3(joint, rigid, paper.iter().any(|_| ablations.len() > 1))),
+    ];
+    blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
+    blocks.push(Block::Table(strategies(comparison)));
+    if !paper.is_empty() && !problem.effects.is_empty() {
+        blocks.push(Block::lines("  paper: its own closed forms, without the declared effects"));
+    }
+    blocks.push(Block::Table(parts(comparison)));
+    text(&blocks)
+}
+
+/// A comparison as Markdown, ending in a line break.
+pub fn comparison_markdown(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> String {
+    markdown(&problem.title, &report(problem, comparison, plots))
+}
+
+/// The report of `compare`.
+pub fn comparison_page(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> Page {
+    page(problem, "comparison", &report(problem, comparison, plots))
+}
+
+fn report<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData) -> Vec<Block<'a>> {
+    let joint = &comparison.joint;
+    let held_out = joint.fitted.held_out;
+    let head = Headline {
+        change: change(&joint.registered.held_out, &held_out),
+        of: format!("{} held-out poses, everything fitted at once", held_out.n),
+        facts: vec![
+            poses(joint),
+            fitted_parameters(joint),
+            ("Geometry alone", format!("{} mm", short_mm(comparison.rigid.fitted.held_out.mean.norm))),
+            size("Residual against σ", joint),
+        ],
+    };
+    let mut blocks = vec![
+        Block::Headline(head),
+        Block::Text(counts(joint)),
+        Block::heading("Strategies and solvers side by side"),
+        Block::Figures(vec![Figure::Strategies(comparison)]),
+        Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),
+        Block::Page(vec![Block::Table(in_full(comparison))]),
+        Block::heading("What each part of the elasticity is worth"),
+        Block::Figures(vec![Figure::Ablations(comparison)]),
+        Block::Table(untimed(parts(comparison))),
+        Block::heading("Everything fitted at once"),
+    ];
+    blocks.extend(errors(joint));
+    blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.extend(remainder(problem, joint, plots, &format!("the estimate.json of {}", code("flexcal identify"))));
+    blocks
+}
+
+/// One row for each strategy and solver.
+fn strategies(comparison: &Comparison) -> Table {
+    side_by_side("strategy", fits(comparison).iter().map(|fit| cells(fit.strategy, fit)).collect())
+}
+
+/// The same without times, with further errors.
+fn in_full(comparison: &Comparison) -> Table {
+    let mut table = untimed(strategies(comparison));
+    table.header.extend(["fitted mean", "held out, largest"]);
+    for (row, Fit { errors, .. }) in table.rows.iter_mut().zip(fits(comparison)) {
+        row.extend([errors.identification.mean.norm, errors.held_out.max.norm].map(|error| mm(error, 4)));
+    }
+    table
+}
+
+/// One row for each part of the elasticity.
+fn parts(comparison: &Comparison) -> Table {
+    let row = |(part, found): &(Ablation, Identification)| cells(part.as_str(), &found.into());
+    side_by_side("elasticity", comparison.ablations.iter().map(row).collect())
+}
+
+fn side_by_side(first: &'static str, rows: Vec<Vec<String>>) -> Table {
+    let header: Vec<&str> = std::iter::once(first).chain(ROWS).collect();
+    Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }
+}
+
+/// Without the time taken: the same input gives the same page.
+fn untimed(mut table: Table) -> Table {
+    table.header.remove(TIME);
+    table.rows.iter_mut().for_each(|row| _ = row.remove(TIME));
+    Table { left: vec![0, 1, 8], ..table }
+}
+
+fn cells(name: &str, fit: &Fit) -> Vec<String> {
+    vec![
+        name.to_owned(),
+        fit.solver.to_owned(),
+        mm(fit.errors.held_out.mean.norm, 4),
+        mm(fit.errors.held_out.rms.norm, 4),
+        mm(fit.errors.identification.rms.norm, 4),
+        fit.steps.to_string(),
+        fit.evaluations.to_string(),
+        number(fit.seconds * 1e3, 1),
+        fit.condition.map_or_else(|| "–".to_owned(), |condition| format!("{condition:.1e}")),
+        fit.termination.as_str().to_owned(),
+    ]
+}
+
+/// Table 2: nominal, identified, error of each joint's geometry.
+fn geometry(problem: &Problem, joint: &Identification) -> Table {
+    let row = |(index, declared): (usize, &crate::problem::Joint)| {
+        let nominal = [declared.alpha, declared.a, declared.theta, declared.d, declared.beta];
+        let identified: Vec<f64> = ["alpha", "a", "theta", "d", "beta"]
+            .iter()
+            .zip(nominal)
+            .map(|(field, nominal)| {
+                let name = format!("joint{}.{field}", index + 1);
+                joint.estimates.iter().find(|estimate| estimate.name == name).map_or(nominal, |found| found.estimate)
+            })
+            .collect();
+        let change: Vec<f64> = identified.iter().zip(nominal).map(|(found, nominal)| found - nominal).collect();
+        let show = |(k, value): (usize, &f64)| if k % 2 == 0 { number(value.to_degrees(), 3) } else { mm(*value, 2) };
+        let values = [&nominal[..], &identified, &change].into_iter().flat_map(|set| set.iter().enumerate().map(show));
+        std::iter::once((index + 1).to_string()).chain(values).collect()
+    };
+    Table::new(&TABLE_2, problem.joints.iter().enumerate().map(row).collect(), &[])
+}
+
+/// Table 3: errors before, with elasticity, ignoring it; the published figures beside them.
+fn table_3(joint: &Identification, rigid: &Identification, beside_the_paper: bool) -> Table {
+    let columns = [&joint.registered.held_out, &joint.fitted.held_out, &rigid.fitted.held_out];
+    let of_kind = |summary: &ErrorSummary, kind: &str| -> [f64; 4] {
+        let AxisValues { x, y, z, norm } = if kind == "max" { summary.max } else { summary.mean };
+        [x, y, z, norm]
+    };
+    let mut body = Vec::new();
+    for (kind, published) in PUBLISHED {
+        for (axis, name) in ["x", "y", "z", "norm"].iter().enumerate() {
+            let mut row = vec![if axis == 0 { kind.to_owned() } else { String::new() }, (*name).to_owned()];
+            row.extend(columns.iter().map(|summary| mm(of_kind(summary, kind)[axis], 4)));
+            if beside_the_paper {
+                row.extend(published.iter().map(|values| number(values[axis], 4)));
+            }
+            body.push(row);
+        }
+    }
+    match beside_the_paper {
+        true => Table::new(&TABLE_3, body, &[0, 1])
+            .noted(&["paper: published in [Chen2021, table 3], measured on another arm"]),
+        false => Table::new(&TABLE_3[..5], body, &[0, 1]),
+    }
+}

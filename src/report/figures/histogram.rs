@@ -1,0 +1,64 @@
+//! How the residuals scatter.
+
+use plotters::prelude::*;
+
+use super::Drawing;
+use super::frame::{ACCENT, Axis, FAINT, WIDTH, chart, figure, legend, line, px};
+use crate::report::plot_data::Picture;
+
+const HEIGHT: i32 = 280;
+/// Least that the axis reaches [σ]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
+const REACH: f64 = 5.0;
+
+/// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
+pub fn histogram(picture: &Picture) -> Option<Drawing> {
+    let fitted = picture.residuals.iter().filter(|residual| !residual.held_out);
+    let values: Vec<f64> =
+        fitted.flat_map(|residual| (residual.error / residual.sigma).data.0[0]).filter(|v| v.is_finite()).collect();
+    if values.len() < 3 {
+        return None;
+    }
+    let scatter = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
+    let reach = (4.0 * scatter).ceil().max(REACH);
+    let half: usize = if values.len() < 150 { 10 } else { 20 };
+    let width = reach / half as f64;
+    let mut counts = vec![0_usize; 2 * half];
+    for value in &values {
+        let shifted = ((value + reach) / width).floor().clamp(0.0, (2 * half - 1) as f64);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the bars")]
+        let bar = shifted as usize;
+        counts[bar] += 1;
+    }
+    let scale = values.len() as f64 * width;
+    let normal = |u: f64| scale * (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let tallest = counts.iter().map(|count| *count as f64).fold(normal(0.0), f64::max) * 1.08;
+    let beyond = values.iter().filter(|value| value.abs() > reach).count();
+    let svg = figure((WIDTH, HEIGHT), "Histogram of the residuals", |area| {
+        legend(area, &[("residuals", FAINT, true), ("noise alone", ACCENT, true)])?;
+        let (_, body) = area.split_vertically(px(20));
+        let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);
+        let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "coordinates [1]"))?;
+        let bars = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(|(k, count)| {
+            let left = k as f64 * width - reach;
+            Rectangle::new([(left + 0.04 * width, 0.0), (left + 0.96 * width, *count as f64)], FAINT.filled())
+        });
+        chart.draw_series(bars)?;
+        let curve = (-60..=60).map(|k| reach * f64::from(k) / 60.0).map(|u| (u, normal(u)));
+        chart.draw_series(LineSeries::new(curve, line(ACCENT, 2.0)))?;
+        Ok(())
+    });
+    let outside = if beyond > 0 {
+        format!(" {beyond} lie beyond ±{reach} σ and are counted into the outermost bars.")
+    } else {
+        String::new()
+    };
+    Some(Drawing {
+        name: "residual-histogram".to_owned(),
+        title: "How the residuals scatter".to_owned(),
+        caption: format!(
+            "Residual coordinates of the fitted poses against the σ of the measurement. Noise alone would follow the line; a \
+             fit takes a little off it, the more parameters the more.{outside}"
+        ),
+        svg,
+    })
+}

@@ -1,0 +1,104 @@
+//! The figures of the report, one a file: numbers in, SVG with its title and caption out.
+
+mod cause;
+mod correlation;
+mod errors;
+mod frame;
+mod histogram;
+mod order;
+mod ranking;
+mod spectrum;
+mod strategies;
+mod vectors;
+
+pub use frame::{ACCENT, FAINT, GRID, INK, MUTED, WARM};
+
+use crate::diagnose::Trace;
+use crate::identify::Comparison;
+use crate::least_squares::Identifiability;
+use crate::report::plot_data::Cause;
+pub use crate::report::plot_data::Picture as PlotData;
+
+/// A figure with its numbers.
+#[derive(Debug, Clone, Copy)]
+pub enum Figure<'a> {
+    Errors(&'a PlotData),
+    Vectors(&'a PlotData),
+    Histogram(&'a PlotData),
+    Order(&'a PlotData),
+    Correlations(&'a PlotData),
+    SingularValues(&'a Identifiability),
+    Ranking(&'a Trace),
+    Strategies(&'a Comparison),
+    Ablations(&'a Comparison),
+    /// Of an effect, with its number from 1.
+    Cause(&'a Cause, usize),
+    Trend(&'a Cause),
+}
+
+impl Figure<'_> {
+    /// Its drawing; nothing where there is too little to draw.
+    pub fn draw(&self) -> Option<Drawing> {
+        match *self {
+            Self::Errors(data) => Some(errors::errors(data)),
+            Self::Vectors(data) => Some(vectors::vectors(data)),
+            Self::Histogram(data) => histogram::histogram(data),
+            Self::Order(data) => order::order(data),
+            Self::Correlations(data) => correlation::correlation(&data.correlations),
+            Self::SingularValues(found) => spectrum::spectrum(found),
+            Self::Ranking(trace) => ranking::ranking(trace),
+            Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
+            Self::Ablations(comparison) => strategies::ablations(comparison),
+            Self::Cause(own, number) => Some(cause::effect(own, number)),
+            Self::Trend(own) => Some(cause::trend(own)),
+        }
+    }
+}
+
+/// A figure as it is drawn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Drawing {
+    /// Name of its file, without the ending.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// What to see in it.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
+/// Every name but those of effects, which are numbered.
+const NAMES: [&str; 10] = [
+    "ablations",
+    "correlations",
+    "held-out-errors",
+    "ranking",
+    "residual-histogram",
+    "residual-order",
+    "residual-vectors",
+    "singular-values",
+    "strategies",
+    "unexplained",
+];
+
+/// Whether a file of this name is a figure that some page may have: `effect-1.svg`.
+pub fn is_figure(file: &str) -> bool {
+    let Some(name) = file.strip_suffix(".svg") else { return false };
+    let numbered = |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    NAMES.contains(&name) || name.strip_prefix("effect-").is_some_and(numbered)
+}
+
+/// " 3 poses without an equilibrium are left out." where there are any.
+fn left_out(poses: usize) -> String {
+    match poses {
+        0 => String::new(),
+        1 => " One pose without an equilibrium is left out.".to_owned(),
+        n => format!(" {n} poses without an equilibrium are left out."),
+    }
+}
+
+/// " Every third pose is drawn." where poses are left out of a drawing.
+fn thinned(every: usize) -> String {
+    if every > 1 { format!(" One pose in {every} is drawn.") } else { String::new() }
+}

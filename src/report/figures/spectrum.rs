@@ -1,0 +1,52 @@
+//! What the poses can tell: singular values.
+
+use plotters::prelude::*;
+
+use super::Drawing;
+use super::frame::{ACCENT, Axis, FAINT, WARM, WIDTH, chart, figure, legend, line, px, radius};
+use crate::least_squares::Identifiability;
+
+const HEIGHT: i32 = 280;
+/// Singular values below this part of the largest are drawn there.
+const LEAST: f64 = 1e-17;
+
+/// Singular values of the scaled Jacobian, largest first.
+pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
+    let largest = found.singular_values.first().copied().filter(|value| *value > 0.0)?;
+    let relative = |value: f64| (value / largest).max(LEAST).log10();
+    let values: Vec<(f64, f64)> =
+        found.singular_values.iter().enumerate().map(|(k, value)| (k as f64 + 1.0, relative(*value))).collect();
+    let lowest = values.iter().map(|at| at.1).fold(0.0, f64::min).floor().min(-2.0);
+    let blind = found.blind.len();
+    let svg = figure((WIDTH, HEIGHT), "Singular values", |area| {
+        let entries = [("seen", ACCENT, true), ("blind", WARM, true)];
+        legend(area, if blind > 0 { &entries } else { &entries[..1] })?;
+        let (_, body) = area.split_vertically(px(20));
+        let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best seen first");
+        let y = Axis::logarithmic((lowest, 0.3), "relative singular value [1]");
+        let mut chart = chart(&body, &x, &y)?;
+        for (k, at) in values.iter().enumerate() {
+            let colour = if k < found.rank { ACCENT } else { WARM };
+            chart.draw_series([PathElement::new(vec![(at.0, lowest), *at], line(FAINT, 1.0))])?;
+            chart.draw_series([Circle::new(*at, radius(2.6), colour.filled())])?;
+        }
+        Ok(())
+    });
+    let tells = match blind {
+        0 => "every combination is seen".to_owned(),
+        1 => "one combination is blind: it can change and no predicted position moves".to_owned(),
+        n => format!("{n} combinations are blind: they can change and no predicted position moves"),
+    };
+    Some(Drawing {
+        name: "singular-values".to_owned(),
+        title: "What the poses can tell".to_owned(),
+        caption: format!(
+            "Singular values of the Jacobian with columns of unit length, at the nominal arm; {tells}. Rank {} of {}, condition \
+             number {:.0}.",
+            found.rank,
+            found.singular_values.len(),
+            found.condition_number()
+        ),
+        svg,
+    })
+}

@@ -1,0 +1,127 @@
+//! Strategies and parts of the elasticity side by side.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+use super::Drawing;
+use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, legend, line, px, radius, write};
+use crate::identify::{Comparison, Errors};
+use crate::report::quantity::{decimals, number};
+
+const ROW: i32 = 22;
+/// Room for names.
+const NAMES: i32 = 214;
+/// Room for numbers.
+const NUMBERS: i32 = 66;
+const TOP: i32 = 26;
+/// Decades in which 2 and 5 have room for their numbers, too.
+const CLOSE: f64 = 2.2;
+
+struct Entry {
+    name: String,
+    errors: Errors,
+}
+
+/// Held-out and identification error of every strategy with every solver, and of the paper's own procedure.
+pub fn strategies(comparison: &Comparison) -> Drawing {
+    let mut entries: Vec<Entry> = Vec::new();
+    for found in &comparison.strategies {
+        // Solvers that end in the same place stand in one row.
+        let strategy = found.strategy.as_str();
+        let same = |entry: &&mut Entry| {
+            let ratio = entry.errors.held_out.mean.norm / found.fitted.held_out.mean.norm;
+            entry.name.starts_with(strategy)
+                && entry.name[strategy.len()..].starts_with([' ', ','])
+                && (ratio - 1.0).abs() < 1e-3
+        };
+        match entries.iter_mut().find(same) {
+            Some(entry) => entry.name = format!("{strategy}, {} solvers", solvers(&entry.name) + 1),
+            None => entries.push(Entry { name: format!("{strategy} {}", found.solver.as_str()), errors: found.fitted }),
+        }
+    }
+    entries.extend(comparison.paper.iter().map(|own| Entry { name: own.strategy().to_owned(), errors: own.errors }));
+    Drawing {
+        name: "strategies".to_owned(),
+        title: "Strategies side by side".to_owned(),
+        caption: "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
+                  wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
+                  share a row."
+            .to_owned(),
+        svg: rows(&entries, "Error of every strategy"),
+    }
+}
+
+/// How many solvers a row stands for.
+fn solvers(name: &str) -> usize {
+    name.rsplit_once(", ").and_then(|(_, tail)| tail.split(' ').next()?.parse().ok()).unwrap_or(1)
+}
+
+/// The same for every part of the elasticity that is kept; nothing for an arm without any.
+pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
+    let entry = |(part, found): &(crate::model::Ablation, crate::identify::Identification)| Entry {
+        name: part.as_str().to_owned(),
+        errors: found.fitted,
+    };
+    let entries: Vec<Entry> = comparison.ablations.iter().map(entry).collect();
+    (entries.len() > 1).then(|| Drawing {
+        name: "ablations".to_owned(),
+        title: "What each part of the elasticity is worth".to_owned(),
+        caption: "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
+                  rigid to complete, on a logarithmic scale."
+            .to_owned(),
+        svg: rows(&entries, "Error with parts of the elasticity"),
+    })
+}
+
+fn rows(entries: &[Entry], label: &str) -> String {
+    let of = |entry: &Entry| {
+        [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm].map(|e| (e * 1e3).max(1e-9).log10())
+    };
+    let finite = entries.iter().flat_map(of).filter(|value| value.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
+    let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
+    let room = f64::from(px(WIDTH - NAMES - NUMBERS));
+    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
+    let place = |value: f64| px(NAMES) + ((value - low) / (high - low) * room).round() as i32;
+    let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
+    figure((WIDTH, bottom + BELOW), label, |area| {
+        legend(area, &[("fitted poses", FAINT, true), ("held-out poses", INK, true), ("best", ACCENT, true)])?;
+        for decade in -6..=6 {
+            for part in [1.0_f64, 2.0, 5.0] {
+                let value = f64::from(decade) + part.log10();
+                if (low..=high).contains(&value) {
+                    let at = place(value);
+                    area.draw(&PathElement::new(vec![(at, px(TOP)), (at, px(bottom))], line(GRID, 1.0)))?;
+                    if part < 1.5 || high - low < CLOSE {
+                        let digits = usize::try_from(-decade).unwrap_or_default();
+                        write(
+                            area,
+                            &number(10.0_f64.powf(value), digits),
+                            (at / px(1), bottom + 10),
+                            MUTED,
+                            HPos::Center,
+                        )?;
+                    }
+                }
+            }
+        }
+        for (k, entry) in (0..).zip(entries) {
+            let y = TOP + ROW * k + ROW / 2;
+            let [fitted, held_out] = of(entry);
+            let colour = if held_out <= best + 1e-4 { ACCENT } else { INK };
+            write(area, &entry.name, (NAMES - 10, y), INK, HPos::Right)?;
+            if !(fitted.is_finite() && held_out.is_finite()) {
+                write(area, "no result", (NAMES + 8, y), MUTED, HPos::Left)?;
+                continue;
+            }
+            let ends = vec![(place(fitted), px(y)), (place(held_out), px(y))];
+            area.draw(&PathElement::new(ends, line(FAINT, 1.4)))?;
+            area.draw(&Circle::new((place(fitted), px(y)), radius(3.4), FAINT.filled()))?;
+            area.draw(&Circle::new((place(held_out), px(y)), radius(3.4), colour.filled()))?;
+            let value = entry.errors.held_out.mean.norm * 1e3;
+            write(area, &number(value, decimals(value, 4) + 1), (WIDTH - 6, y), colour, HPos::Right)?;
+        }
+        write(area, "mean position error [mm]", (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 28), INK, HPos::Center)
+    })
+}

@@ -1,0 +1,135 @@
+//! Residual vectors over the workspace.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
+
+use super::frame::{
+    ACCENT, Area, Axis, BELOW, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, legend, line, px, radius, range,
+    with_margin, write,
+};
+use super::{Drawing, left_out, thinned};
+use crate::report::plot_data::{Picture, Residual};
+use crate::report::quantity::number;
+
+/// Poses that are drawn at most.
+const MOST: usize = 400;
+/// Length of a long arrow as a part of the width.
+const LONG: f64 = 0.09;
+/// Heights of a view as shown.
+const LEAST: f64 = 150.0;
+const GREATEST: f64 = 330.0;
+
+/// Residuals from above and from the side, at their measured positions.
+pub fn vectors(picture: &Picture) -> Drawing {
+    let finite = |residual: &&Residual| residual.error.norm().is_finite();
+    let all: Vec<&Residual> = picture.residuals.iter().filter(finite).collect();
+    let count = all.len();
+    let step = every(count, MOST);
+    let shown: Vec<&Residual> = all.into_iter().step_by(step).collect();
+    let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
+    let width = f64::from(WIDTH - LEFT - 12);
+    let size = |(low, high): (f64, f64)| high - low;
+    // One scale for all: strokes keep their directions.
+    let per_pixel = (size(extent(0)) / width).max(size(extent(1)) / GREATEST).max(size(extent(2)) / GREATEST);
+    let across = about(extent(0), width * per_pixel);
+    let views = [1, 2].map(|axis| View::new(axis, extent(axis), per_pixel));
+    let mut lengths: Vec<f64> = shown.iter().map(|residual| residual.error.norm()).collect();
+    lengths.sort_by(f64::total_cmp);
+    let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
+    // A scale of 1, 2 or 5 times a power of ten.
+    let bar = rounded(long);
+    let larger = LONG * (across.1 - across.0) / bar;
+    let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
+    let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
+        legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
+        let length = radius(LONG * width);
+        let end = px(WIDTH - 12);
+        area.draw(&PathElement::new(vec![(end - length, px(10)), (end, px(10))], line(INK, 1.6)))?;
+        write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
+        let (_, body) = area.split_vertically(px(22));
+        let mut rest = body;
+        for view in &views {
+            let (panel, below) = rest.split_vertically(px(view.height + BELOW + 8));
+            rest = below;
+            view.draw(&panel, across, &shown, larger)?;
+        }
+        Ok(())
+    });
+    Drawing {
+        name: "residual-vectors".to_owned(),
+        title: "What is left, over the workspace".to_owned(),
+        caption: format!(
+            "Each stroke starts at a measured position (dot) and shows the residual measured − predicted there, drawn {} times \
+             too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
+             structure; a tangle is noise.{}{}",
+            short(larger),
+            left_out(picture.residuals.len() - count),
+            thinned(step)
+        ),
+        svg,
+    }
+}
+
+/// 1, 2 or 5 times the power of ten below.
+fn rounded(value: f64) -> f64 {
+    let power = 10.0_f64.powf(value.log10().floor());
+    [5.0, 2.0, 1.0].map(|part| part * power).into_iter().find(|round| *round <= value * 1.001).unwrap_or(power)
+}
+
+/// Two digits that count, without an exponent.
+fn short(value: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, reason = "a power of ten")]
+    let digits = 1 - value.abs().max(1e-12).log10().floor() as i32;
+    if digits < 0 {
+        let power = 10.0_f64.powi(-digits);
+        return number((value / power).round() * power, 0);
+    }
+    let text = number(value, digits.unsigned_abs() as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// A range of some width about the middle of another.
+fn about((low, high): (f64, f64), width: f64) -> (f64, f64) {
+    let middle = 0.5 * (low + high);
+    (middle - 0.5 * width, middle + 0.5 * width)
+}
+
+/// The part of the way from a value in a range to another that stays in it.
+fn inside(from: f64, to: f64, (low, high): (f64, f64)) -> f64 {
+    let edge = if to > high { high } else { low };
+    if (low..=high).contains(&to) { 1.0 } else { ((edge - from) / (to - from)).clamp(0.0, 1.0) }
+}
+
+/// Positions projected on x and one other axis.
+struct View {
+    axis: usize,
+    range: (f64, f64),
+    /// Of the drawing between the axes, as shown.
+    height: i32,
+}
+
+impl View {
+    fn new(axis: usize, range: (f64, f64), per_pixel: f64) -> Self {
+        let height = ((range.1 - range.0) / per_pixel).max(LEAST).round();
+        #[expect(clippy::cast_possible_truncation, reason = "between the two heights")]
+        let shown = height as i32;
+        Self { axis, range: about(range, height * per_pixel), height: shown }
+    }
+
+    fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&Residual], larger: f64) -> Result<(), Failure> {
+        let label = if self.axis == 1 { "y [m]" } else { "z [m]" };
+        let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
+        let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;
+        for residual in shown {
+            let colour = if residual.held_out { ACCENT } else { FAINT };
+            let from = (residual.position.x, residual.position[self.axis]);
+            let end = (from.0 + larger * residual.error.x, from.1 + larger * residual.error[self.axis]);
+            // A stroke that would leave the view ends at its edge.
+            let part = inside(from.0, end.0, across).min(inside(from.1, end.1, self.range));
+            let to = (from.0 + part * (end.0 - from.0), from.1 + part * (end.1 - from.1));
+            chart.draw_series([PathElement::new(vec![from, to], line(colour, 1.2))])?;
+            chart.draw_series([Circle::new(from, radius(1.5), colour.filled())])?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,335 @@
+//! What `identify` says and writes: `estimate.json`, its text, and the report on one fit.
+
+use super::document::{Block, Headline, Table, some_of};
+use super::errors::{NOMINAL, row, unpredicted};
+use super::figures::{Figure, PlotData};
+use super::findings;
+use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentified};
+use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters};
+use super::quantity::{decimals, mm, number};
+use super::render::{Page, markdown, page, text};
+use crate::identify::{ActiveConstraint, Distrust, ErrorSummary, Estimate, Identification, Noise, Outlier};
+use crate::least_squares::solver::AtBound;
+use crate::problem::Problem;
+
+/// Outliers that fit on a screen.
+const SHOWN_OUTLIERS: usize = 20;
+/// The file that holds everything.
+const FILE: &str = "estimate.json";
+
+object! {
+    Document<'a>(problem: &'a Problem, found: &'a Identification) {
+        problem: &'a str = &problem.name,
+        arm_digest: String = problem.digest(),
+        strategy: &'a str = found.strategy.as_str(),
+        solver: &'a str = found.solver.as_str(),
+        solver_reason: Option<&'a str> = found.solver_reason,
+        termination: &'a str = found.termination.as_str(),
+        trusted: bool = found.is_trusted(),
+        iterations: u64 = found.iterations,
+        seconds: f64 = found.seconds,
+        registered: Both = Both::of(&found.registered),
+        #[serde(flatten)]
+        fitted: Both = Both::of(&found.fitted),
+        reduced_chi2: Option<f64> = found.reduced_chi2,
+        estimated_sigma_mm: Option<f64> = match found.noise {
+            Noise::Declared | Noise::Unknown => None,
+            Noise::Estimated(sigma) => Some(sigma * 1e3),
+        },
+        noise_factor: f64 = found.noise_factor,
+        rank: usize = found.identifiability.rank,
+        #[serde(flatten)]
+        conditioning: Conditioning<'a> = Conditioning::of(&found.identifiability, found.coordinates),
+        parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
+        unidentified: Vec<Unidentified<'a>> = unidentified(&found.identifiability, |k| found.unknowns[k].as_str()),
+        correlations: Vec<Correlation<'a>> = found.correlations.iter().map(Correlation::of).collect(),
+        active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
+        outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
+    }
+}
+object! {
+    ParameterEntry<'a>(estimate: &'a Estimate) {
+        name: &'a str = &estimate.name,
+        unit: &'a str = estimate.unit.symbol(),
+        nominal: f64 = estimate.nominal,
+        estimate: f64 = estimate.estimate,
+        std_error: Option<f64> = estimate.std_error,
+        at_bound: Option<&'a str> = estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
+        identified: f64 = estimate.identified,
+        fitted: bool = estimate.fitted,
+    }
+}
+object! {
+    Correlation<'a>(pair: &'a (String, String, f64)) {
+        parameters: [&'a str; 2] = [&pair.0, &pair.1],
+        correlation: f64 = pair.2,
+    }
+}
+object! {
+    ActiveEntry<'a>(active: &'a ActiveConstraint) {
+        constraint: &'a str = &active.words,
+        side: &'a str = side(active.side, ["at_least", "at_most"]),
+        line: Option<usize> = active.location.line,
+    }
+}
+object! {
+    OutlierEntry(outlier: &Outlier) {
+        file: String = outlier.location.file.display().to_string(),
+        line: Option<usize> = outlier.location.line,
+        /// Counted from 1 over all files.
+        pose_row: usize = outlier.row + 1,
+        error_mm: f64 = outlier.error.norm() * 1e3,
+        sigmas: f64 = outlier.distance,
+    }
+}
+
+fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
+    if bound == AtBound::Lower { lower } else { upper }
+}
+
+/// The result of an identification as JSON text, ending in a line break; SI units except where a key says otherwise.
+pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
+    to_text(&Document::of(problem, found))
+}
+
+/// A result as a table with its story, ending in a line break.
+pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
+    let mut blocks =
+        vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    blocks.extend(outliers(problem, found));
+    blocks.extend(parameters(problem, found, FILE));
+    blocks.extend(active_constraints(found));
+    blocks.extend(told(found, FILE));
+    text(&blocks)
+}
+
+/// An identification as Markdown, ending in a line break.
+pub fn identification_markdown(problem: &Problem, found: &Identification, plots: &PlotData) -> String {
+    markdown(&problem.title, &report(problem, found, plots))
+}
+
+/// The report of `identify`.
+pub fn identification_page(problem: &Problem, found: &Identification, plots: &PlotData) -> Page {
+    page(problem, "identification", &report(problem, found, plots))
+}
+
+fn report<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
+    let held_out = found.fitted.held_out;
+    let head = Headline {
+        change: change(&found.registered.held_out, &held_out),
+        of: format!("{} held-out poses", held_out.n),
+        facts: vec![
+            poses(found),
+            fitted_parameters(found),
+            ("Held out, after", spread(&held_out)),
+            size("Residual against σ", found),
+            ("Strategy", found.strategy.as_str().to_owned()),
+            ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
+        ],
+    };
+    let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
+    blocks.extend(errors(found));
+    blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.extend(remainder(problem, found, plots, FILE));
+    blocks
+}
+
+/// Why a fit is not to be trusted, in one line.
+pub fn why_not_trusted(found: &Identification) -> String {
+    match &found.distrust {
+        Some(reason) => format!("the fit is not to be trusted: {reason}"),
+        None => "the fit is to be trusted".to_owned(),
+    }
+}
+
+fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
+    let fitted = &found.fitted;
+    let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
+    Block::lines(format!(
+        "{}\n{} parameters from {} poses, {} poses held out; strategy {}, solver {}{reason}\n{} after {} steps, {:.3} s",
+        problem.title,
+        found.unknowns.len(),
+        fitted.identification.n,
+        fitted.held_out.n,
+        found.strategy.as_str(),
+        found.solver.as_str(),
+        found.termination,
+        found.iterations,
+        found.seconds,
+    ))
+}
+
+/// What was fitted to what, and how it ended.
+pub(super) fn counts(found: &Identification) -> String {
+    let (fitted, held_out) = (found.fitted.identification.n, found.fitted.held_out.n);
+    let beware = if found.is_trusted() { String::new() } else { format!(" Beware: {}.", why_not_trusted(found)) };
+    format!(
+        "{} parameters from {fitted} poses; {held_out} poses held out. Strategy {}, solver {}: {}.{beware}",
+        found.unknowns.len(),
+        found.strategy.as_str(),
+        found.solver.as_str(),
+        found.termination,
+    )
+}
+
+fn errors_by_axis(found: &Identification) -> Table {
+    let row = |poses: &str, when: &str, of: &ErrorSummary| {
+        let values = [of.mean.x, of.mean.y, of.mean.z, of.mean.norm, of.rms.norm, of.max.norm];
+        [vec![poses.to_owned(), when.to_owned()], values.map(|value| mm(value, 4)).to_vec()].concat()
+    };
+    let (before, after) = (&found.registered, &found.fitted);
+    let rows = vec![
+        row("identification", "before", &before.identification),
+        row("", "after", &after.identification),
+        row("held out", "before", &before.held_out),
+        row("", "after", &after.held_out),
+    ];
+    let header = ["error, mm", "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
+    let mut table = Table::new(&header, rows, &[0, 1]);
+    table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
+    table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
+    table
+}
+
+/// Before and after, on both kinds of poses.
+pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
+    let (before, after) = (&found.registered, &found.fitted);
+    let rows = vec![
+        row("held out", NOMINAL, &before.held_out),
+        row("", "as identified", &after.held_out),
+        row("identification", NOMINAL, &before.identification),
+        row("", "as identified", &after.identification),
+    ];
+    let table = Block::Table(Table::new(&["error, mm", "", "mean", "rms", "max"], rows, &[0, 1]));
+    std::iter::once(table).chain(no_errors(found).map(Block::Note)).collect()
+}
+
+/// Poses whose errors an identification does not know.
+pub(super) fn no_errors(found: &Identification) -> Option<String> {
+    unpredicted(&[("the nominal arm", &found.registered), ("the arm as identified", &found.fitted)])
+}
+
+/// The residual, the parameters, and what the poses can tell; `file` holds what is left out.
+pub(super) fn remainder<'a>(
+    problem: &Problem,
+    found: &'a Identification,
+    plots: &'a PlotData,
+    file: &str,
+) -> Vec<Block<'a>> {
+    let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
+    blocks.extend(outliers(problem, found));
+    blocks.push(Block::Figures(vec![Figure::Histogram(plots), Figure::Order(plots)]));
+    blocks.extend(findings::blocks(&plots.findings));
+    blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
+    blocks.push(Block::heading("Parameters"));
+    blocks.extend(parameters(problem, found, file));
+    blocks.extend(lower_waves(problem, found, file));
+    blocks.extend(active_constraints(found).map(|own| Block::Page(vec![own])));
+    blocks.push(Block::heading("What the poses can tell"));
+    blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&found.identifiability)]));
+    blocks.extend(told(found, file));
+    blocks
+}
+
+/// What the poses can tell, in words.
+pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
+    let mut blocks = vec![
+        conditioning(&found.identifiability, found.unknowns.len(), found.coordinates),
+        blind(&found.identifiability, &found.unknowns, file),
+    ];
+    blocks.extend(more_blind(found, file));
+    blocks.push(correlations(found, file));
+    blocks
+}
+
+/// How large the residual is against the declared noise.
+fn noise(problem: &Problem, found: &Identification) -> String {
+    match (found.noise, found.reduced_chi2) {
+        (Noise::Estimated(sigma), _) => format!(
+            "No σ is declared; the scatter about the fit gives {} mm per coordinate, model errors included.",
+            mm(sigma, 4)
+        ),
+        (Noise::Unknown, _) => {
+            "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors."
+                .to_owned()
+        }
+        (Noise::Declared, Some(_))
+            if found.too_few_poses.is_some() || matches!(found.distrust, Some(Distrust::TooFewEquations { .. })) =>
+        {
+            "There are not enough different poses to judge the declared σ, or the model.".to_owned()
+        }
+        (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
+        (Noise::Declared, Some(chi2)) if found.noise_factor > 1.0 => {
+            let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({:.4} mm)", s * 1e3));
+            format!(
+                "Reduced χ² is {}: the residual is {} times the declared σ{declared}, so the model lacks something.\n\
+                 Standard errors are raised by that factor.",
+                number(chi2, 2),
+                number(chi2.sqrt(), 1)
+            )
+        }
+        (Noise::Declared, Some(chi2)) => {
+            format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2))
+        }
+    }
+}
+
+/// The constraints that hold parameters back; nothing to say without any.
+fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
+    let point = |active: &ActiveConstraint| {
+        let line = active.location.line.map_or_else(String::new, |line| format!("line {line}: "));
+        format!("{line}{}", active.words)
+    };
+    let words = "Held by a constraint (standard errors are those along it):".to_owned();
+    let points: Vec<String> = found.active_constraints.iter().map(point).collect();
+    (!points.is_empty()).then_some(Block::Lines(words, points))
+}
+
+/// Poses whose residual is too long to be noise; nothing to say without any.
+fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> {
+    let treatment = if problem.robust.is_some() {
+        "the robust loss keeps them from ruling the fit"
+    } else {
+        "they count in full; a section [robust] would limit them"
+    };
+    let (n, poses) = (found.outliers.len(), found.fitted.identification.n);
+    let point = |own: &Outlier| {
+        format!("{}: {} mm, {} σ of the scatter", own.location, mm(own.error.norm(), 3), number(own.distance, 1))
+    };
+    let (mut points, more) = some_of(found.outliers.iter().map(point), SHOWN_OUTLIERS);
+    points.extend((more > 0).then(|| format!("and {more} more in estimate.json")));
+    let words = format!("{n} of {poses} poses are too far off to be noise ({treatment}):");
+    (n > 0).then_some(Block::Lines(words, points))
+}
+
+/// A length [m] in mm with about three digits.
+pub(super) fn short_mm(length: f64) -> String {
+    mm(length, (decimals(length * 1e3, 4) + 1).min(4))
+}
+
+/// Mean errors before and after.
+pub(super) fn change(before: &ErrorSummary, after: &ErrorSummary) -> (String, String) {
+    (short_mm(before.mean.norm), short_mm(after.mean.norm))
+}
+
+pub(super) fn poses(found: &Identification) -> (&'static str, String) {
+    ("Poses", format!("{} fitted, {} held out", found.fitted.identification.n, found.fitted.held_out.n))
+}
+
+pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String) {
+    ("Parameters", format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability.rank))
+}
+
+pub(super) fn spread(errors: &ErrorSummary) -> String {
+    format!("rms {} mm, largest {} mm", short_mm(errors.rms.norm), short_mm(errors.max.norm))
+}
+
+/// How large the residual is, in brief.
+pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
+    let size = match (found.noise, found.reduced_chi2) {
+        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", number(chi2, 2)),
+        (Noise::Estimated(sigma), _) => format!("{} mm per coordinate", short_mm(sigma)),
+        _ => "not to be judged".to_owned(),
+    };
+    (term, size)
+}

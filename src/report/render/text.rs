@@ -1,0 +1,136 @@
+//! Blocks on a terminal.
+
+use comfy_table::{CellAlignment, presets::NOTHING};
+
+use crate::report::document::{Block, Mark, Point, Table};
+
+/// Columns that running text is wrapped to; tables may be wider.
+const WIDTH: usize = 110;
+
+/// Blocks as text, ending in a line break.
+pub(in crate::report) fn text(blocks: &[Block]) -> String {
+    let mut text = String::new();
+    let mut follows_heading = false;
+    for block in flat(blocks) {
+        if !text.is_empty() && !follows_heading {
+            text.push('\n');
+        }
+        let indent = if follows_heading { "  " } else { "" };
+        follows_heading = matches!(block, Block::Heading(_));
+        match block {
+            Block::Heading(words) => text.push_str(&wrapped(words, "", "")),
+            Block::Text(words) | Block::Note(words) => text.push_str(&wrapped(words, indent, indent)),
+            Block::Lines(words, points) => {
+                text.extend(words.lines().flat_map(|line| [plain(line), "\n".to_owned()]));
+                text.extend(points.iter().map(|point| format!("  {}\n", plain(point))));
+            }
+            Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own)),
+            Block::Ranking(points) => {
+                points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
+            }
+            Block::Table(own) => {
+                text.push_str(&table(own));
+                text.extend(own.notes.iter().map(|note| format!("  {note}\n")));
+            }
+            Block::Headline(_) | Block::Figures(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
+        }
+    }
+    text
+}
+
+/// What terminals and Markdown show, one after another.
+pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
+    let mut all = Vec::new();
+    for block in blocks {
+        match block {
+            Block::Words(inner) => all.extend(flat(inner)),
+            Block::Headline(_) | Block::Figures(_) | Block::Folded(..) | Block::Page(_) => {}
+            shown => all.push(shown),
+        }
+    }
+    all
+}
+
+/// A point's text with how its test went.
+pub(super) fn marked(point: &Point) -> String {
+    let mark = match point.mark {
+        Some(Mark::Failed) => "failed: ",
+        Some(Mark::Passed) => "passed: ",
+        Some(Mark::Untested) | None => "",
+    };
+    format!("{mark}{}", point.text)
+}
+
+fn point(text: &mut String, mark: &str, point: &Point) {
+    let (first, further) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
+    text.push_str(&wrapped(&marked(point), &first, &further));
+    for detail in &point.details {
+        text.push_str(&wrapped(detail, &further, &format!("{further}  ")));
+    }
+}
+
+/// Lines of words, each ending in a line break; a break in the words stays one.
+fn wrapped(words: &str, first: &str, further: &str) -> String {
+    let plain = plain(words);
+    let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(further).break_words(false);
+    textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// Without marks and what else would steer the terminal.
+fn plain(words: &str) -> String {
+    words.chars().filter(|c| !c.is_control() || *c == '\n').collect()
+}
+
+/// Rows and columns without lines around them.
+fn table(table: &Table) -> String {
+    let mut shown = comfy_table::Table::new();
+    let rows = table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect::<Vec<_>>());
+    shown.load_style(NOTHING).set_header(table.header.clone()).add_rows(rows);
+    for (index, column) in shown.column_iter_mut().enumerate() {
+        column.set_padding((if index == 0 { 2 } else { 1 }, 1));
+        let left = table.left.contains(&index);
+        column.set_cell_alignment(if left { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    shown.lines().flat_map(|line| [line.trim_end().to_owned(), "\n".to_owned()]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::document::code;
+    use crate::report::render::markdown;
+
+    #[test]
+    fn a_story_is_shown_both_ways() {
+        let details = vec!["2 < 3".to_owned()];
+        let point = Point { text: format!("found {}", code("a*b")), details, mark: Some(Mark::Passed) };
+        let rows = vec![vec!["a|b".to_owned(), "1".to_owned()]];
+        let story = [
+            Block::heading("Found"),
+            Block::Ranking(vec![point]),
+            Block::Table(Table::new(&["name", "value"], rows, &[0])),
+        ];
+        let expected = "Found\n  1. passed: found a*b\n     2 < 3\n\n  name  value\n  a|b       1\n";
+        assert_eq!(text(&story), expected);
+        let expected = "# The \\*arm\\*\n\n## Found\n\n1. passed: found `a*b`\n   - 2 \\< 3\n\n\
+                        | name | value |\n| :-- | --: |\n| a\\|b | 1 |\n";
+        assert_eq!(markdown("The *arm*", &story), expected);
+    }
+
+    #[test]
+    fn titles_and_names_change_nothing_else() {
+        let words = format!("link ` is *off*: {}\u{1b}[31m", code("link = \"a`*\""));
+        let story = [Block::Text(words)];
+        assert_eq!(text(&story), "link ` is *off*: link = \"a`*\"[31m\n");
+        let expected = "# A \\` and \\*\n\nlink \\` is \\*off\\*: `` link = \"a`*\" ``[31m\n";
+        assert_eq!(markdown("A ` and *", &story), expected);
+    }
+
+    #[test]
+    fn long_text_is_wrapped_under_its_mark() {
+        let words = "word ".repeat(40);
+        let text = text(&[Block::list([words])]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines.len() == 2 && lines[0].starts_with("  - word") && lines[1].starts_with("    word"), "{text}");
+    }
+}

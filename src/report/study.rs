@@ -1,0 +1,226 @@
+//! What `study` says and writes: a line a cell, `study.json`, and tables for other programs.
+
+use std::collections::BTreeMap;
+
+use super::document::{Block, Table};
+use super::json::{object, to_text};
+use super::quantity::{number, or_dash, quoted};
+use super::render::text;
+use crate::monte_carlo::{Campaign, CellResult, ParameterResult, Results, Source, Tally};
+
+/// First columns of every table.
+const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
+
+object! {
+    Document<'a>(campaign: &'a Campaign, results: &'a Results) {
+        study: &'a str = &campaign.name,
+        problem: &'a str = &campaign.problem.name,
+        data: &'a str = campaign.source.as_str(),
+        seed: u64 = campaign.seed,
+        repetitions: usize = campaign.repetitions,
+        held_out_poses: usize = campaign.held_out,
+        cells: Vec<Cell<'a>> = results.cells.iter().map(|cell| Cell::of(campaign, cell)).collect(),
+    }
+}
+object! {
+    Cell<'a>(campaign: &'a Campaign, result: &'a CellResult) {
+        position_sigma_mm: f64 = millimetres(result.cell.sigma),
+        identification_poses: usize = result.cell.poses,
+        strategy: &'a str = result.cell.strategy.as_str(),
+        solver: &'a str = result.cell.solver.as_str(),
+        fits: u64 = result.tally.fits,
+        failed: u64 = result.tally.failed(),
+        failure_rate: f64 = result.failure_rate(),
+        /// Fits that are not to be trusted, by reason.
+        failures: &'a BTreeMap<String, u64> = &result.tally.failures,
+        held_out_mm: HeldOut = HeldOut::of(&result.tally),
+        reduced_chi2: Option<f64> = result.tally.reduced_chi2.mean(),
+        coverage: Option<f64> = result.coverage(),
+        largest_bias: Option<LargestBias<'a>> =
+            result.largest_bias(campaign).map(|(parameter, bias)| LargestBias::of(&parameter.name, bias)),
+        iterations_mean: Option<f64> = result.tally.iterations.mean(),
+        iterations_max: Option<f64> = result.tally.iterations.largest(),
+        parameters: Vec<Parameter<'a>> = result.parameters(campaign).map(|own| Parameter::of(&own)).collect(),
+    }
+}
+object! {
+    /// Position errors of held-out poses; mean and rms over fits and poses, the others of the rms of each fit.
+    HeldOut(tally: &Tally) {
+        mean: Option<f64> = in_mm(tally.held_out_mean.mean()),
+        rms: Option<f64> = in_mm(tally.held_out_rms.rms()),
+        rms_sd: Option<f64> = in_mm(tally.held_out_rms.deviation()),
+        rms_max: Option<f64> = in_mm(tally.held_out_rms.largest()),
+    }
+}
+object! {
+    /// Bias over spread.
+    LargestBias<'a>(name: &'a str, bias: f64) {
+        parameter: &'a str = name,
+        bias_sd: f64 = bias,
+    }
+}
+object! {
+    Parameter<'a>(own: &ParameterResult<'a>) {
+        name: &'a str = &own.parameter.name,
+        unit: &'a str = own.unit(),
+        fits: u64 = own.fits,
+        bias: Option<f64> = own.bias,
+        spread: Option<f64> = own.spread,
+        rms_error: Option<f64> = own.rms_error,
+        with_std_error: u64 = own.with_std_error,
+        std_error: Option<f64> = own.std_error,
+        coverage: Option<f64> = own.coverage,
+    }
+}
+
+fn in_mm(metres: Option<f64>) -> Option<f64> {
+    metres.map(|value| value * 1e3)
+}
+
+/// A noise level as it was written: 0.1 mm are not 0.10000000000000001 mm.
+fn millimetres(metres: f64) -> f64 {
+    (metres * 1e15).round() / 1e12
+}
+
+/// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and without times.
+pub fn study_json(campaign: &Campaign, results: &Results) -> String {
+    to_text(&Document::of(campaign, results))
+}
+
+/// A study as text, ending in a line break.
+pub fn study_text(campaign: &Campaign, results: &Results) -> String {
+    let by = match campaign.source {
+        Source::Model => "the model itself",
+        Source::Rig => "the virtual test rig",
+    };
+    let head = format!(
+        "{}\n{} cells of {} fits, {} parameters, measured by {by}; {} poses held out in each",
+        campaign.title,
+        campaign.cells.len(),
+        campaign.repetitions,
+        campaign.parameters.len(),
+        campaign.held_out
+    );
+    let header = [
+        "noise mm",
+        "poses",
+        "strategy",
+        "solver",
+        "failed",
+        "held out mean",
+        "rms, mm",
+        "± sd",
+        "covered",
+        "largest bias",
+        "of",
+        "steps",
+        "ms",
+    ];
+    let rows = results.cells.iter().map(|cell| line(campaign, cell)).collect();
+    let table = Table::new(&header, rows, &[2, 3, 10]).noted(&[
+        "held out: measured − predicted, noise included; covered: by ± 1.96 standard errors, 95 % if those are right;",
+        "largest bias: of all parameters, over its spread; ms: middle fit",
+    ]);
+    text(&[Block::lines(head), Block::Table(table)])
+}
+
+fn line(campaign: &Campaign, result: &CellResult) -> Vec<String> {
+    let CellResult { cell, tally, .. } = result;
+    let shown = |value: Option<f64>, decimals| or_dash(value, |value| number(value, decimals));
+    let length = |metres: Option<f64>| shown(in_mm(metres), 4);
+    let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.1} %", 100.0 * share));
+    let bias = result.largest_bias(campaign);
+    vec![
+        millimetres(cell.sigma).to_string(),
+        cell.poses.to_string(),
+        cell.strategy.as_str().to_owned(),
+        cell.solver.as_str().to_owned(),
+        percent(Some(result.failure_rate())),
+        length(tally.held_out_mean.mean()),
+        length(tally.held_out_rms.rms()),
+        length(tally.held_out_rms.deviation()),
+        percent(result.coverage()),
+        shown(bias.map(|(_, ratio)| ratio), 2),
+        or_dash(bias, |(parameter, _)| parameter.name.clone()),
+        shown(tally.iterations.mean(), 1),
+        number(result.timing().median * 1e3, 1),
+    ]
+}
+
+/// `study.csv`: one line a cell.
+pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
+    let header = "fits,failed,failure_rate,held_out_mean_mm,held_out_rms_mm,held_out_rms_sd_mm,held_out_rms_max_mm,\
+                  reduced_chi2,coverage,largest_bias_sd,largest_bias_of,iterations_mean,iterations_max";
+    let line = |(index, cell): (usize, &CellResult)| {
+        let tally = &cell.tally;
+        let bias = cell.largest_bias(campaign);
+        let length = |metres: Option<f64>| plain(in_mm(metres));
+        let cells = [
+            leading(index, cell),
+            tally.fits.to_string(),
+            tally.failed().to_string(),
+            cell.failure_rate().to_string(),
+            length(tally.held_out_mean.mean()),
+            length(tally.held_out_rms.rms()),
+            length(tally.held_out_rms.deviation()),
+            length(tally.held_out_rms.largest()),
+            plain(tally.reduced_chi2.mean()),
+            plain(cell.coverage()),
+            plain(bias.map(|(_, ratio)| ratio)),
+            bias.map(|(parameter, _)| quoted(&parameter.name)).unwrap_or_default(),
+            plain(tally.iterations.mean()),
+            plain(tally.iterations.largest()),
+        ];
+        cells.join(",")
+    };
+    csv(header, results.cells.iter().enumerate().map(line))
+}
+
+/// `parameters.csv`: one line a cell and parameter; relative: of ln(value).
+pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
+    let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
+    let lines = results.cells.iter().enumerate().flat_map(|(index, cell)| {
+        cell.parameters(campaign).map(move |result| {
+            let cells = [
+                leading(index, cell),
+                quoted(&result.parameter.name),
+                result.unit().to_owned(),
+                result.fits.to_string(),
+                plain(result.bias),
+                plain(result.spread),
+                plain(result.rms_error),
+                result.with_std_error.to_string(),
+                plain(result.std_error),
+                plain(result.coverage),
+            ];
+            cells.join(",")
+        })
+    });
+    csv(header, lines)
+}
+
+/// `timing.csv`: one line a cell; the only result that differs from run to run.
+pub fn study_timing_csv(results: &Results) -> String {
+    let line = |(index, cell): (usize, &CellResult)| {
+        let timing = cell.timing();
+        let milliseconds = [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
+        format!("{},{},{},{:.3}", leading(index, cell), cell.seconds.len(), milliseconds.join(","), timing.total)
+    };
+    csv("fits,median_ms,slowest_ms,total_s", results.cells.iter().enumerate().map(line))
+}
+
+/// Which cell, counted from 1.
+fn leading(index: usize, result: &CellResult) -> String {
+    let cell = &result.cell;
+    let (strategy, solver) = (cell.strategy.as_str(), cell.solver.as_str());
+    format!("{},{},{},{strategy},{solver}", index + 1, millimetres(cell.sigma), cell.poses)
+}
+
+/// The shortest text that is read back as the same number; empty where there is none.
+fn plain(value: Option<f64>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
+}
+
+fn csv(header: &str, lines: impl Iterator<Item = String>) -> String {
+    std::iter::once(format!("{CELL},{header}")).chain(lines).flat_map(|line| [line, "\n".to_owned()]).collect()
+}

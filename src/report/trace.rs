@@ -1,0 +1,204 @@
+//! What `trace` says and writes: what the residual of a fit points to.
+
+use std::fmt::Write as _;
+
+use super::document::{Block, Point, some_of};
+use super::errors::counted;
+use super::json::{Both, object, to_text};
+use super::quantity::{mm, number, p_value};
+use super::render::text;
+use super::{effect, findings};
+use crate::diagnose::{Ranked, TellingPose, Trace};
+use crate::identify::Identification;
+use crate::problem::{Effect, JointKind, Problem};
+
+/// Candidates that fit on a screen.
+const SHOWN: usize = 6;
+/// Effects alike that are named.
+const SHOWN_ALIKE: usize = 3;
+
+object! {
+    Document<'a>(problem: &'a Problem, trace: &'a Trace, untestable: &'a [(Effect, &'static str)], absorbed: &'a [(Effect, ())]) {
+        problem: &'a str = &problem.name,
+        trusted: bool = trace.fit.is_trusted(),
+        #[serde(flatten)]
+        fitted: Both = Both::of(&trace.fit.fitted),
+        reduced_chi2: Option<f64> = trace.fit.reduced_chi2,
+        /// Whether the tests see structure that an effect could explain.
+        structured: bool = trace.findings.is_structured(),
+        checks: Vec<findings::Entry> = findings::entries(&trace.findings),
+        /// Candidates tried, orders and times counted.
+        tried: usize = trace.tried,
+        /// The p below which a candidate stands out.
+        level: f64 = trace.level,
+        ranking: Vec<RankedEntry<'a>> = trace.ranking.iter().map(|ranked| RankedEntry::of(ranked, trace)).collect(),
+        untestable: Vec<effect::Untestable<'a>> = untestable.iter().map(effect::Untestable::of).collect(),
+        absorbed: Vec<effect::Entry<'a>> = absorbed.iter().map(|(effect, ())| effect::Entry(effect)).collect(),
+    }
+}
+object! {
+    RankedEntry<'a>(ranked: &'a Ranked, trace: &Trace) {
+        #[serde(flatten)]
+        effect: effect::Entry<'a> = effect::Entry(&ranked.effect),
+        description: String = trace.describe(&ranked.effect),
+        p_value: f64 = ranked.p_value,
+        f: f64 = ranked.f.0,
+        freedom: usize = ranked.f.1,
+        /// Expected reduction of the root mean squared error on the identification poses.
+        expected_gain_mm: f64 = ranked.gain * 1e3,
+        /// The same on poses left out in turn.
+        cross_validated_gain_mm: Option<f64> = ranked.cross_validated.map(|gain| gain * 1e3),
+        alike: Vec<AlikeEntry<'a>> = ranked.alike.iter().map(AlikeEntry::of).collect(),
+        /// A pose that would tell it from the first of those.
+        told_apart: Option<ApartEntry<'a>> = ranked.telling_pose.as_ref().map(ApartEntry::of),
+    }
+}
+object! {
+    ApartEntry<'a>(apart: &'a TellingPose) {
+        from: effect::Entry<'a> = effect::Entry(&apart.other),
+        /// Configuration [rad] or [m].
+        q: &'a [f64] = &apart.configuration,
+        payload_kg: Option<f64> = apart.payload,
+        #[serde(rename = "hoist_N")]
+        hoist: Option<f64> = apart.hoist,
+        #[serde(rename = "temperature_C")]
+        temperature: Option<f64> = apart.temperature,
+        difference_mm: f64 = apart.difference * 1e3,
+    }
+}
+object! {
+    AlikeEntry<'a>(alike: &'a (Effect, f64)) {
+        #[serde(flatten)]
+        effect: effect::Entry<'a> = effect::Entry(&alike.0),
+        /// 0: the same on these poses; 90: nothing in common.
+        angle_deg: f64 = alike.1.to_degrees(),
+    }
+}
+
+/// A trace as JSON text, ending in a line break; SI units except where a key says otherwise.
+pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
+    let untestable = effect::joined(trace.untestable.iter().cloned());
+    let absorbed = effect::joined(trace.absorbed.iter().cloned().map(|effect| (effect, ())));
+    to_text(&Document::of(problem, trace, &untestable, &absorbed))
+}
+
+/// A trace as text, ending in a line break.
+pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
+    let mut blocks = vec![
+        Block::Text(headline(problem, &trace.fit)),
+        Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
+        Block::List(findings::all(&trace.findings)),
+    ];
+    blocks.extend(findings::another_size(&trace.findings, trace.fit.reduced_chi2).map(Block::Text));
+    blocks.extend(ranking(problem, trace, SHOWN, "trace.json holds them all"));
+    blocks.extend(not_seen(trace));
+    text(&blocks)
+}
+
+fn headline(problem: &Problem, fit: &Identification) -> String {
+    let (fitted, held_out) = (&fit.fitted.identification, &fit.fitted.held_out);
+    let size =
+        fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", number(chi2, 2)));
+    let error = match held_out.unpredicted {
+        0 => format!(
+            "on {} held-out poses the error is {} mm in the mean, rms {} mm",
+            held_out.n,
+            mm(held_out.mean.norm, 4),
+            mm(held_out.rms.norm, 4),
+        ),
+        _ => counted(held_out, "held-out"),
+    };
+    format!("{}\n{} parameters from {} poses{size}; {error}", problem.title, fit.unknowns.len(), fitted.n)
+}
+
+/// The candidates that stand out, at most so many of them, how to read them, and `where_all` are.
+pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_all: &str) -> Vec<Block<'a>> {
+    let all: Vec<&Ranked> = trace.ranking.iter().filter(|ranked| ranked.p_value < trace.level).collect();
+    let Some(first) = trace.ranking.first() else {
+        return vec![Block::heading("What could explain it"), Block::Text("There is no candidate to try.".to_owned())];
+    };
+    if all.is_empty() {
+        return vec![
+            Block::heading("What could explain it"),
+            Block::Text(format!(
+                "None of {} candidates stands out. The best, {}, does no better than chance would (p {}, corrected for the \
+                 number of candidates; below {} would stand out).",
+                trace.tried,
+                effect::both(&first.effect, trace),
+                p_value(first.p_value),
+                trace.level,
+            )),
+        ];
+    }
+    let shown = all.iter().take(most).map(|ranked| point(problem, trace, ranked)).collect();
+    let mut notes = format!(
+        "{} candidates were tried one by one; p is the probability that chance alone does as well, corrected for their \
+         number, and below {} it stands out. One cause makes its neighbours stand out, too: the first is the best \
+         explanation, not every entry a finding.",
+        trace.tried, trace.level
+    );
+    if all.len() > most {
+        let _ = write!(notes, " {} more that stand out are left out here; {where_all}.", all.len() - most);
+    }
+    if all.iter().take(most).any(|ranked| !ranked.alike.is_empty()) {
+        notes.push_str(
+            " The angle between two effects says how alike they are on these poses once all parameters have been fitted: \
+             at 0° nothing tells them apart, at 90° they have nothing in common. A pose where they would differ is one \
+             within the ranges that were measured.",
+        );
+    }
+    vec![Block::heading("What could explain it, best first"), Block::Ranking(shown), Block::Text(notes)]
+}
+
+fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
+    let mut gain = format!(
+        "p {}; would take {} mm off the rms error of the identification poses",
+        p_value(ranked.p_value),
+        mm(ranked.gain, 4)
+    );
+    if let Some(cross_validated) = ranked.cross_validated {
+        let _ = write!(gain, ", {} mm on poses left out in turn", mm(cross_validated, 4));
+    }
+    let mut details = vec![gain];
+    if !ranked.alike.is_empty() {
+        let named = |(other, angle): &(Effect, f64)| format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees());
+        let (named, more) = some_of(ranked.alike.iter().map(named), SHOWN_ALIKE);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        details.push(format!("hard to tell from: {}{more}", named.join("; ")));
+    }
+    if let Some(apart) = &ranked.telling_pose {
+        let other = trace.describe(&apart.other);
+        details.push(format!("“{other}” would differ by {} mm at {}", mm(apart.difference, 4), pose(problem, apart)));
+    }
+    Point { text: effect::both(&ranked.effect, trace), details, mark: None }
+}
+
+/// A pose in words: joints, payload, hoist, temperature.
+fn pose(problem: &Problem, apart: &TellingPose) -> String {
+    let joints = problem.joints.iter().zip(&apart.configuration).enumerate();
+    let mut words: Vec<String> = joints
+        .filter_map(|(index, (joint, q))| match joint.kind {
+            JointKind::Revolute => Some(format!("q{} {}°", index + 1, number(q.to_degrees(), 1))),
+            JointKind::Prismatic => Some(format!("q{} {} mm", index + 1, mm(*q, 1))),
+            JointKind::Fixed => None,
+        })
+        .collect();
+    words.extend(apart.payload.map(|mass| format!("payload {} kg", number(mass, 2))));
+    words.extend(apart.hoist.map(|force| format!("hoist {} N", number(force, 1))));
+    words.extend(apart.temperature.map(|degrees| format!("{} °C", number(degrees, 1))));
+    words.join(", ")
+}
+
+/// What these data can say nothing about.
+pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
+    let mut blocks = Vec::new();
+    if !trace.untestable.is_empty() {
+        blocks.push(Block::heading("What these data cannot show"));
+        blocks.push(Block::List(effect::reasons(trace.untestable.iter().cloned())));
+    }
+    if !trace.absorbed.is_empty() {
+        blocks.push(Block::heading("What the fitted parameters take up wholly, so that it would not show"));
+        blocks.push(Block::list(effect::listed(&trace.absorbed)));
+    }
+    blocks
+}
