@@ -279,9 +279,8 @@ fn table_3(joint: &Identification, rigid: &Identification, beside_the_paper: boo
             body.push(row);
         }
     }
-    match beside_the_paper {
-        true => Table::new(&TABLE_3, body, &[0, 1])
-            .noted(&["paper: published in [Chen2021, table 3], measured on another arm"]),
-        false => Table::new(&TABLE_3[..5], body, &[0, 1]),
+    if !beside_the_paper {
+        return Table::new(&TABLE_3[..5], body, &[0, 1]);
     }
+    Table::new(&TABLE_3, body, &[0, 1]).noted(&["paper: published in [Chen2021, table 3], measured on another arm"])
 }

@@ -1,5 +1,7 @@
 //! What `compensate` says and writes: commands as a table to run, and what they come to.
 
+use std::fmt::Write as _;
+
 use super::document::Block;
 use super::json::{object, to_text};
 use super::quantity::{fixed, mm, quoted};
@@ -42,7 +44,8 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
     let document = document(problem, commands);
     let mut words = format!("{}\n{} of {} targets can be reached", problem.title, document.reached, document.targets);
     if let (Some(after), Some(before)) = (document.mean_miss_mm, document.mean_miss_before_mm) {
-        words += &format!(
+        let _ = write!(
+            words,
             ": {after:.4} mm from them on average with these commands, {before:.4} mm with those in the file,\n\
              as the identified arm predicts"
         );

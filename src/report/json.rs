@@ -14,6 +14,7 @@ macro_rules! object {
     }) => {
         $(#[$meta])*
         #[derive(Debug, serde::Serialize)]
+        #[allow(clippy::struct_field_names, reason = "keys of the file")]
         pub(in crate::report) struct $name $(<$a>)? { $($(#[$attribute])* $key: $type,)* }
 
         impl $(<$a>)? $name $(<$a>)? {

@@ -26,6 +26,9 @@ const SHOWN: usize = 12;
 /// Columns of the table of parameters.
 const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
 
+/// A row of the table with its bar.
+type Line = (Vec<String>, Bar);
+
 /// Joint, from 1, and order of every coefficient of a harmonic that `problem` declares, by the parameter's name.
 fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
     let of = |driver: &Driver| match *driver {
@@ -61,7 +64,7 @@ fn highest(estimates: &[Estimate], harmonics: &BTreeMap<String, (usize, u32)>) -
 pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &str) -> Vec<Block<'a>> {
     let harmonics = harmonics(problem);
     let high = highest(&found.estimates, &harmonics);
-    let (mut shown, mut lower): (Vec<(Vec<String>, Bar)>, Vec<(Vec<String>, Bar)>) = Default::default();
+    let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
         let wave = harmonics.get(&estimate.name).and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
         let own = (row(estimate), bar(estimate));
@@ -77,7 +80,7 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
             shown.push((cells, Bar::default()));
         }
     }
-    let table = |rows: Vec<(Vec<String>, Bar)>| {
+    let table = |rows: Vec<Line>| {
         let (rows, bars) = rows.into_iter().unzip();
         Table { minor: vec![1, 3, 6], bars: Some(("change / σ", bars)), ..Table::new(&HEADER, rows, &[0, 5, 6]) }
     };
@@ -237,4 +240,36 @@ pub(super) fn conditioning<'a>(found: &Identifiability, unknowns: usize, coordin
         found.rank,
         found.condition_number(),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(name: &str, value: f64) -> Estimate {
+        Estimate {
+            name: name.to_owned(),
+            unit: Unit::Angle,
+            nominal: 0.0,
+            estimate: value,
+            std_error: None,
+            identified: 1.0,
+            at_bound: None,
+            fitted: true,
+        }
+    }
+
+    #[test]
+    fn the_highest_of_many_waves_are_shown() {
+        let waves = [(1, 4_u32), (2, 10)].into_iter().flat_map(|(joint, orders)| {
+            (1..=orders)
+                .flat_map(move |order| ["sin", "cos"].map(|part| (format!("{joint}.{part}{order}"), (joint, order))))
+        });
+        let harmonics: BTreeMap<String, (usize, u32)> = waves.collect();
+        let mut estimates = vec![estimate("tool.x", 1.0)];
+        estimates.extend(harmonics.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))));
+        // Of joint 1 all are shown.
+        let expected = BTreeMap::from([(2, (vec![10, 9, 8, 7], 6))]);
+        assert_eq!(highest(&estimates, &harmonics), expected);
+    }
 }

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::style;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
-use crate::report::figures::Drawing;
+use crate::report::figures::{Drawing, Figure};
 
 /// Half the width of a bar in standard errors: wider changes run off it.
 const REACH: f64 = 10.0;
@@ -94,7 +94,7 @@ fn one(block: &Block, figures: &mut Vec<Drawing>) -> Markup {
             Block::Ranking(points) => ol { @for point in points { (item(point)) } },
             Block::Table(own) => (table(own)),
             Block::Headline(own) => (headline(own)),
-            Block::Figures(own) => (grid(own.iter().filter_map(|figure| figure.draw()).collect(), figures)),
+            Block::Figures(own) => (grid(own.iter().filter_map(Figure::draw).collect(), figures)),
             Block::Folded(title, inner, on_paper) => {
                 details { summary { (words(title)) } @for block in inner { (one(block, figures)) } }
                 p.folded { (words(on_paper)) }

@@ -19,7 +19,7 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                 if !points.is_empty() {
                     text.push('\n');
                 }
-                points.iter().for_each(|words| point(&mut text, "- ", &Point::from(words.clone())));
+                text.extend(points.iter().map(|words| format!("- {}\n", escaped(words))));
             }
             Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own)),
             Block::Ranking(points) => {
