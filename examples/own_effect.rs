@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let before = identify(&problem, &data, &options)?;
     let after = identify_model(&model, &problem, &data, &options)?;
-    let own = after.estimates.iter().find(|estimate| estimate.name == "joint-belt[2].slack").ok_or("not fitted")?;
+    let own = after.estimate("joint-belt[2].slack").ok_or("not fitted")?;
     let rms = |poses: f64| poses * 1e3;
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]
     {

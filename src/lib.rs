@@ -35,7 +35,7 @@
 //!
 //! // Fit what is free. Held-out poses only judge.
 //! let found = identify(&problem, &data, &Options::default())?;
-//! let stiffness = found.estimates.iter().find(|estimate| estimate.name == "joint2.stiffness");
+//! let stiffness = found.estimate("joint2.stiffness");
 //! assert!(stiffness.is_some_and(|estimate| estimate.std_error.is_some()));
 //!
 //! // The residual is larger than noise: find what the model lacks.

@@ -24,7 +24,7 @@ fn parallel(free: &str) -> Problem {
 }
 
 fn estimate<'a>(found: &'a Identification, name: &str) -> &'a Estimate {
-    found.estimates.iter().find(|estimate| estimate.name == name).unwrap()
+    found.estimate(name).unwrap()
 }
 
 /// Ninety noisy poses of the arm with these deviations, sixty of them to identify.

@@ -36,7 +36,7 @@ fn identified(more: &str) -> Identification {
 }
 
 fn estimate<'a>(result: &'a Identification, name: &str) -> &'a Estimate {
-    result.estimates.iter().find(|estimate| estimate.name == name).unwrap()
+    result.estimate(name).unwrap()
 }
 
 fn constraint(terms: &str, limits: &str) -> String {

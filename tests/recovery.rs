@@ -216,7 +216,7 @@ fn a_session_held_out_is_fitted_on_its_own_rows_alone() {
     for (k, parameter) in parameters.iter().enumerate() {
         let same = with_other.x[k].to_bits() == found.x[k].to_bits();
         assert_eq!(same, !placed.contains(&k), "{} {:e} {:e}", parameter.name, with_other.x[k], found.x[k]);
-        let Some(estimate) = alone.estimates.iter().find(|estimate| estimate.name == parameter.name) else {
+        let Some(estimate) = alone.estimate(&parameter.name) else {
             continue;
         };
         assert_eq!(*estimate, found.estimates[k]);

@@ -117,9 +117,9 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     close(&fitted, &found.fitted.identification);
     // Strong correlations are those of the estimate.
     let name = |name: &String| shown.correlations.names.iter().position(|own| own == name).unwrap();
-    for (a, b, rho) in &found.correlations {
-        let shown = shown.correlations.matrix[(name(a), name(b))];
-        assert!((shown - rho).abs() < 0.02, "{a} {b}: {shown} {rho}");
+    for (a, b, rho) in found.strong_correlations() {
+        let shown = shown.correlations.matrix[(name(&a), name(&b))];
+        assert_eq!(shown.to_bits(), rho.to_bits(), "{a} {b}: {shown} {rho}");
     }
     let page = report::identification_page(&problem, &found, &shown);
     check(&page);

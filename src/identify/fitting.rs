@@ -9,8 +9,8 @@ use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strateg
 use crate::least_squares::Loss;
 use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::measurement::{Measurements, Split};
+use crate::model::Model;
 use crate::model::parameter::Parameter;
-use crate::model::{Model, PoseResiduals};
 
 /// Sweeps after which a sequential strategy is given up.
 const MAX_SWEEPS: usize = 2000;
@@ -193,7 +193,6 @@ impl<'a> Fitting<'a> {
 
     /// Residuals measured − predicted of some rows, measuring frame [m].
     pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
-        let poses = self.placement.poses(self.measurements, rows, self.sigma);
-        PoseResiduals::new(self.model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
+        self.placement.position_errors(self.model, x, self.measurements, rows)
     }
 }

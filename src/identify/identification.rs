@@ -5,6 +5,7 @@ use std::time::Instant;
 use nalgebra::DVector;
 
 use super::active::ActiveConstraint;
+use super::covariance::Collected;
 use super::fitting::{FitEnd, Fitting};
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
@@ -83,8 +84,9 @@ impl Options {
     }
 }
 
-/// Why an identification could not be made.
+/// Why an identification could not be made, or not be applied.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// There is no row to identify from.
     #[error("no pose to identify from")]
@@ -109,6 +111,12 @@ pub enum IdentifyError {
     NothingToFit {
         /// The strategy that was asked for.
         strategy: &'static str,
+    },
+    /// A parameter is needed that was not identified.
+    #[error("{name} was not identified: the sessions, targets or effects are others")]
+    NoEstimate {
+        /// Its name.
+        name: String,
     },
 }
 
@@ -190,7 +198,8 @@ pub fn identify_model(
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
-    enter(&mut estimates, &fitting.whole(), &end, &statistics);
+    let mut covariance = Collected::new(estimates.len());
+    enter((&mut estimates, &mut covariance), &fitting.whole(), &end, &statistics);
     let numbers = measurements.pose_numbers(problem);
     let poses = different(&numbers, split.identification.iter().copied());
     let mut distrust = (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination));
@@ -200,7 +209,8 @@ pub fn identify_model(
         end.evaluations += late.evaluations;
         distrust = distrust
             .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
-        enter(&mut estimates, &stage, &late, &Statistics::of(&stage, &late, noise_is_declared)?);
+        let statistics = Statistics::of(&stage, &late, noise_is_declared)?;
+        enter((&mut estimates, &mut covariance), &stage, &late, &statistics);
         end.x = late.x;
     }
     if noise == Noise::Unknown {
@@ -219,7 +229,6 @@ pub fn identify_model(
         .or(misses)
         .or(distrust)
         .or_else(|| beyond_prior(model, &end.x));
-    let name = |j: usize| unknowns[j].name.clone();
     Ok(Identification {
         distrust,
         too_few_poses: (3 * poses < parameters).then_some(TooFewPoses { poses, parameters }),
@@ -237,11 +246,13 @@ pub fn identify_model(
         coordinates: 3 * split.identification.len(),
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
-        correlations: statistics.correlations.iter().map(|&(i, j, rho)| (name(i), name(j), rho)).collect(),
+        covariance: covariance.finish(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
         active_constraints: ActiveConstraint::all(&statistics.constraints, model),
         outliers,
         x: end.x,
+        registered_x: start,
+        sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
@@ -11,6 +12,9 @@ use crate::least_squares::solver::{AtBound, Termination};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
+/// Correlations beyond this are reported: of sum and difference of the two, one has less than a nineteenth of the other's
+/// variance.
+pub const STRONG_CORRELATION: f64 = 0.9;
 /// A parameter of which the data gave no more than this part has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;
 
@@ -58,6 +62,7 @@ pub struct Estimate {
 
 /// An identified arm.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Identification {
     /// Which parameters were fitted together.
     pub strategy: Strategy,
@@ -96,20 +101,47 @@ pub struct Identification {
     pub identifiability: Identifiability,
     /// Every free parameter.
     pub estimates: Vec<Estimate>,
-    /// Pairs of parameters correlated by more than 0.9, strongest first.
-    pub correlations: Vec<(String, String, f64)>,
+    /// Covariance of the estimates.
+    pub covariance: Covariance,
     /// Constraints that hold the fitted parameters back, in the order of the file.
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,
+    /// The same of the nominal arm with base and target fitted where they are free, whose errors are `registered`.
+    pub registered_x: DVector<f64>,
+    /// 1 σ of a coordinate in rows without one of their own, declared or estimated [m].
+    pub sigma: f64,
 }
 
 impl Identification {
     /// Whether the fit is to be trusted.
     pub fn is_trusted(&self) -> bool {
         self.distrust.is_none()
+    }
+
+    /// A parameter by its name: `joint2.stiffness`.
+    pub fn estimate(&self, name: &str) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.name == name)
+    }
+
+    /// Pairs of [`correlations`](Self::correlations) beyond [`STRONG_CORRELATION`], strongest first.
+    pub fn strong_correlations(&self) -> Vec<(String, String, f64)> {
+        let all = self.correlations();
+        all.above(STRONG_CORRELATION).into_iter().map(|(a, b, rho)| (a.to_owned(), b.to_owned(), rho)).collect()
+    }
+
+    /// Correlations of the parameters that were fitted together.
+    pub fn correlations(&self) -> Correlations {
+        let name = |k: usize| &self.estimates[k].name;
+        let Covariance { parameters, .. } = &self.covariance;
+        let together: Vec<usize> =
+            (0..parameters.len()).filter(|&i| self.unknowns.contains(name(parameters[i]))).collect();
+        Correlations {
+            names: together.iter().map(|&i| name(parameters[i]).clone()).collect(),
+            matrix: self.covariance.correlation().select_rows(&together).select_columns(&together),
+        }
     }
 }
 
@@ -130,7 +162,13 @@ impl Estimate {
 }
 
 /// Enters what a stage found into the estimates of its unknowns.
-pub(super) fn enter(estimates: &mut [Estimate], stage: &Stage, end: &FitEnd, statistics: &Statistics) {
+pub(super) fn enter(
+    (estimates, covariance): (&mut [Estimate], &mut Collected),
+    stage: &Stage,
+    end: &FitEnd,
+    statistics: &Statistics,
+) {
+    covariance.enter(stage.model, &stage.unknowns, end.x.as_slice(), &statistics.covariance);
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
         let learned = statistics.known[j] && statistics.identified[j] > NOTHING_LEARNED;

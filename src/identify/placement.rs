@@ -1,8 +1,10 @@
 //! Which base and which target each row uses, and which of them appear in held-out rows only.
 
+use nalgebra::{DVector, Vector3};
+
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
-use crate::model::{Model, Pose};
+use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 use crate::problem::Problem;
 
@@ -72,6 +74,19 @@ impl Placement {
                 sigma: at(&measurements.sigma, row).unwrap_or(sigma),
             })
             .collect()
+    }
+
+    /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`, measuring frame [m]; NaN
+    /// where it has no equilibrium.
+    pub fn position_errors(
+        &self,
+        model: &Model,
+        x: &DVector<f64>,
+        measurements: &Measurements,
+        rows: &[usize],
+    ) -> Vec<Vector3<f64>> {
+        let poses = self.poses(measurements, rows, 1.0);
+        PoseResiduals::new(model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }
 
     /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.

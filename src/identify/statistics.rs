@@ -1,5 +1,6 @@
 //! What the residual of a fit says about its unknowns.
 
+use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::active::{Held, confine};
@@ -12,8 +13,6 @@ use crate::least_squares::{Identifiability, Loss, Uncertainty};
 const IMPROBABLE: f64 = 1e-3;
 /// A part this large in blind combinations leaves an unknown without an error of its own.
 const PARTLY_BLIND: f64 = 1e-3;
-/// Correlations beyond this are reported.
-const STRONG: f64 = 0.9;
 
 /// Errors and correlations of the unknowns of a fit.
 #[derive(Debug, Clone)]
@@ -24,8 +23,8 @@ pub(super) struct Statistics {
     pub known: Vec<bool>,
     /// Part of each unknown that the data gave, 0…1.
     pub identified: Vec<f64>,
-    /// Pairs of unknowns correlated by more than 0.9, strongest first.
-    pub correlations: Vec<(usize, usize, f64)>,
+    /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 where one is held.
+    pub covariance: DMatrix<f64>,
     /// χ² over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
     pub reduced_chi2: Option<f64>,
     /// By how much the assumed variance was raised, ≥ 1.
@@ -85,7 +84,7 @@ impl Statistics {
         let known =
             (0..errors.len()).map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND).collect();
         Ok(Self {
-            correlations: uncertainty.correlations_above(STRONG),
+            covariance: uncertainty.covariance,
             errors,
             known,
             identified,

@@ -61,20 +61,6 @@ impl Uncertainty {
     pub fn standard_errors(&self) -> Vec<f64> {
         self.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
     }
-
-    /// Pairs of unknowns correlated by more than `least` in absolute value, strongest first.
-    pub fn correlations_above(&self, least: f64) -> Vec<(usize, usize, f64)> {
-        let error = self.standard_errors();
-        let n = error.len();
-        let mut pairs: Vec<(usize, usize, f64)> = (0..n)
-            .flat_map(|i| (i + 1..n).map(move |j| (i, j)))
-            .filter(|&(i, j)| error[i] > 0.0 && error[j] > 0.0)
-            .map(|(i, j)| (i, j, (self.covariance[(i, j)] / (error[i] * error[j])).clamp(-1.0, 1.0)))
-            .filter(|&(_, _, rho)| rho.abs() > least)
-            .collect();
-        pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()).then((a.0, a.1).cmp(&(b.0, b.1))));
-        pairs
-    }
 }
 
 /// (`AᵀA`)⁺ through the singular values of A with its columns scaled to unit norm.

@@ -96,6 +96,13 @@ impl Dataset {
             held_out: Vec::new(),
         }
     }
+
+    /// Poses to predict: as [`builder`](Self::builder), with all positions 0.
+    pub fn poses<C: AsRef<[f64]>>(configurations: impl IntoIterator<Item = C>) -> DatasetBuilder {
+        let configurations = rows_of(configurations);
+        let positions = vec![Vector3::zeros(); configurations.len()];
+        Self::builder(configurations, positions)
+    }
 }
 
 impl DatasetBuilder {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::plan::{Campaign, Cell, Source};
 use crate::identify::Placement;
 use crate::measurement::{Dataset, Labels, Measurements, Split};
-use crate::model::{Model, PoseResiduals};
+use crate::model::Model;
 use crate::problem::Problem;
 use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
 
@@ -62,9 +62,7 @@ fn by_model(mut arm: Problem, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     let mut table = table(rows);
     table.positions.fill(Vector3::zeros());
     let all: Vec<usize> = (0..rows.len()).collect();
-    let poses = Placement::of(&table).poses(&table, &all, 1.0);
-    let none = DVector::zeros(0);
-    let errors = PoseResiduals::new(&model, poses, Vec::new(), none.clone()).position_errors(&none);
+    let errors = Placement::of(&table).position_errors(&model, &DVector::zeros(0), &table, &all);
     errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
 }
 

@@ -1,5 +1,7 @@
 //! What `identify` says and writes: `estimate.json`, its text, and the report on one fit.
 
+use serde_json::value::{RawValue, to_raw_value};
+
 use super::document::{Block, Headline, Table, some_of};
 use super::errors::{NOMINAL, row, unpredicted};
 use super::figures::{Figure, PlotData};
@@ -42,7 +44,8 @@ object! {
         conditioning: Conditioning<'a> = Conditioning::of(&found.identifiability, found.coordinates),
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         unidentified: Vec<Unidentified<'a>> = unidentified(&found.identifiability, |k| found.unknowns[k].as_str()),
-        correlations: Vec<Correlation<'a>> = found.correlations.iter().map(Correlation::of).collect(),
+        covariance: Vec<Box<RawValue>> = covariance(found),
+        correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
         active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
         outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
     }
@@ -60,8 +63,8 @@ object! {
     }
 }
 object! {
-    Correlation<'a>(pair: &'a (String, String, f64)) {
-        parameters: [&'a str; 2] = [&pair.0, &pair.1],
+    Correlation(pair: (String, String, f64)) {
+        parameters: [String; 2] = [pair.0, pair.1],
         correlation: f64 = pair.2,
     }
 }
@@ -229,6 +232,15 @@ pub(super) fn remainder<'a>(
     blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&found.identifiability)]));
     blocks.extend(told(found, file));
     blocks
+}
+
+/// Rows of the covariance in the order of the parameters, a row a line: entry (k, k) is the square of the standard error; null
+/// where one of the two parameters has none.
+fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
+    let n = found.estimates.len();
+    let has_error = |k: usize| found.estimates[k].std_error.is_some();
+    let entry = |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
+    (0..n).filter_map(|j| to_raw_value(&(0..n).map(|k| entry(j, k)).collect::<Vec<_>>()).ok()).collect()
 }
 
 /// What the poses can tell, in words.

@@ -219,8 +219,8 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
             |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
         found.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
     };
-    let pairs = found.correlations.iter().filter(|(a, b, _)| !tied(a, b)).map(|(a, b, correlation)| {
-        let sign = if *correlation < 0.0 { '−' } else { '+' };
+    let pairs = found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).map(|(a, b, correlation)| {
+        let sign = if correlation < 0.0 { '−' } else { '+' };
         format!("{a} and {b}: {sign}{:.3}", correlation.abs())
     });
     let (mut points, more) = some_of(pairs, SHOWN);

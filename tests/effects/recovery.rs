@@ -135,7 +135,7 @@ fn every_part_of_the_elasticity_can_be_left_out_with_effects_declared() {
     };
     let ablations = Ablation::EACH.map(|ablation| (ablation, identify(ablation)));
     for (ablation, found) in &ablations {
-        let estimate = |name: &str| found.estimates.iter().find(|estimate| estimate.name == name);
+        let estimate = |name: &str| found.estimate(name);
         let of_geometry = ["gear-ratio[3].error", "backlash[3].width", "link-thermal-expansion[B].strain"];
         for name in of_geometry {
             let learned = estimate(name).unwrap().identified;

@@ -1,11 +1,10 @@
 //! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
 //!
-//! - `states`: the arm before, with geometry alone, with elasticity, after the loop, and its errors on held-out poses.
-//! - `correlations`: the whole matrix. `cause`: the residual against what drives a found effect. `trend`: the same for
+//! - `states`: the arm before, with elasticity, after the loop, and its errors on held-out poses; with geometry alone where a
+//!   comparison has it. `cause`: the residual against what drives a found effect. `trend`: the same for
 //!   structure that no effect explains.
 
 mod cause;
-mod correlations;
 mod joint;
 mod states;
 mod trend;
@@ -18,8 +17,8 @@ use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::problem::Problem;
 
+pub use crate::identify::Correlations;
 pub use cause::{Abscissa, Cause, Ordinate, Point};
-pub use correlations::Correlations;
 pub use states::{Stand, State};
 
 use states::{Arm, Sight};
@@ -69,9 +68,7 @@ pub struct Picture {
 pub fn of_identification(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Picture, IdentifyError> {
     let sight = Sight::new(data);
     let fitted = Arm::of(problem, &sight, found)?;
-    let mut states = vec![sight.nominal(problem, &fitted.model)?];
-    states.extend(sight.rigid(problem, &fitted.model)?);
-    states.push(sight.identified(&fitted, found));
+    let states = vec![sight.registered(&fitted, found), sight.identified(&fitted, found)];
     let findings = examine(problem, data, found)?;
     Ok(sight.picture(states, &fitted, found, (sigma_of(problem, found, &sight), findings)))
 }
@@ -83,7 +80,7 @@ pub fn of_identification(problem: &Problem, data: &Dataset, found: &Identificati
 pub fn of_comparison(problem: &Problem, data: &Dataset, comparison: &Comparison) -> Result<Picture, IdentifyError> {
     let sight = Sight::new(data);
     let fitted = Arm::of(problem, &sight, &comparison.joint)?;
-    let mut states = vec![sight.nominal(problem, &fitted.model)?];
+    let mut states = vec![sight.registered(&fitted, &comparison.joint)];
     if states::is_elastic(&fitted.model) {
         let rigid = Arm { model: fitted.model.ablated(Ablation::Rigid), x: comparison.rigid.x.clone() };
         states.push(sight.state(Stand::GeometryOnly, &rigid));
@@ -101,10 +98,11 @@ pub fn of_closure(problem: &Problem, data: &Dataset, closure: &ClosedLoop) -> Re
     let sight = Sight::new(data);
     let before = Arm::of(problem, &sight, &closure.before.fit)?;
     let after = Arm::of(&closure.closed, &sight, &closure.after)?;
-    let mut states = vec![sight.nominal(problem, &before.model)?];
-    states.extend(sight.rigid(problem, &before.model)?);
-    states.push(sight.identified(&before, &closure.before.fit));
-    states.push(sight.state(Stand::Closed, &after));
+    let states = vec![
+        sight.registered(&before, &closure.before.fit),
+        sight.identified(&before, &closure.before.fit),
+        sight.state(Stand::Closed, &after),
+    ];
     let sigma = sigma_of(&closure.closed, &closure.after, &sight);
     let mut picture = sight.picture(states, &after, &closure.after, (sigma, closure.findings.clone()));
     picture.causes =
@@ -153,7 +151,7 @@ impl Sight<'_> {
             residuals: rows.iter().copied().zip(&poses).zip(errors).map(residual).collect(),
             time_measured: self.measurements.time_measured,
             findings,
-            correlations: Correlations::of(best, self, found, sigma),
+            correlations: found.correlations(),
             causes: Vec::new(),
             trend: None,
         }

@@ -3,9 +3,9 @@
 use nalgebra::{DVector, Vector3};
 
 use super::model_of;
-use crate::identify::{Identification, IdentifyError, Options, Placement, identify_model};
+use crate::identify::{Identification, IdentifyError, Placement};
 use crate::measurement::{Dataset, Measurements, Split};
-use crate::model::{Ablation, Model, PoseResiduals};
+use crate::model::Model;
 use crate::problem::Problem;
 
 /// What has been done for the arm.
@@ -49,7 +49,6 @@ impl Arm {
 
 /// The measurements that a picture is made from.
 pub(super) struct Sight<'a> {
-    pub data: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub placement: Placement,
@@ -58,13 +57,12 @@ pub(super) struct Sight<'a> {
 impl<'a> Sight<'a> {
     pub fn new(data: &'a Dataset) -> Self {
         let Dataset { measurements, split } = data;
-        Self { data, measurements, split, placement: Placement::of(measurements) }
+        Self { measurements, split, placement: Placement::of(measurements) }
     }
 
     /// Residuals of some rows, measuring frame [m].
     pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
-        let poses = self.placement.poses(self.measurements, rows, 1.0);
-        PoseResiduals::new(&arm.model, poses, Vec::new(), arm.x.clone()).position_errors(&DVector::zeros(0))
+        self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
     /// Errors of an arm on the held-out poses.
@@ -73,28 +71,8 @@ impl<'a> Sight<'a> {
     }
 
     /// The nominal arm, with bases and targets fitted where they are free.
-    pub fn nominal(&self, problem: &Problem, model: &Model) -> Result<State, IdentifyError> {
-        let mut model = model.clone();
-        model.parameters.retain(|parameter| parameter.slot.is_placement());
-        model.constraints.clear();
-        // As an identification does before it applies any loss.
-        let plain = Problem { robust: None, ..problem.clone() };
-        let x = if model.parameters.is_empty() { DVector::zeros(0) } else { self.fitted(&plain, &model)? };
-        Ok(self.state(Stand::Registered, &Arm { model, x }))
-    }
-
-    /// Geometry alone, where there is elasticity to leave out.
-    pub fn rigid(&self, problem: &Problem, model: &Model) -> Result<Option<State>, IdentifyError> {
-        if !is_elastic(model) {
-            return Ok(None);
-        }
-        let model = model.ablated(Ablation::Rigid);
-        let x = self.fitted(problem, &model)?;
-        Ok(Some(self.state(Stand::GeometryOnly, &Arm { model, x })))
-    }
-
-    fn fitted(&self, problem: &Problem, model: &Model) -> Result<DVector<f64>, IdentifyError> {
-        Ok(identify_model(model, problem, self.data, &Options::default())?.x)
+    pub fn registered(&self, fitted: &Arm, found: &Identification) -> State {
+        self.state(Stand::Registered, &Arm { model: fitted.model.clone(), x: found.registered_x.clone() })
     }
 }
 

@@ -1,0 +1,81 @@
+//! What an identified arm predicts, and what it leaves of measurements.
+
+use nalgebra::{DVector, Vector3};
+
+use super::identification::IdentifyError;
+use super::outcome::Identification;
+use super::placement::Placement;
+use crate::measurement::{Dataset, Measurements};
+use crate::model::Model;
+use crate::problem::Problem;
+
+/// A measured pose and what a fit leaves of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Residual {
+    /// Row of the measurements, counted from 0.
+    pub row: usize,
+    /// Whether the row was held out.
+    pub held_out: bool,
+    /// Measured − predicted position, measuring frame [m]; NaN where the identified arm has no equilibrium.
+    pub position: Vector3<f64>,
+    /// The same over 1 σ of a coordinate [1].
+    pub whitened: Vector3<f64>,
+    /// Whether the row is among the [outliers](Identification::outliers) of the fit.
+    pub outlier: bool,
+}
+
+impl Identification {
+    /// Positions of the identified arm in the poses of `rows`, measuring frame [m]; NaN where it has no equilibrium.
+    ///
+    /// The positions in `rows` do not matter ([`Dataset::poses`] makes rows without any); their sessions and targets have to
+    /// be among those identified. `problem` is the one that was identified.
+    ///
+    /// # Errors
+    /// A parameter of the problem, or of a session or target of `rows`, that was not identified.
+    pub fn predict(&self, problem: &Problem, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
+        let placement = Placement::of(rows);
+        let model = Model::new(problem, &placement.bases, &placement.targets)?;
+        self.predict_with(&model, rows)
+    }
+
+    /// As [`predict`](Self::predict), with a model of the problem that the caller has changed.
+    ///
+    /// # Errors
+    /// A parameter of the model that was not identified.
+    pub fn predict_with(&self, model: &Model, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
+        let all: Vec<usize> = (0..rows.len()).collect();
+        let errors = Placement::of(rows).position_errors(model, &self.vector(model)?, rows, &all);
+        Ok(rows.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect())
+    }
+
+    /// What the identified arm leaves of every row, in the order of the rows.
+    ///
+    /// # Errors
+    /// A parameter of the problem, or of a session or target of the data, that was not identified.
+    pub fn residuals(&self, problem: &Problem, data: &Dataset) -> Result<Vec<Residual>, IdentifyError> {
+        let Dataset { measurements, split } = data;
+        let placement = Placement::of(measurements);
+        let model = Model::new(problem, &placement.bases, &placement.targets)?;
+        let all: Vec<usize> = (0..measurements.len()).collect();
+        let errors = placement.position_errors(&model, &self.vector(&model)?, measurements, &all);
+        let sigma = |row: usize| measurements.sigma.as_ref().map_or(self.sigma, |own| own[row]);
+        let residual = |(row, position): (usize, Vector3<f64>)| Residual {
+            row,
+            held_out: split.held_out.binary_search(&row).is_ok(),
+            position,
+            whitened: position / sigma(row),
+            outlier: self.outliers.iter().any(|outlier| outlier.row == row),
+        };
+        Ok(errors.into_iter().enumerate().map(residual).collect())
+    }
+
+    /// The full parameter vector of a model with the parameters that were identified, by their names.
+    fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+        let x = model.parameters.iter().map(|parameter| {
+            let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
+            place.map(|k| self.x[k]).ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })
+        });
+        Ok(DVector::from_vec(x.collect::<Result<Vec<f64>, _>>()?))
+    }
+}
