@@ -1,33 +1,56 @@
 //! An effect that no catalogue holds, without touching flexcal: `cargo run --example own_effect`.
 //!
 //! Suppose that the second joint of the lunar sampler has a belt that slackens as it is warmed. One parameter more at a slot of
-//! the model, multiplied by a driver (docs/effects.md lists both), fitted beside everything that the problem declares.
+//! the model, multiplied by a driver (docs/effects.md lists both): fitted beside everything that the problem declares, and
+//! offered to the search for what the model lacks, beside the catalogue.
 
 use std::error::Error;
 use std::path::Path;
 
-use flexcal::identify::{Options, Placement, identify, identify_model};
+use flexcal::diagnose::trace;
+use flexcal::identify::{Options, identify};
 use flexcal::measurement::Dataset;
-use flexcal::model::Model;
-use flexcal::model::effect::{Term, named};
-use flexcal::model::parameter::{Driver, JointField, Slot};
-use flexcal::problem::Problem;
+use flexcal::model::effect::{CustomEffect, Term};
+use flexcal::model::parameter::{Driver, Slot};
+use flexcal::problem::{Effect, Problem};
+
+/// Δθ = slack · (T − 20 °C).
+#[derive(Debug)]
+struct Belt {
+    /// Number of the joint, from 1.
+    joint: usize,
+}
+
+impl CustomEffect for Belt {
+    fn name(&self) -> &str {
+        "joint-belt"
+    }
+
+    fn place(&self) -> String {
+        self.joint.to_string()
+    }
+
+    fn terms(&self, problem: &Problem) -> Vec<Term> {
+        // The last number is 1 σ of the prior [rad/K].
+        let slot = Slot::coordinate(problem, self.joint);
+        vec![Term::driven("slack", slot, Driver::Warming { reference: 20.0 }, 1e-4)]
+    }
+
+    fn describe(&self) -> String {
+        format!("the belt of joint {} slackens with temperature", self.joint)
+    }
+}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let problem = Problem::read(Path::new("problems/lunar-sampler"))?;
     let (data, _warnings) = Dataset::read(&problem)?;
-    let options = Options::default();
+    let belt = Effect::custom(Belt { joint: 2 });
 
-    // Joints count from 0 here; the last number is 1 σ of the prior [rad/K].
-    let slot = Slot::Joint { joint: 1, field: JointField::Theta };
-    let slack = Term::driven("slack", slot, Driver::Warming { reference: 20.0 }, 1e-4);
-    let belt = named("joint-belt", "2", vec![slack]);
-    let placement = Placement::of(&data.measurements);
-    let model = Model::with_terms(&problem, &placement.bases, &placement.targets, &belt)?;
-
-    let before = identify(&problem, &data, &options)?;
-    let after = identify_model(&model, &problem, &data, &options)?;
+    let before = identify(&problem, &data, &Options::default())?;
+    let after = identify(&problem.with_effect(belt.clone()), &data, &Options::default())?;
     let own = after.estimate("joint-belt[2].slack").ok_or("not fitted")?;
+    let traced = trace(&problem, &data, &Options::default().with_candidates(vec![belt.clone()]))?;
+    let rank = traced.ranking.iter().position(|ranked| ranked.effect == belt);
     let rms = |poses: f64| poses * 1e3;
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]
     {
@@ -37,9 +60,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             rms(before.fitted.held_out.rms.norm),
             rms(after.fitted.held_out.rms.norm)
         );
-        println!(
-            "(the rig's link bows with temperature, so part of that looks like a slack belt: compare `flexcal trace`)"
-        );
+        match rank {
+            Some(rank) => println!("number {} of what the residual points to, the first is:", rank + 1),
+            None => println!("not among what the residual points to, the first is:"),
+        }
+        println!("{}", traced.describe(&traced.ranking[0].effect));
     }
     Ok(())
 }

@@ -42,7 +42,7 @@
 //! assert!(found.reduced_chi2.is_some_and(|chi2| chi2 > 5.0));
 //! let closure = close(&problem, &data, &Options::default())?;
 //! assert_eq!(closure.verdict, Verdict::Explained);
-//! assert_eq!(flexcal::model::effect::describe(&closure.effects[0].effect), "link A bows with temperature");
+//! assert_eq!(closure.effects[0].effect.describe(), "link A bows with temperature");
 //! assert!(closure.after.fitted.held_out.mean.norm < 0.1e-3);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -81,10 +81,10 @@ fn a_closed_loop_shows_what_it_found() {
     let shown = plot_data::of_closure(&problem, &data, &closure).unwrap();
     let page = report::loop_page(&problem, &closure, &shown);
     check(&page);
-    assert!(closure.effects.iter().any(|found| flexcal::model::effect::name(&found.effect) == "tracker-drift"));
+    assert!(closure.effects.iter().any(|found| found.effect.name() == "tracker-drift"));
     assert_eq!(shown.causes.len(), closure.effects.len());
     for found in &closure.effects {
-        assert!(page.html.contains(flexcal::model::effect::name(&found.effect)));
+        assert!(page.html.contains(found.effect.name()));
         for estimate in &found.estimates {
             assert!(page.html.contains(&estimate.name), "{}", estimate.name);
         }

@@ -49,7 +49,7 @@ impl Source {
         let all = self.all_ranges(problem)?;
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let thermal = declared(Effect::is_thermal);
-        let sided = declared(|effect| matches!(effect, Effect::Backlash { .. }));
+        let sided = declared(Effect::has_sides);
         Ok(PoseRanges { temperature: all.temperature.filter(|_| thermal), approach: all.approach && sided, ..all })
     }
 

@@ -6,7 +6,6 @@ use super::plan::{DRAWN, DRAWS, EVENLY, FIRST_DRAW, choose};
 use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
 use crate::diagnose::{Separation, separation};
 use crate::measurement::Measurements;
-use crate::model::effect;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Two effects to tell apart, and a problem that declares both.
@@ -28,14 +27,14 @@ impl Pair {
     pub fn new(problem: &Problem, pair: [EffectDeclaration; 2]) -> Result<Self, DesignError> {
         let [one, other] = &pair;
         if one.effect == other.effect {
-            return Err(DesignError::SameEffect { effect: effect::describe(&one.effect) });
+            return Err(DesignError::SameEffect { effect: one.effect.describe() });
         }
         for EffectDeclaration { effect, .. } in &pair {
             if problem.effects.iter().any(|declared| declared.effect == *effect) {
-                return Err(DesignError::DeclaredEffect { effect: effect::describe(effect) });
+                return Err(DesignError::DeclaredEffect { effect: effect.describe() });
             }
-            if matches!(effect, Effect::TrackerDrift | Effect::StationShift { .. }) {
-                return Err(DesignError::FollowsTime { effect: effect::describe(effect) });
+            if effect.follows_time() {
+                return Err(DesignError::FollowsTime { effect: effect.describe() });
             }
         }
         let mut declared = problem.clone();
@@ -50,7 +49,7 @@ impl Pair {
     /// As for [`Site::new`], or rules of `[parameters]` fix both effects.
     fn criterion(&self, poses: &Measurements) -> Result<Criterion, DesignError> {
         let site = Site::new(&self.declared, &[poses])?;
-        let own = self.effects.iter().flat_map(|effect| effect::parameters_of(effect, &self.declared));
+        let own = self.effects.iter().flat_map(|effect| effect.parameters(&self.declared));
         let names: Vec<String> = own.filter(|own| own.nominal == 0.0).map(|own| own.name).collect();
         let parameters = site.model.parameters.iter().enumerate();
         let columns: Vec<usize> =

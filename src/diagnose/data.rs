@@ -11,7 +11,7 @@ use super::residual_tests::CovariateValues;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::DataCoverage;
 use crate::model::parameter::Quantity;
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Effect, JointKind, Problem};
 
 /// Blocks of a cross-validation.
 const BLOCKS: usize = 10;
@@ -33,6 +33,8 @@ pub(super) struct Data<'a> {
     pub setup: Vec<usize>,
     /// Block of each identification row; repeats share one.
     pub block: Vec<usize>,
+    /// Effects that are looked for besides those of the catalogue.
+    pub candidates: &'a [Effect],
 }
 
 impl<'a> Data<'a> {
@@ -49,7 +51,12 @@ impl<'a> Data<'a> {
             block_of[configuration] = place % BLOCKS.min(count.max(1));
         }
         let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
-        Self { dataset, measurements, split, setup, block }
+        Self { dataset, measurements, split, setup, block, candidates: &[] }
+    }
+
+    /// The same with more effects to look for.
+    pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
+        Self { candidates, ..self }
     }
 
     /// The identification rows.

@@ -12,7 +12,6 @@ use crate::error::InputError;
 use crate::identify::Placement;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
-use crate::model::effect;
 use crate::model::parameter::unit;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
@@ -135,7 +134,7 @@ pub(super) fn sizes(problem: &Problem, library: &Library, linear: &Linear, effec
     let score = linear.score(&library.columns(effect));
     let test = ScanTest::new(score.rank(), linear.expected_freedom(), tries);
     let needed = test.and_then(|test| test.noncentrality(POWER));
-    let parameters = effect::parameters_of(effect, problem);
+    let parameters = effect.parameters(problem);
     let mut groups: Vec<(Unit, Vec<usize>)> = Vec::new();
     for (k, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0) {
         let own = unit(parameter.slot, parameter.driver);

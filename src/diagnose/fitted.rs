@@ -6,7 +6,6 @@ use super::data::Data;
 use super::neighbourhood::{Library, Linear, open};
 use super::smooth_term::SmoothTerm;
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
-use crate::model::effect;
 use crate::model::parameter::Slot;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Effect, EffectDeclaration, Problem};
@@ -144,7 +143,7 @@ impl Fitted {
 
     /// Numbers of an effect's parameters in the model.
     pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
-        let own = effect::parameters_of(effect, &self.problem);
+        let own = effect.parameters(&self.problem);
         let is_own = |&k: &usize| own.iter().any(|parameter| parameter.name == self.model.parameters[k].name);
         (0..self.model.parameters.len()).filter(is_own).collect()
     }

@@ -21,7 +21,7 @@ mod smooth_term;
 mod telling_pose;
 mod unexplained;
 
-pub use candidates::{HELD_FIXED, REFUSED};
+pub use candidates::{HELD_FIXED, NO_ROOM, REFUSED};
 pub use covariate::{Covariate, Place};
 pub use detection::{Detectable, Detection, Size, detectable};
 pub use residual_tests::{

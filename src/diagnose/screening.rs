@@ -7,10 +7,8 @@ use super::neighbourhood::{Scan, Tried};
 use super::residual_tests::{Findings, FitResidual, test_residual};
 use super::selection::LEVEL;
 use super::telling_pose::{TellingPose, shuffled, telling_pose};
-use super::unexplained::named;
 use crate::identify::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
-use crate::model::effect;
 use crate::problem::{Effect, Problem};
 
 /// Entries of a ranking.
@@ -63,7 +61,7 @@ pub struct Trace {
 impl Trace {
     /// What an effect is in these data, in words.
     pub fn describe(&self, effect: &Effect) -> String {
-        effect::describe_in(effect, self.time_measured)
+        effect.describe_in(self.time_measured)
     }
 }
 
@@ -72,7 +70,7 @@ impl Trace {
 /// # Errors
 /// Problem, data and options do not fit each other.
 pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Trace, IdentifyError> {
-    let data = Data::new(data);
+    let data = Data::new(data).with_candidates(&options.candidates);
     Ok(trace_fit(&Fitted::new(problem.clone(), &data, options)?, &data))
 }
 
@@ -84,7 +82,8 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let scan = Scan::new(&library, fitted.linear(&library, &[], &[]), testable);
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {
-        let known = |other: &Tried| named_place(&scan.effects[other.index]) == named_place(&scan.effects[tried.index]);
+        let known =
+            |other: &Tried| scan.effects[other.index].name_and_place() == scan.effects[tried.index].name_and_place();
         if !best.iter().any(known) {
             best.push(tried);
         }
@@ -162,12 +161,4 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         covariates: &data.covariates(&fitted.problem),
     };
     test_residual(&fit, SEED)
-}
-
-/// Family and place, orders and times left out.
-pub(super) fn named_place(effect: &Effect) -> String {
-    match effect {
-        Effect::StationShift { .. } => crate::model::effect::name(effect).to_owned(),
-        other => named(other),
-    }
 }

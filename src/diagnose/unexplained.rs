@@ -11,7 +11,6 @@ use super::residual_tests::Findings;
 use super::smooth_term::SmoothTerm;
 use crate::identify::ErrorSummary;
 use crate::model::Pose;
-use crate::model::effect;
 use crate::model::parameter::{JointField, Quantity, Slot};
 use crate::problem::Effect;
 use crate::quantity::Unit;
@@ -140,11 +139,10 @@ pub(super) fn withdraw(
 ) -> Option<(SmoothTerm, Vec<Effect>)> {
     let smooth_terms = SmoothTerm::all(&fitted.problem, data);
     let library = fitted.library(data, &[], &smooth_terms);
-    let everything: Vec<Effect> =
-        candidates.iter().cloned().chain(added.iter().flat_map(super::candidates::parts)).collect();
+    let everything: Vec<Effect> = candidates.iter().cloned().chain(added.iter().flat_map(Effect::parts)).collect();
     let (all_tries, families) = tries(&everything);
     let search = |effect: &Effect| {
-        let parts = super::candidates::parts(effect).into_iter();
+        let parts = effect.parts().into_iter();
         parts
             .map(|part| {
                 let known = everything.iter().position(|other| *other == part);
@@ -152,12 +150,12 @@ pub(super) fn withdraw(
             })
             .sum::<f64>()
     };
-    let mut places: Vec<(usize, usize)> = added.iter().filter_map(function_of).collect();
+    let mut places: Vec<(usize, usize)> = added.iter().filter_map(Effect::function_of).collect();
     places.sort_unstable();
     places.dedup();
     for (joint, from) in places {
         let (own, rest): (Vec<Effect>, Vec<Effect>) =
-            added.iter().cloned().partition(|effect| function_of(effect) == Some((joint, from)));
+            added.iter().cloned().partition(|effect| effect.function_of() == Some((joint, from)));
         let parameters: Vec<usize> = own.iter().flat_map(|effect| fitted.parameters_of(effect)).collect();
         let linear = fitted.linear(&library, &parameters, &[]);
         let explained = linear.sums().gain(&linear.score(&fitted.columns(&library, &parameters)));
@@ -174,15 +172,6 @@ pub(super) fn withdraw(
         }
     }
     None
-}
-
-/// The joint at which an effect is a function of a command alone, and the joint commanded, both from 1.
-fn function_of(effect: &Effect) -> Option<(usize, usize)> {
-    match effect {
-        Effect::JointHarmonic { joint, .. } | Effect::GearRatio { joint } => Some((*joint, *joint)),
-        Effect::JointCoupling { joint, from } => Some((*joint, *from)),
-        _ => None,
-    }
 }
 
 /// The strongest structure that is left, if it is beyond chance.
@@ -285,10 +274,4 @@ fn partial_residuals(
         PartialResidual { row: data.rows()[k], covariate, value, lever: lever.norm() * pose.sigma }
     };
     library.poses().iter().enumerate().map(point).collect()
-}
-
-/// Name of an effect with its place, for people.
-pub(super) fn named(effect: &Effect) -> String {
-    let place = effect::place(effect);
-    if place.is_empty() { effect::name(effect).to_owned() } else { format!("{} {place}", effect::name(effect)) }
 }

@@ -120,6 +120,12 @@ pub enum InputErrorKind {
     NoHoist,
     #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]
     InEquilibriumAlready,
+    #[error("{name} enters where another parameter is already")]
+    Occupied { name: String },
+    #[error("{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be")]
+    NotDrivable { name: String },
+    #[error("{name} enters where the arm has nothing")]
+    EntersNowhere { name: String },
     #[error("the measurements cannot show this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 

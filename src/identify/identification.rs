@@ -17,8 +17,9 @@ use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::{Identifiability, Loss};
 use crate::measurement::{Dataset, Measurements, different};
 use crate::model::Model;
+use crate::model::effect::Columns;
 use crate::model::parameter::Parameter;
-use crate::problem::{Effect, EffectDeclaration, JointKind, Problem, Robust, RobustLoss};
+use crate::problem::{Effect, EffectDeclaration, Problem, Robust, RobustLoss};
 
 /// An undeclared σ has settled when it changes by less than this part.
 const NOISE_SETTLED: f64 = 1e-3;
@@ -41,6 +42,9 @@ pub struct Options {
     pub start: Vec<(String, f64)>,
     /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
     pub max_steps: Option<u64>,
+    /// Effects that trace and loop look for besides those of the catalogue: effects of one's own ([`Effect::custom`]). A fit
+    /// alone does not use them.
+    pub candidates: Vec<Effect>,
 }
 
 impl Options {
@@ -66,6 +70,12 @@ impl Options {
     #[must_use]
     pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
         Self { start, ..self }
+    }
+
+    /// The same, looking for these effects besides those of the catalogue.
+    #[must_use]
+    pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
+        Self { candidates, ..self }
     }
 
     /// The same, stopped after so many steps.
@@ -132,14 +142,12 @@ pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<
 
 /// Declared effects of which the measurements hold nothing are mistakes.
 fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
-    let slides = |joint: &usize| problem.joints[joint - 1].kind == JointKind::Prismatic;
+    let columns =
+        Columns { temperature: measurements.temperature.is_some(), approach: measurements.approach.is_some() };
     for EffectDeclaration { effect, location } in &problem.effects {
-        let write = match effect {
-            effect if effect.is_thermal() && measurements.temperature.is_none() => "a column temperature_C",
-            Effect::Backlash { joint } if slides(joint) && measurements.approach.is_none() => "columns approach1, …",
-            _ => continue,
-        };
-        return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
+        if let Some(write) = effect.missing_column(problem, columns) {
+            return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
+        }
     }
     Ok(())
 }

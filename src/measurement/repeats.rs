@@ -43,9 +43,7 @@ impl Measurements {
         if let Some(temperature) = self.temperature.as_ref().filter(|_| declared(Effect::is_thermal)) {
             columns.push(Column { values: temperature.clone(), step: TEMPERATURE_STEP });
         }
-        if let Some(approach) =
-            self.approach.as_ref().filter(|_| declared(|effect| matches!(effect, Effect::Backlash { .. })))
-        {
+        if let Some(approach) = self.approach.as_ref().filter(|_| declared(Effect::has_sides)) {
             let side = |joint: usize| (0..self.len()).map(|row| approach[row * self.joints + joint]).collect();
             columns.extend((0..self.joints).map(|joint| Column { values: side(joint), step: SAME }));
         }

@@ -17,15 +17,12 @@ mod terms;
 
 pub use ablation::Ablation;
 pub use poses::{Pose, PoseResiduals};
-pub use terms::TermsError;
 
 use nalgebra::Vector3;
 
 use crate::error::InputError;
 use crate::mechanics::Arm;
-use crate::model::parameter::{
-    Driver, EffectParameter, JointField, LinearConstraint, Parameter, Slot, constrain, resolve,
-};
+use crate::model::parameter::{Driver, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -48,40 +45,13 @@ pub struct Model {
 }
 
 impl Model {
-    /// The declared arm with one base per name in `bases` and one target per name in `targets`.
+    /// The declared arm with its effects, one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint does not fit the parameters there are.
+    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, or a custom effect finds no room.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
-        Self::of(problem, bases, targets, &effect::parameters(problem))
-    }
-
-    /// The same with the parameters `more` of effects that no catalogue holds, behind those of the declared ones.
-    ///
-    /// They are free with their own σ as prior, and `[parameters]` may speak of them by their names.
-    ///
-    /// # Errors
-    /// A parameter enters where the model has no room for it; or as for [`Model::new`].
-    pub fn with_terms(
-        problem: &Problem,
-        bases: &[String],
-        targets: &[String],
-        more: &[EffectParameter],
-    ) -> Result<Self, TermsError> {
-        let mut effects = effect::parameters(problem);
-        for parameter in more {
-            terms::check(problem, bases.len(), targets.len(), &effects, parameter)?;
-            effects.push(parameter.clone());
-        }
-        Ok(Self::of(problem, bases, targets, &effects)?)
-    }
-
-    fn of(
-        problem: &Problem,
-        bases: &[String],
-        targets: &[String],
-        effects: &[EffectParameter],
-    ) -> Result<Self, InputError> {
+        terms::check_customs(problem, bases.len(), targets.len())?;
+        let effects = &effect::parameters(problem);
         let parameters = resolve(problem, bases, targets, effects)?;
         let mut nominal = Arm::nominal(problem);
         for effect in effects {

@@ -1,57 +1,79 @@
-//! Which parameters of effects the model has room for.
+//! Which parameters of custom effects the model has room for.
 
-use crate::error::InputError;
+use super::effect;
+use crate::error::{InputError, InputErrorKind};
 use crate::model::parameter::{BeamField, Driver, EffectParameter, JointField, Quantity, Slot};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Effect, EffectDeclaration, Joint, JointKind, Problem};
 
-/// Why a model cannot take a parameter of an effect.
-#[derive(Debug, thiserror::Error)]
-pub enum TermsError {
-    /// The rules of the problem do not fit the parameters there are.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// Another parameter is that very quantity.
-    #[error("{name} enters where another parameter is already")]
-    Occupied {
-        /// Name of the parameter.
-        name: String,
-    },
-    /// Its driver changes from pose to pose, and the quantity is the same in all of them.
-    #[error("{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be")]
-    NotDrivable {
-        /// Name of the parameter.
-        name: String,
-    },
-    /// The arm has no such joint, beam, base or target.
-    #[error("{name} enters where the arm has nothing")]
-    Nowhere {
-        /// Name of the parameter.
-        name: String,
-    },
+/// Whether the custom effects among those of `problem` find room in its model beside everything else.
+pub(super) fn check_customs(problem: &Problem, bases: usize, targets: usize) -> Result<(), InputError> {
+    for (k, EffectDeclaration { effect, location }) in problem.effects.iter().enumerate() {
+        let others: Vec<EffectParameter> = problem
+            .effects
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != k)
+            .flat_map(|(_, other)| other.effect.parameters(problem))
+            .collect();
+        check_custom(problem, bases, targets, others, effect).map_err(|kind| location.clone().error(kind))?;
+    }
+    Ok(())
+}
+
+impl Effect {
+    /// Whether a custom effect finds room in the model of `problem` beside what is declared; others always do.
+    ///
+    /// # Errors
+    /// Its name is taken, or one of its parameters enters where the model has no room for it.
+    pub fn check_room(&self, problem: &Problem) -> Result<(), InputErrorKind> {
+        check_custom(problem, 1, 1, effect::parameters(problem), self)
+    }
+}
+
+fn check_custom(
+    problem: &Problem,
+    bases: usize,
+    targets: usize,
+    mut others: Vec<EffectParameter>,
+    effect: &Effect,
+) -> Result<(), InputErrorKind> {
+    if !matches!(effect, Effect::Custom(_)) {
+        return Ok(());
+    }
+    let name = effect.name();
+    let of_beam = |joint: &Joint| joint.beam.as_ref().is_some_and(|beam| beam.name == name);
+    if effect::FAMILIES.iter().any(|family| family.name == name) || problem.joints.iter().any(of_beam) {
+        return Err(InputErrorKind::ReservedName { name: name.to_owned() });
+    }
+    for parameter in effect.parameters(problem) {
+        check(problem, bases, targets, &others, &parameter)?;
+        others.push(parameter);
+    }
+    Ok(())
 }
 
 /// Whether `parameter` finds room beside the declared arm and `others`.
-pub(super) fn check(
+fn check(
     problem: &Problem,
     bases: usize,
     targets: usize,
     others: &[EffectParameter],
     parameter: &EffectParameter,
-) -> Result<(), TermsError> {
+) -> Result<(), InputErrorKind> {
     let name = || parameter.name.clone();
     if !exists(problem, bases, targets, parameter) {
-        return Err(TermsError::Nowhere { name: name() });
+        return Err(InputErrorKind::EntersNowhere { name: name() });
     }
     if parameter.driver.is_constant() {
         let same = |other: &EffectParameter| other.driver.is_constant() && other.slot == parameter.slot;
         if is_declared(parameter.slot) || others.iter().any(same) {
-            return Err(TermsError::Occupied { name: name() });
+            return Err(InputErrorKind::Occupied { name: name() });
         }
     } else if !is_drivable(problem, parameter.slot) {
-        return Err(TermsError::NotDrivable { name: name() });
+        return Err(InputErrorKind::NotDrivable { name: name() });
     }
     let twin = |other: &EffectParameter| other.name == parameter.name;
-    if others.iter().any(twin) { Err(TermsError::Occupied { name: name() }) } else { Ok(()) }
+    if others.iter().any(twin) { Err(InputErrorKind::Occupied { name: name() }) } else { Ok(()) }
 }
 
 /// Whether the arm has what the parameter enters and what drives it.
@@ -62,8 +84,11 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Travel(joint)
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
-        | Driver::Spline { of: Quantity::Command(joint), .. } => joint < joints,
-        _ => true,
+        | Driver::Spline { of: Quantity::Command(joint), .. }
+        | Driver::Bump { of: Quantity::Command(joint), .. }
+        | Driver::Step { of: Quantity::Command(joint), .. } => joint < joints,
+        Driver::Spline { .. } | Driver::Bump { .. } | Driver::Step { .. } => true,
+        Driver::Constant | Driver::Unit | Driver::Warming { .. } | Driver::Elapsed | Driver::Since(_) => true,
     };
     driven
         && match parameter.slot {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::item::Item;
 use super::section::Section;
-use super::{Beam, Body, Hoist, Joint, JointKind, effects};
+use super::{Beam, Body, Hoist, Joint, JointKind, effect};
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
 
@@ -80,7 +80,7 @@ fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError
     let name = item.text()?.to_owned();
     let reserved = name.strip_prefix("joint").is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
         || ["tool", "base"].contains(&name.as_str())
-        || effects::NAMES.contains(&name.as_str());
+        || effect::NAMES.contains(&name.as_str());
     if name.contains(|c: char| ".*[]\"".contains(c) || c.is_whitespace() || c.is_control()) {
         Err(item.error(InputErrorKind::NotABeamName { name }))
     } else if reserved {

@@ -1,6 +1,16 @@
-//! An effect as declared.
+//! The catalogue's effects, declared in one table: names, arguments, reading and writing follow from it.
+//!
+//! What an effect does is said by its family in `model::effect`.
 
-use crate::error::Location;
+use std::any::Any;
+use std::fmt;
+use std::sync::Arc;
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::argument::{Argument, Examples, Reader};
+use super::{Data, Equilibrium, Joint, Statics};
+use crate::error::{InputError, InputErrorKind, Location};
 
 /// One `[[effect]]` and where it stands in the file.
 #[derive(Debug, Clone)]
@@ -11,39 +21,245 @@ pub struct EffectDeclaration {
     pub location: Location,
 }
 
-/// An effect and its arguments; joints are numbered from 1, links go by the name of their beam.
-#[derive(Debug, Clone, PartialEq)]
-#[expect(missing_docs, reason = "arguments carry the names of the file format")]
-pub enum Effect {
-    JointCompliance { joint: usize },
-    JointHarmonic { joint: usize, orders: Vec<u32> },
-    GearRatio { joint: usize },
-    Backlash { joint: usize },
-    JointNonlinearStiffness { joint: usize },
-    JointLateralCompliance { joint: usize },
-    JointThermalDrift { joint: usize },
-    JointCoupling { joint: usize, from: usize },
-    LinkBending { joint: usize },
-    LinkThermalBending { link: String },
-    LinkThermalExpansion { link: String },
-    UnmodelledMass { link: String },
-    PayloadMass,
-    HoistForce,
-    HoistDirection,
-    BaseCompliance,
-    GravityDirection,
-    DeflectedEquilibrium,
-    TrackerScale,
-    TrackerDrift,
-    StationShift { at_time: f64 },
+/// The key of an argument: its name, or what stands behind `as`.
+macro_rules! key {
+    ($field:ident) => {
+        stringify!($field)
+    };
+    ($field:ident $key:literal) => {
+        $key
+    };
+}
+
+/// From lines `Variant "name-in-files" { field: Type = kind }`; the kinds are methods of [`Reader`] and [`Examples`].
+macro_rules! effects {
+    ($(
+        $(#[$doc:meta])*
+        $variant:ident $name:literal $({ $($field:ident: $type:ty = $kind:ident $(as $key:literal)?),+ })?
+    )+) => {
+        /// An effect and its arguments; joints are numbered from 1 as in files, links go by the name of their beam.
+        #[derive(Debug, Clone, PartialEq)]
+        #[non_exhaustive]
+        #[expect(missing_docs, reason = "arguments carry the names of the file format")]
+        pub enum Effect {
+            $($(#[$doc])* $variant $({ $($field: $type),+ })?,)+
+            /// One that no catalogue holds: a law of one's own (`model::effect::CustomEffect`).
+            Custom(Custom),
+        }
+
+        /// Names of the effects in files.
+        pub(crate) const NAMES: &[&str] = &[$($name),+];
+
+        impl Effect {
+            /// Name in files.
+            pub fn name(&self) -> &str {
+                match self {
+                    $(Self::$variant $({ $($field: _),+ })? => $name,)+
+                    Self::Custom(own) => &own.name,
+                }
+            }
+
+            /// Arguments by key, in the order of the files; the place of a custom effect, unless that is the whole arm.
+            pub fn arguments(&self) -> Vec<(&'static str, Argument)> {
+                match self {
+                    $(Self::$variant $({ $($field),+ })? => {
+                        vec![$($((key!($field $($key)?), $field.into())),+)?]
+                    })+
+                    Self::Custom(own) if own.place.is_empty() => Vec::new(),
+                    Self::Custom(own) => vec![("place", Argument::Name(own.place.clone()))],
+                }
+            }
+
+            /// The effect of that name with its arguments; `None` where no effect is called so.
+            pub(super) fn read(name: &str, arguments: &mut Reader<'_, '_, '_>) -> Result<Option<Self>, InputError> {
+                Ok(Some(match name {
+                    $($name => Self::$variant $({ $($field: arguments.$kind(key!($field $($key)?))?),+ })?,)+
+                    _ => return Ok(None),
+                }))
+            }
+        }
+
+        /// How the effect of that name may be declared on an arm with these joints: `gear-ratio = { joint = 1 }`.
+        pub(crate) fn example(name: &str, joints: &[Joint]) -> String {
+            let examples = Examples::new(joints);
+            let arguments: Vec<(&str, String)> = match name {
+                $($name => vec![$($((key!($field $($key)?), examples.$kind())),+)?],)+
+                _ => Vec::new(),
+            };
+            declaration(name, &arguments)
+        }
+    };
+}
+
+effects! {
+    /// A joint declared rigid turns by Δθ = c `M_z`.
+    JointCompliance "joint-compliance" { joint: usize = any_joint }
+    /// Δθ = Σₖ aₖ sin kθ + bₖ cos kθ, with θ = q as commanded.
+    JointHarmonic "joint-harmonic" { joint: usize = moving_joint, orders: Vec<u32> = orders }
+    /// Δθ = ε θ, with θ = q as commanded.
+    GearRatio "gear-ratio" { joint: usize = moving_joint }
+    /// Δθ = (b/2)·approach; without directions of approach the moment decides.
+    Backlash "backlash" { joint: usize = moving_joint }
+    /// Δθ = c₃ `M_z`³ beyond the linear torsion.
+    JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = any_joint }
+    /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
+    JointLateralCompliance "joint-lateral-compliance" { joint: usize = any_joint }
+    /// Δθ = k (T − T₀).
+    JointThermalDrift "joint-thermal-drift" { joint: usize = moving_joint }
+    /// Δθ of one joint = k q of another.
+    JointCoupling "joint-coupling" { joint: usize = moving_joint, from: usize = other_joint }
+    /// Flexibility 1/EI of a link declared rigid.
+    LinkBending "link-bending" { joint: usize = linked_joint }
+    /// Curvature (`k_y`, `k_z`)·(T − T₀) along a beam.
+    LinkThermalBending "link-thermal-bending" { link: String = beam }
+    /// Strain α (T − T₀) of a beam.
+    LinkThermalExpansion "link-thermal-expansion" { link: String = beam }
+    /// A mass m at s along a beam.
+    UnmodelledMass "unmodelled-mass" { link: String = beam }
+    /// The payload is heavier by m whenever one is carried.
+    PayloadMass "payload-mass"
+    /// The rope pulls with F (1 + k).
+    HoistForce "hoist-force"
+    /// The rope leans.
+    HoistDirection "hoist-direction"
+    /// The base turns by (`C_x` `M_x`, `C_y` `M_y`, 0) under the moments at the base.
+    BaseCompliance "base-compliance"
+    /// Gravity is turned by (`r_x`, `r_y`, 0).
+    GravityDirection "gravity-direction"
+    /// λ from 0, loads on the rigid arm, to 1, loads on the bent arm.
+    DeflectedEquilibrium "deflected-equilibrium"
+    /// Measured positions are scaled by 1 + s.
+    TrackerScale "tracker-scale"
+    /// Measured positions move by v (t − `t_first`).
+    TrackerDrift "tracker-drift"
+    /// Measured positions are moved by d from a time on.
+    StationShift "station-shift" { at_time: f64 = time as "at_time_s" }
+}
+
+/// `name = { key = value }`; without arguments `name = true`.
+fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
+    let all: Vec<String> = arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    match all.join(", ") {
+        none if none.is_empty() => format!("{name} = true"),
+        all => format!("{name} = {{ {all} }}"),
+    }
 }
 
 impl Effect {
+    /// Where it is, as its parameters' names say it in brackets: a joint's number, a link, a time; empty for the whole.
+    pub fn place(&self) -> String {
+        self.arguments().iter().filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",")
+    }
+
+    /// As a problem declares it: `gear-ratio = { joint = 3 }`.
+    pub fn declaration(&self) -> String {
+        let arguments: Vec<_> = self.arguments().iter().map(|(key, argument)| (*key, argument.toml())).collect();
+        declaration(self.name(), &arguments)
+    }
+
     /// Whether it follows the temperature.
     pub fn is_thermal(&self) -> bool {
         matches!(
             self,
             Self::JointThermalDrift { .. } | Self::LinkThermalBending { .. } | Self::LinkThermalExpansion { .. }
         )
+    }
+
+    /// Whether it depends on the side from which joints come.
+    pub fn has_sides(&self) -> bool {
+        matches!(self, Self::Backlash { .. })
+    }
+
+    /// Whether it follows time rather than what poses can be chosen for.
+    pub fn follows_time(&self) -> bool {
+        matches!(self, Self::TrackerDrift | Self::StationShift { .. })
+    }
+
+    /// An order that this and another harmonic of one joint share.
+    pub(super) fn shared_order(&self, other: &Self) -> Option<u32> {
+        match (self, other) {
+            (Self::JointHarmonic { joint, orders }, Self::JointHarmonic { joint: own, orders: more })
+                if joint == own =>
+            {
+                more.iter().find(|order| orders.contains(order)).copied()
+            }
+            _ => None,
+        }
+    }
+
+    /// Why it could never act on this arm: the declared model has it already, or has nothing for it to act on.
+    pub(super) fn refusal(&self, statics: Statics, joints: &[Joint], data: &Data) -> Option<InputErrorKind> {
+        let hoisted = || joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
+        match self {
+            Self::LinkBending { joint } if joints[joint - 1].a == 0.0 => Some(InputErrorKind::NoLink { joint: *joint }),
+            Self::DeflectedEquilibrium if statics.equilibrium == Equilibrium::Deflected => {
+                Some(InputErrorKind::InEquilibriumAlready)
+            }
+            Self::HoistForce | Self::HoistDirection if !hoisted() => Some(InputErrorKind::NoHoist),
+            effect if effect.is_thermal() && data.reference_temperature.is_none() => {
+                Some(InputErrorKind::NeedsTemperature { write: "reference_temperature_C in [data]" })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// `{"effect": "gear-ratio", "joint": 3}`.
+impl Serialize for Effect {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let arguments = self.arguments();
+        let mut map = serializer.serialize_map(Some(1 + arguments.len()))?;
+        map.serialize_entry("effect", self.name())?;
+        for (key, argument) in &arguments {
+            map.serialize_entry(key, argument)?;
+        }
+        map.end()
+    }
+}
+
+/// An effect of one's own, made by `Effect::custom`; two are the same where name and place are.
+#[derive(Clone)]
+pub struct Custom {
+    name: String,
+    place: String,
+    law: Arc<dyn Any + Send + Sync>,
+}
+
+impl Custom {
+    /// Name, place (empty for the whole arm), and what the model makes of it.
+    pub(crate) fn new(name: String, place: String, law: Arc<dyn Any + Send + Sync>) -> Self {
+        Self { name, place, law }
+    }
+
+    /// What the model makes of it.
+    pub(crate) fn law(&self) -> &(dyn Any + Send + Sync) {
+        &*self.law
+    }
+}
+
+impl fmt::Debug for Custom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} at {:?}", self.name, self.place)
+    }
+}
+
+impl PartialEq for Custom {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.name, &self.place) == (&other.name, &other.place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_are_written_as_they_are_read() {
+        assert_eq!(Effect::GearRatio { joint: 3 }.declaration(), "gear-ratio = { joint = 3 }");
+        assert_eq!(Effect::HoistForce.declaration(), "hoist-force = true");
+        assert_eq!(Effect::StationShift { at_time: 600.0 }.declaration(), "station-shift = { at_time_s = 600.0 }");
+        let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1, 4] };
+        let json = r#"{"effect":"joint-harmonic","joint":2,"orders":[1,4]}"#;
+        assert_eq!(serde_json::to_string(&harmonic).ok().as_deref(), Some(json));
     }
 }

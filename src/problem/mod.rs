@@ -3,12 +3,13 @@
 //! Everything here is plain data in SI units (m, rad, N, kg, s; temperatures in °C), read once from `problem.toml`
 //! and never changed afterwards.
 
+mod argument;
 mod arm;
 mod conditions;
 mod constraints;
 mod data;
 pub(crate) mod digest;
-mod effect;
+pub(crate) mod effect;
 pub(crate) mod effects;
 pub(crate) mod item;
 mod joint;
@@ -20,10 +21,11 @@ pub(crate) mod section;
 
 use nalgebra::Vector3;
 
+pub use argument::Argument;
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, HeldOut};
-pub use effect::{Effect, EffectDeclaration};
+pub use effect::{Custom, Effect, EffectDeclaration};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub use robust::{Robust, RobustLoss};

@@ -8,10 +8,10 @@ use nalgebra::Vector3;
 use super::item::Document;
 use super::section::Section;
 use super::{
-    BasePose, EffectDeclaration, Equilibrium, Problem, Statics, Tool, arm, constraints, data, effects, parameters,
-    robust,
+    BasePose, Effect, EffectDeclaration, Equilibrium, Problem, Statics, Tool, arm, constraints, data, effects,
+    parameters, robust,
 };
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
 impl Problem {
@@ -30,6 +30,16 @@ impl Problem {
     /// The first mistake found.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
+    }
+
+    /// The same problem with one more effect declared, behind the others; joints are numbered from 1.
+    #[must_use]
+    pub fn with_effect(&self, effect: Effect) -> Self {
+        let mut problem = self.clone();
+        problem
+            .effects
+            .push(EffectDeclaration { effect, location: Location::file(&self.data.location.file).with_key("effect") });
+        problem
     }
 
     /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint = 3 }`); `named` is what

@@ -7,8 +7,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString,
 use super::effect::values;
 use super::quantity::p_value;
 use crate::diagnose::{ClosedLoop, Found, HARMONICS, Trace};
-use crate::model::effect::{self, Argument};
-use crate::problem::{Effect, Problem};
+use crate::problem::{Argument, Effect, Problem};
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text
 /// will stand; everything else stays as it was written, comments included.
@@ -91,7 +90,7 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
 fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
-        let mut value = Value::InlineTable(InlineTable::from_iter([(effect::name(effect), arguments(effect))]));
+        let mut value = Value::InlineTable(InlineTable::from_iter([(effect.name(), arguments(effect))]));
         value.decor_mut().set_prefix(format!("\n{lines}"));
         known.push_formatted(value);
         return;
@@ -100,7 +99,7 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let rest = document.trailing().as_str().unwrap_or_default().to_owned();
     document.set_trailing(RawString::default());
     let mut table = Table::new();
-    table.insert(effect::name(effect), Item::Value(arguments(effect)));
+    table.insert(effect.name(), Item::Value(arguments(effect)));
     table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
     let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
     table.set_position(Some(last + 1));
@@ -133,13 +132,13 @@ fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
         _ => None,
     };
     if let Some(declared) = declared {
-        declared.insert(effect::name(effect), Item::Value(arguments(effect)));
+        declared.insert(effect.name(), Item::Value(arguments(effect)));
     }
 }
 
 /// The arguments of an effect; `true` stands for none.
 fn arguments(effect: &Effect) -> Value {
-    let arguments = effect::arguments(effect);
+    let arguments = effect.arguments();
     if arguments.is_empty() {
         return Value::from(true);
     }
@@ -148,7 +147,7 @@ fn arguments(effect: &Effect) -> Value {
         let value = match argument {
             Argument::Joint(joint) => whole(joint),
             Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
-            Argument::Link(link) => Value::from(link),
+            Argument::Name(name) => Value::from(name),
             Argument::Time(time) => Value::from(time),
         };
         (key, value)

@@ -5,7 +5,6 @@ use super::effect;
 use super::forecast::size as shown;
 use super::json::object;
 use crate::diagnose::{Detectable, Detection, Size};
-use crate::model::effect::{name, place};
 use crate::problem::Effect;
 
 /// Effects of a family on a screen.
@@ -44,8 +43,8 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let (visible, hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
     let mut families: Vec<&str> = Vec::new();
     for own in &visible {
-        if !families.contains(&name(&own.effect)) {
-            families.push(name(&own.effect));
+        if !families.contains(&own.effect.name()) {
+            families.push(own.effect.name());
         }
     }
     let rows: Vec<Vec<String>> = families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
@@ -72,7 +71,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
 /// Rows of a family: the effect at each place that is hardest to see, the hardest first.
 fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut own: Vec<(&Detectable, f64)> = Vec::new();
-    for effect in shown.iter().filter(|effect| name(&effect.effect) == family) {
+    for effect in shown.iter().filter(|effect| effect.effect.name() == family) {
         let sizes = effect.sizes.iter();
         let part = sizes.map(|size| size.worst.unwrap_or(f64::INFINITY) / size.prior).fold(0.0, f64::max);
         own.push((effect, part));
@@ -81,8 +80,7 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut places: Vec<String> = Vec::new();
     let rows = own.iter().filter(|(effect, _)| {
         // Times of a shift are not places.
-        let place =
-            if matches!(effect.effect, Effect::StationShift { .. }) { String::new() } else { place(&effect.effect) };
+        let place = if effect.effect.is_searched() { String::new() } else { effect.effect.place() };
         let new = !places.contains(&place);
         places.push(place);
         new

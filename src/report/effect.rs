@@ -1,13 +1,12 @@
 //! Effects as results name them.
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde::ser::{Serialize, Serializer};
 
 use super::document::{Point, code};
 use super::json::object;
 use super::quantity::{decimals, number};
 use crate::diagnose::{Found, Trace};
 use crate::identify::Estimate;
-use crate::model::effect::{self, Argument};
 use crate::problem::Effect;
 
 /// Decimals of a value at most.
@@ -22,18 +21,7 @@ pub(super) struct Entry<'a>(pub &'a Effect);
 
 impl Serialize for Entry<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let arguments = effect::arguments(self.0);
-        let mut map = serializer.serialize_map(Some(1 + arguments.len()))?;
-        map.serialize_entry("effect", effect::name(self.0))?;
-        for (key, argument) in &arguments {
-            match argument {
-                Argument::Joint(joint) => map.serialize_entry(key, joint)?,
-                Argument::Orders(orders) => map.serialize_entry(key, orders)?,
-                Argument::Link(link) => map.serialize_entry(key, link)?,
-                Argument::Time(time) => map.serialize_entry(key, time)?,
-            }
-        }
-        map.end()
+        self.0.serialize(serializer)
     }
 }
 
@@ -48,17 +36,7 @@ object! {
 
 /// As a problem declares it: `gear-ratio = { joint = 3 }`.
 pub(super) fn declaration(effect: &Effect) -> String {
-    let write = |(key, argument): (&str, Argument)| match argument {
-        Argument::Joint(joint) => format!("{key} = {joint}"),
-        Argument::Orders(orders) => format!("{key} = {orders:?}"),
-        Argument::Link(link) => format!("{key} = {link:?}"),
-        Argument::Time(time) => format!("{key} = {time:?}"),
-    };
-    let arguments: Vec<String> = effect::arguments(effect).into_iter().map(write).collect();
-    match arguments.join(", ") {
-        none if none.is_empty() => format!("{} = true", effect::name(effect)),
-        arguments => format!("{} = {{ {arguments} }}", effect::name(effect)),
-    }
+    effect.declaration()
 }
 
 /// In words and, unless that is long, as a problem declares it.
@@ -141,9 +119,7 @@ pub(super) fn grouped<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Ef
     let mut groups: Vec<(Vec<Effect>, R)> = Vec::new();
     for (effect, reason) in joined(effects) {
         let alike = |(members, why): &&mut (Vec<Effect>, R)| {
-            *why == reason
-                && effect::name(&members[0]) == effect::name(&effect)
-                && orders(&members[0]) == orders(&effect)
+            *why == reason && members[0].name() == effect.name() && orders(&members[0]) == orders(&effect)
         };
         match groups.iter_mut().find(alike) {
             Some((members, _)) => members.push(effect),
@@ -158,17 +134,17 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
 }
 
 fn group(members: &[Effect]) -> String {
-    let name = effect::name(&members[0]);
+    let name = members[0].name();
     if let (Effect::StationShift { .. }, true) = (&members[0], members.len() > 1) {
         return format!("{} at {} times", code(name), members.len());
     }
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
         Effect::StationShift { at_time } => format!("{at_time} s"),
-        other => effect::place(other),
+        other => other.place(),
     };
     let places = members.iter().map(place).collect::<Vec<_>>().join(", ");
-    let of = match effect::arguments(&members[0]).first() {
+    let of = match members[0].arguments().first() {
         Some(("joint", _)) if members.len() > 1 => "of joints ",
         Some(("joint", _)) => "of joint ",
         Some(("link", _)) if members.len() > 1 => "of links ",
@@ -190,17 +166,6 @@ fn group(members: &[Effect]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn effects_are_written_as_they_are_read() {
-        assert_eq!(declaration(&Effect::GearRatio { joint: 3 }), "gear-ratio = { joint = 3 }");
-        assert_eq!(declaration(&Effect::HoistForce), "hoist-force = true");
-        let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1, 4] };
-        assert_eq!(
-            serde_json::to_string(&Entry(&harmonic)).ok().as_deref(),
-            Some(r#"{"effect":"joint-harmonic","joint":2,"orders":[1,4]}"#)
-        );
-    }
 
     #[test]
     fn many_effects_take_one_line() {

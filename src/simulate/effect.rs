@@ -120,6 +120,8 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
         Effect::StationShift { .. } => xyz(Unit::Length),
+        // The rig knows the laws of the catalogue alone.
+        Effect::Custom(_) => Vec::new(),
     }
 }
 

@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
-use crate::problem::{Effect, Joint, JointKind};
+use crate::problem::{Joint, JointKind};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -124,7 +124,7 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
             "depends_on": [format!("q{joint}")],
             "shape": match shape { Shape::Bump => "bump", Shape::Step => "step" },
         }),
-        Cause::Catalogued(effect) => catalogued(effect),
+        Cause::Catalogued(effect) => serde_json::to_value(effect).unwrap_or_default(),
     };
     let names = keys(effect.cause(), joints);
     let values: Map<String, Value> = names
@@ -134,35 +134,4 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
         .collect();
     entry["values"] = Value::Object(values);
     entry
-}
-
-fn catalogued(effect: &Effect) -> Value {
-    let at_joint = |name: &str, joint: &usize| json!({"effect": name, "joint": joint});
-    let at_link = |name: &str, link: &String| json!({"effect": name, "link": link});
-    let plain = |name: &str| json!({"effect": name});
-    match effect {
-        Effect::JointCompliance { joint } => at_joint("joint-compliance", joint),
-        Effect::JointHarmonic { joint, orders } => {
-            json!({"effect": "joint-harmonic", "joint": joint, "orders": orders})
-        }
-        Effect::GearRatio { joint } => at_joint("gear-ratio", joint),
-        Effect::Backlash { joint } => at_joint("backlash", joint),
-        Effect::JointNonlinearStiffness { joint } => at_joint("joint-nonlinear-stiffness", joint),
-        Effect::JointLateralCompliance { joint } => at_joint("joint-lateral-compliance", joint),
-        Effect::JointThermalDrift { joint } => at_joint("joint-thermal-drift", joint),
-        Effect::JointCoupling { joint, from } => json!({"effect": "joint-coupling", "joint": joint, "from": from}),
-        Effect::LinkBending { joint } => at_joint("link-bending", joint),
-        Effect::LinkThermalBending { link } => at_link("link-thermal-bending", link),
-        Effect::LinkThermalExpansion { link } => at_link("link-thermal-expansion", link),
-        Effect::UnmodelledMass { link } => at_link("unmodelled-mass", link),
-        Effect::PayloadMass => plain("payload-mass"),
-        Effect::HoistForce => plain("hoist-force"),
-        Effect::HoistDirection => plain("hoist-direction"),
-        Effect::BaseCompliance => plain("base-compliance"),
-        Effect::GravityDirection => plain("gravity-direction"),
-        Effect::DeflectedEquilibrium => plain("deflected-equilibrium"),
-        Effect::TrackerScale => plain("tracker-scale"),
-        Effect::TrackerDrift => plain("tracker-drift"),
-        Effect::StationShift { at_time } => json!({"effect": "station-shift", "at_time_s": at_time}),
-    }
 }

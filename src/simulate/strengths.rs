@@ -2,7 +2,8 @@
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use crate::error::{InputError, InputErrorKind};
-use crate::problem::effects::{NAMES, effect};
+use crate::problem::effect::NAMES;
+use crate::problem::effects::effect;
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};

@@ -170,7 +170,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         let error = error.to_string();
         let Some((_, example)) = error.split_once("write '") else { continue };
         let read = read(example.trim_end_matches('\'')).unwrap();
-        assert_eq!(flexcal::model::effect::name(&read.effect), family.name);
+        assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
     assert_eq!(written, 13);

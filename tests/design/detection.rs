@@ -6,7 +6,6 @@ use flexcal::design::Extremes;
 use flexcal::diagnose::{detectable, trace};
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, Measurements, Split};
-use flexcal::model::effect;
 use flexcal::problem::{Effect, Freedom, Problem};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +36,7 @@ fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, 
     with.effects.push(problem.effect(&text, Path::new("test")).unwrap());
     let model = model_of(&with, rows);
     let mut x = draw(&model, |_| 0.0, &mut random);
-    let own = effect::parameters_of(effect, &with);
+    let own = effect.parameters(&with);
     let sign = if seed.is_multiple_of(2) { size } else { -size };
     for (k, parameter) in model.parameters.iter().enumerate().filter(|(_, p)| p.name == own[0].name) {
         assert!(parameter.sigma.is_some());
@@ -55,7 +54,7 @@ fn written(effect: &Effect) -> String {
         Effect::GearRatio { joint } => format!("gear-ratio = {{ joint = {joint} }}"),
         Effect::JointThermalDrift { joint } => format!("joint-thermal-drift = {{ joint = {joint} }}"),
         Effect::LinkThermalExpansion { link } => format!("link-thermal-expansion = {{ link = \"{link}\" }}"),
-        other => effect::name(other).to_owned(),
+        other => other.name().to_owned(),
     }
 }
 

@@ -1,7 +1,6 @@
 //! What the rules of `[parameters]` make of the parameters of effects.
 
 use flexcal::diagnose::detectable;
-use flexcal::model::effect::name;
 use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
 
@@ -153,7 +152,7 @@ fn what_a_rule_could_not_take_is_not_looked_for() {
     let poses = at_random(&problem, 60, 1.5, &mut ChaCha8Rng::seed_from_u64(1));
     let detection = detectable(&problem, &poses).unwrap();
     let refused: Vec<&str> =
-        detection.untestable.iter().filter(|(_, why)| why.contains("in another unit")).map(|(e, _)| name(e)).collect();
+        detection.untestable.iter().filter(|(_, why)| why.contains("in another unit")).map(|(e, _)| e.name()).collect();
     assert_eq!(refused, ["backlash"; 3], "{:?}", detection.untestable);
     // Whatever is looked for can be declared.
     for found in &detection.effects {

@@ -2,7 +2,6 @@
 
 use flexcal::diagnose::{ClosedLoop, Covariate, Verdict, close};
 use flexcal::identify::{Identification, Options, identify};
-use flexcal::model::effect;
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
@@ -172,7 +171,7 @@ pub fn named(effect: &Effect) -> String {
         Effect::JointHarmonic { orders, .. } => format!("{orders:?}"),
         _ => String::new(),
     };
-    format!("{} {}{orders}", effect::name(effect), effect::place(effect)).trim().to_owned()
+    format!("{} {}{orders}", effect.name(), effect.place()).trim().to_owned()
 }
 
 /// What a set lacks, with strengths.

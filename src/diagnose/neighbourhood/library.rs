@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::least_squares::{Block, LeastSquares};
-use crate::model::effect::{self, Term};
+use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Slot};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
@@ -39,7 +39,7 @@ impl<'a> Library<'a> {
         (effects, places): (&[Effect], &[Slot]),
     ) -> Self {
         let mut slots: Vec<(Slot, f64)> = places.iter().map(|&slot| (slot, 0.0)).collect();
-        for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect::terms(effect, problem)) {
+        for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect.terms(problem)) {
             if !slots.iter().any(|(known, _)| *known == slot) {
                 slots.push((slot, nominal));
             }
@@ -95,7 +95,7 @@ impl<'a> Library<'a> {
 
     /// Columns of an effect's parameters, shape = (3 N, k).
     pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
-        let terms = effect::terms(effect, self.problem);
+        let terms = effect.terms(self.problem);
         let mut columns = DMatrix::zeros(self.jacobian.nrows(), terms.len());
         for (term, mut out) in terms.iter().zip(columns.column_iter_mut()) {
             let Some(&(_, place)) = self.places.iter().find(|(slot, _)| *slot == term.slot) else { continue };
@@ -112,7 +112,7 @@ impl<'a> Library<'a> {
 
     /// For each of an effect's parameters, whether it is never negative.
     pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
-        effect::terms(effect, self.problem).iter().map(|term| term.never_negative).collect()
+        effect.terms(self.problem).iter().map(|term| term.never_negative).collect()
     }
 
     /// Column of a place, 3 N; `None` where no effect enters there.

@@ -1,12 +1,13 @@
 //! Every candidate tried against what a fit leaves.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::library::Library;
 use super::linear::Linear;
 use super::score::{Gain, Score, Sums};
-use crate::model::effect;
 use crate::problem::Effect;
 
 /// The candidates with what the residual says about each.
@@ -125,14 +126,10 @@ impl<'a, 'l> Scan<'a, 'l> {
 
 /// For each candidate how often chance has a try at it within its family, and the number of families.
 pub(crate) fn tries(effects: &[Effect]) -> (Vec<f64>, usize) {
-    let (mut tries, mut families) = (vec![1.0; effects.len()], 0);
-    for family in effect::FAMILIES {
-        let own = |effect: &&Effect| effect::name(effect) == family.name;
-        let members: Vec<&Effect> = effects.iter().filter(own).collect();
-        families += usize::from(!members.is_empty());
-        for (effect, tries) in effects.iter().zip(&mut tries).filter(|(effect, _)| own(effect)) {
-            *tries = family.tries(effect, &members);
-        }
+    let mut families: BTreeMap<&str, Vec<&Effect>> = BTreeMap::new();
+    for effect in effects {
+        families.entry(effect.name()).or_default().push(effect);
     }
-    (tries, families)
+    let tries = effects.iter().map(|effect| effect.tries(&families[effect.name()])).collect();
+    (tries, families.len())
 }

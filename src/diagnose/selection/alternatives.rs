@@ -1,9 +1,7 @@
 //! Candidates that the data cannot tell from an effect that was added.
 
-use super::super::candidates::covers;
 use super::super::fitted::{Fitted, Given, Normal};
 use super::super::neighbourhood::{Library, Scan, Tried, tries};
-use super::super::screening::named_place;
 use super::super::smooth_term::SmoothTerm;
 use crate::problem::Effect;
 
@@ -54,16 +52,16 @@ impl<'f, 'a> Replacements<'f, 'a> {
         let own = sums.gain_of(part.norm_squared(), part.len());
         let own = own.map_or(0.0, |gain| gain.criterion + 2.0 * own_tries.ln());
         let ranking = self.scan.ranking_without(&directions, &part);
-        let is_other = |index: usize| !covers(effect, &self.scan.effects[index]);
+        let is_other = |index: usize| !effect.covers(&self.scan.effects[index]);
         let mut effects: Vec<Effect> = Vec::new();
         let ranking: Vec<_> = ranking.into_iter().filter(|tried| is_other(tried.index)).collect();
         let as_much = if structured { AS_MUCH * part.norm_squared() } else { f64::INFINITY };
         let untold = |tried: &&Tried| tried.criterion < own + UNTOLD || tried.gain.squares > as_much;
         for tried in ranking.iter().filter(untold) {
             let candidate = &self.scan.effects[tried.index];
-            let known = |other: &Effect| named_place(other) == named_place(candidate);
+            let known = |other: &Effect| other.name_and_place() == candidate.name_and_place();
             // Other times of the same shift are the same effect; other orders of a harmonic are not.
-            let is_own = matches!(effect, Effect::StationShift { .. }) && known(effect);
+            let is_own = effect.is_searched() && known(effect);
             if !effects.iter().any(known) && !is_own {
                 effects.push(candidate.clone());
             }

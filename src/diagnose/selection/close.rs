@@ -1,6 +1,6 @@
 //! The whole story: before, what was found, after, what remains.
 
-use super::super::candidates::{Candidates, covers};
+use super::super::candidates::Candidates;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
@@ -83,7 +83,7 @@ impl ClosedLoop {
 /// # Errors
 /// Problem, data and options do not fit each other.
 pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<ClosedLoop, IdentifyError> {
-    let data = Data::new(data);
+    let data = Data::new(data).with_candidates(&options.candidates);
     let first = Fitted::new(problem.clone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
@@ -191,13 +191,13 @@ fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bo
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
-        let stays = |known: &Effect| added.iter().any(|own| covers(own, known));
-        let holds = |step: &&Round| step.effects.iter().any(|known| covers(effect, known));
+        let stays = |known: &Effect| added.iter().any(|own| own.covers(&known));
+        let holds = |step: &&Round| step.effects.iter().any(|known| effect.covers(&known));
         let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| Found {
-        p_value: tested.iter().filter(|part| covers(&effect, &part.effect)).map(|part| part.p).fold(1.0, f64::min),
+        p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
         estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
         alternatives: replacements.of(&effect, structured).effects,
         held_out_after: first_with(&effect),

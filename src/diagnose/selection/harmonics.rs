@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::candidates::{covers, joined};
+use super::super::candidates::joined;
 use super::super::data::Data;
 use super::super::fitted::{Fitted, with_smooth_terms};
 use super::super::smooth_term::SmoothTerm;
@@ -86,7 +86,7 @@ fn all_orders(effect: Effect, declared: &[Effect]) -> Effect {
             let highest = orders.into_iter().max().unwrap_or(1);
             let is_known = |&order: &u32| {
                 let wave = Effect::JointHarmonic { joint, orders: vec![order] };
-                declared.iter().any(|known| covers(known, &wave))
+                declared.iter().any(|known| known.covers(&wave))
             };
             Effect::JointHarmonic { joint, orders: (1..=highest).filter(|order| !is_known(order)).collect() }
         }

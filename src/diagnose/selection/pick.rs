@@ -1,6 +1,5 @@
 //! Which effects a round adds.
 
-use super::super::candidates::same_family;
 use super::super::data::Data;
 use super::super::neighbourhood::Scan;
 use crate::problem::Effect;
@@ -54,7 +53,7 @@ pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
             .collect();
         let p = best.corrected;
         let effect = scan.effects[best.index].clone();
-        let alone = many || rivals.iter().all(|rival| same_family(rival, &effect)) && p < OVERWHELMING;
+        let alone = many || rivals.iter().all(|rival| rival.name() == effect.name()) && p < OVERWHELMING;
         if !picks.is_empty() && !alone {
             break;
         }

@@ -1,6 +1,6 @@
 //! Rounds of the loop: pick, fit, test again.
 
-use super::super::candidates::{Candidates, joined, parts};
+use super::super::candidates::{Candidates, joined};
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{Scan, tries};
@@ -44,8 +44,9 @@ pub(super) struct Rounds<'a> {
 impl Rounds<'_> {
     /// Effects that the loop added.
     pub fn added(&self, fitted: &Fitted) -> Vec<Effect> {
-        let declared: Vec<Effect> = self.declared.iter().flat_map(parts).collect();
-        let own = fitted.effects().iter().flat_map(parts).filter(|part| !declared.contains(part)).collect::<Vec<_>>();
+        let declared: Vec<Effect> = self.declared.iter().flat_map(Effect::parts).collect();
+        let own =
+            fitted.effects().iter().flat_map(Effect::parts).filter(|part| !declared.contains(part)).collect::<Vec<_>>();
         own.iter().fold(Vec::new(), |all, part| joined(&all, part))
     }
 
@@ -169,14 +170,14 @@ impl Rounds<'_> {
                 return Ok(fitted);
             }
             let stays = |part: &Effect| leaving.iter().all(|leaving| leaving.effect != *part);
-            let kept: Vec<Effect> = added.iter().flat_map(parts).filter(stays).collect();
+            let kept: Vec<Effect> = added.iter().flat_map(Effect::parts).filter(stays).collect();
             fitted = self.fit(&fitted, &kept)?;
         }
     }
 
     /// Every added effect with its p, corrected for the tries, harmonics order by order.
     pub fn tested(&self, fitted: &Fitted) -> Vec<Retested> {
-        self.test(fitted, self.added(fitted).iter().flat_map(parts).collect())
+        self.test(fitted, self.added(fitted).iter().flat_map(Effect::parts).collect())
     }
 
     /// Effects of a fit with their p, corrected for the tries: those of all orders of a harmonic together.
@@ -184,12 +185,12 @@ impl Rounds<'_> {
         let library = fitted.library(self.data, &[], &self.smooth_terms);
         let mut everything = Candidates::of(&fitted.problem, self.data).testable;
         let first = everything.len();
-        everything.extend(own.iter().flat_map(parts));
+        everything.extend(own.iter().flat_map(Effect::parts));
         let (tries, families) = tries(&everything);
         let mut tries = tries[first..].iter();
         let mut tested = retest(fitted, &library, &self.smooth_terms, own);
         for tested in &mut tested {
-            let own: f64 = tries.by_ref().take(parts(&tested.effect).len()).sum();
+            let own: f64 = tries.by_ref().take(tested.effect.parts().len()).sum();
             tested.p = (tested.p * own * families as f64).min(1.0);
         }
         tested

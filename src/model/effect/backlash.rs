@@ -1,8 +1,8 @@
 //! `backlash`: play, Δθ = (b/2)·approach; without directions of approach the moment M_z decides.
 
 use super::coverage::NO_LOADS;
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{commanded, slides};
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
@@ -36,4 +36,9 @@ pub(super) const FAMILY: Family = Family {
         Effect::Backlash { joint } => format!("play in joint {joint}"),
         _ => String::new(),
     },
+    missing_column: |effect, problem, columns| match effect {
+        Effect::Backlash { joint } if slides(problem, *joint) && !columns.approach => Some("columns approach1, …"),
+        _ => None,
+    },
+    ..USUAL
 };

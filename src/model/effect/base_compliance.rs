@@ -1,7 +1,7 @@
 //! `base-compliance`: the base turns by (C_x M_x, C_y M_y, 0) under the moments at the base.
 
 use super::coverage::NO_LOADS;
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
 
@@ -20,4 +20,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::BaseCompliance => "the base tilts under the load".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::problem::{Effect, Problem};
+
 /// Which drivers of effects the poses at hand have, and vary.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataCoverage {
@@ -39,3 +41,17 @@ pub(super) const NO_TEMPERATURE: &str = "no temperature that changes, or no refe
 pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
 /// Why an effect of loads cannot be shown.
 pub(super) const NO_LOADS: &str = "no gravity, so no loads";
+
+/// Which columns some measurements have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Columns {
+    /// Temperatures.
+    pub temperature: bool,
+    /// Directions of approach.
+    pub approach: bool,
+}
+
+/// The column that an effect of the temperature needs, where it is not there.
+pub(super) fn without_temperature(_: &Effect, _: &Problem, columns: Columns) -> Option<&'static str> {
+    (!columns.temperature).then_some("a column temperature_C")
+}

@@ -1,7 +1,7 @@
 //! `deflected-equilibrium`: λ from 0, loads on the rigid arm, to 1, loads on the bent arm.
 
 use super::coverage::NO_LOADS;
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::{Effect, Equilibrium};
 
@@ -23,4 +23,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::DeflectedEquilibrium => "the loads act on the bent arm".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

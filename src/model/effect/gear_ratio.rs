@@ -1,8 +1,9 @@
 //! `gear-ratio`: the transmission ratio is off, Δθ = ε θ with θ = q as commanded.
 
 use super::coverage::STANDS_STILL;
-use super::place::{command, commanded, coordinate};
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
+use super::place::commanded;
+use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
 /// The family.
@@ -10,7 +11,7 @@ pub(super) const FAMILY: Family = Family {
     name: "gear-ratio",
     terms: |effect, problem| match effect {
         Effect::GearRatio { joint } => {
-            vec![Term::driven("error", coordinate(problem, *joint), command(problem, *joint), 0.01)]
+            vec![Term::driven("error", Slot::coordinate(problem, *joint), Driver::command(problem, *joint), 0.01)]
         }
         _ => Vec::new(),
     },
@@ -22,4 +23,9 @@ pub(super) const FAMILY: Family = Family {
         Effect::GearRatio { joint } => format!("transmission ratio of joint {joint} is off"),
         _ => String::new(),
     },
+    function_of: |effect| match effect {
+        Effect::GearRatio { joint } => Some((*joint, *joint)),
+        _ => None,
+    },
+    ..USUAL
 };

@@ -1,7 +1,7 @@
 //! `gravity-direction`: gravity is turned by (r_x, r_y, 0).
 
 use super::coverage::NO_LOADS;
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
 
@@ -20,4 +20,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::GravityDirection => "the base does not stand level".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,7 +1,7 @@
 //! `hoist-direction`: the rope leans, direction ∝ that declared + (t_x + k x, t_y + k y, 0) with the hook at x, y.
 
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::is_hoisted;
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
 
@@ -21,4 +21,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::HoistDirection => "the rope of the hoist leans".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

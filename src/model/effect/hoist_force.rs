@@ -1,7 +1,7 @@
 //! `hoist-force`: the rope pulls with F (1 + k).
 
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::is_hoisted;
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
 
@@ -17,4 +17,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::HoistForce => "the hoist pulls with another force".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

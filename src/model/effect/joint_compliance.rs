@@ -1,7 +1,7 @@
 //! `joint-compliance`: a joint declared rigid turns by Δθ = c M_z.
 
 use super::coverage::NO_LOADS;
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
@@ -24,4 +24,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointCompliance { joint } => format!("joint {joint} gives way about its axis"),
         _ => String::new(),
     },
+    ..USUAL
 };

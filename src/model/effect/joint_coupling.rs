@@ -1,8 +1,9 @@
 //! `joint-coupling`: one joint moves another, Δθ_joint = k q_from.
 
 use super::coverage::STANDS_STILL;
-use super::place::{command, commanded, coordinate};
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
+use super::place::commanded;
+use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
 /// The family.
@@ -10,7 +11,7 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-coupling",
     terms: |effect, problem| match effect {
         Effect::JointCoupling { joint, from } => {
-            vec![Term::driven("factor", coordinate(problem, *joint), command(problem, *from), 0.01)]
+            vec![Term::driven("factor", Slot::coordinate(problem, *joint), Driver::command(problem, *from), 0.01)]
         }
         _ => Vec::new(),
     },
@@ -27,4 +28,9 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointCoupling { joint, from } => format!("joint {from} moves joint {joint} along"),
         _ => String::new(),
     },
+    function_of: |effect| match effect {
+        Effect::JointCoupling { joint, from } => Some((*joint, *from)),
+        _ => None,
+    },
+    ..USUAL
 };

@@ -1,9 +1,10 @@
 //! `joint-harmonic`: an error that repeats with the joint, Δθ = Σ_k a_k sin kθ + b_k cos kθ with θ = q as commanded.
 
+use std::collections::BTreeSet;
+
 use super::coverage::STANDS_STILL;
-use super::place::coordinate;
-use super::{Candidate, Family, Term};
-use crate::model::parameter::Driver;
+use super::family::{Candidate, Family, Term, USUAL};
+use crate::model::parameter::{Driver, Slot};
 use crate::problem::{Effect, JointKind};
 
 /// Highest order that is looked for.
@@ -14,7 +15,7 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-harmonic",
     terms: |effect, problem| match effect {
         Effect::JointHarmonic { joint, orders } => {
-            let slot = coordinate(problem, *joint);
+            let slot = Slot::coordinate(problem, *joint);
             let pair = |&order: &u32| {
                 [("sin", Driver::Sine(joint - 1, order)), ("cos", Driver::Cosine(joint - 1, order))]
                     .map(|(wave, driver)| Term::driven(&format!("{wave}{order}"), slot, driver, 1e-3))
@@ -41,7 +42,42 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => String::new(),
     },
+    tries: |effect, members| tries(effect, members),
+    parts: |effect| match effect {
+        Effect::JointHarmonic { joint, orders } => {
+            orders.iter().map(|&order| Effect::JointHarmonic { joint: *joint, orders: vec![order] }).collect()
+        }
+        other => vec![other.clone()],
+    },
+    joined: |one, other| {
+        let (joint, orders) = orders_of(one)?;
+        let (_, more) = orders_of(other).filter(|(own, _)| *own == joint)?;
+        let mut all = orders.to_vec();
+        all.extend(more.iter().filter(|order| !orders.contains(order)));
+        all.sort_unstable();
+        Some(Effect::JointHarmonic { joint, orders: all })
+    },
+    covers: |one, other| match (orders_of(one), orders_of(other)) {
+        (Some((joint, orders)), Some((own, wanted))) => {
+            joint == own && wanted.iter().all(|order| orders.contains(order))
+        }
+        _ => false,
+    },
+    function_of: |effect| orders_of(effect).map(|(joint, _)| (joint, joint)),
+    ..USUAL
 };
+
+/// Joint, from 1, and orders.
+fn orders_of(effect: &Effect) -> Option<(usize, &[u32])> {
+    if let Effect::JointHarmonic { joint, orders } = effect { Some((*joint, orders)) } else { None }
+}
+
+/// Of order k of each of n joints n π²/6 k²: low orders have causes, high ones are found by trying.
+fn tries(effect: &Effect, members: &[&Effect]) -> f64 {
+    let joints: BTreeSet<usize> = members.iter().filter_map(|member| Some(orders_of(member)?.0)).collect();
+    let order = orders_of(effect).and_then(|(_, orders)| orders.iter().copied().max()).unwrap_or(1);
+    joints.len().max(1) as f64 * std::f64::consts::PI.powi(2) / 6.0 * f64::from(order) * f64::from(order)
+}
 
 /// Ascending orders in words; three and more in a row as "1 to 5".
 fn listed(orders: &[u32]) -> String {

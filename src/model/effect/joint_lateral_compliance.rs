@@ -1,8 +1,8 @@
 //! `joint-lateral-compliance`: bearings tilt by (c_x M_x, c_y M_y, 0) before the joint turns.
 
 use super::coverage::NO_LOADS;
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::commanded;
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
@@ -27,4 +27,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointLateralCompliance { joint } => format!("joint {joint} tilts across its axis"),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,8 +1,8 @@
 //! `joint-nonlinear-stiffness`: Δθ = c₃ M_z³ beyond the linear torsion.
 
 use super::coverage::NO_LOADS;
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::greatest_moment;
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
@@ -30,4 +30,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointNonlinearStiffness { joint } => format!("stiffness of joint {joint} changes with its load"),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,9 +1,9 @@
 //! `joint-thermal-drift`: Δθ = k (T − T₀).
 
-use super::coverage::NO_TEMPERATURE;
-use super::place::{commanded, coordinate};
-use super::{Candidate, Family, Term};
-use crate::model::parameter::Driver;
+use super::coverage::{NO_TEMPERATURE, without_temperature};
+use super::family::{Candidate, Family, Term, USUAL};
+use super::place::commanded;
+use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
 /// The family.
@@ -12,7 +12,7 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, problem| match effect {
         Effect::JointThermalDrift { joint } => {
             let driver = Driver::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) };
-            vec![Term::driven("rate", coordinate(problem, *joint), driver, 1e-3)]
+            vec![Term::driven("rate", Slot::coordinate(problem, *joint), driver, 1e-3)]
         }
         _ => Vec::new(),
     },
@@ -24,4 +24,6 @@ pub(super) const FAMILY: Family = Family {
         Effect::JointThermalDrift { joint } => format!("zero of joint {joint} drifts with temperature"),
         _ => String::new(),
     },
+    missing_column: without_temperature,
+    ..USUAL
 };

@@ -1,7 +1,7 @@
 //! `link-bending`: uniform flexibility 1/EI of a link declared rigid.
 
 use super::coverage::NO_LOADS;
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -27,4 +27,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::LinkBending { joint } => format!("the link before joint {joint} bends"),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,8 +1,8 @@
 //! `link-thermal-bending`: curvature (k_y, k_z)·(T − T₀) along a beam.
 
-use super::coverage::NO_TEMPERATURE;
+use super::coverage::{NO_TEMPERATURE, without_temperature};
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links};
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -27,4 +27,6 @@ pub(super) const FAMILY: Family = Family {
         Effect::LinkThermalBending { link } => format!("link {link} bows with temperature"),
         _ => String::new(),
     },
+    missing_column: without_temperature,
+    ..USUAL
 };

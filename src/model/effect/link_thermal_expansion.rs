@@ -1,8 +1,8 @@
 //! `link-thermal-expansion`: strain α (T − T₀) of a beam.
 
-use super::coverage::NO_TEMPERATURE;
+use super::coverage::{NO_TEMPERATURE, without_temperature};
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links};
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -24,4 +24,6 @@ pub(super) const FAMILY: Family = Family {
         Effect::LinkThermalExpansion { link } => format!("link {link} grows with temperature"),
         _ => String::new(),
     },
+    missing_column: without_temperature,
+    ..USUAL
 };

@@ -1,6 +1,6 @@
 //! `payload-mass`: the payload is heavier by m whenever one is carried.
 
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{ArmField, Slot};
 use crate::problem::Effect;
 
@@ -18,4 +18,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::PayloadMass => "payloads are heavier than declared".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

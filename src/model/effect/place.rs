@@ -1,106 +1,26 @@
-//! Names, places and arguments of effects.
+//! Places of an arm that effects are about; joints are counted from 1, as in files.
 
 use crate::model::parameter::{Driver, JointField, Slot};
-use crate::problem::effects::NAMES;
-use crate::problem::{Body, Effect, Joint, JointKind, Problem};
-
-/// An argument of an effect as the files write it.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Argument {
-    /// Number of a joint, from 1.
-    Joint(usize),
-    /// Orders of harmonics.
-    Orders(Vec<u32>),
-    /// Name of a beam.
-    Link(String),
-    /// A time [s].
-    Time(f64),
-}
-
-/// Name in problem files.
-pub fn name(effect: &Effect) -> &'static str {
-    NAMES[match effect {
-        Effect::JointCompliance { .. } => 0,
-        Effect::JointHarmonic { .. } => 1,
-        Effect::GearRatio { .. } => 2,
-        Effect::Backlash { .. } => 3,
-        Effect::JointNonlinearStiffness { .. } => 4,
-        Effect::JointLateralCompliance { .. } => 5,
-        Effect::JointThermalDrift { .. } => 6,
-        Effect::JointCoupling { .. } => 7,
-        Effect::LinkBending { .. } => 8,
-        Effect::LinkThermalBending { .. } => 9,
-        Effect::LinkThermalExpansion { .. } => 10,
-        Effect::UnmodelledMass { .. } => 11,
-        Effect::PayloadMass => 12,
-        Effect::HoistForce => 13,
-        Effect::HoistDirection => 14,
-        Effect::BaseCompliance => 15,
-        Effect::GravityDirection => 16,
-        Effect::DeflectedEquilibrium => 17,
-        Effect::TrackerScale => 18,
-        Effect::TrackerDrift => 19,
-        Effect::StationShift { .. } => 20,
-    }]
-}
-
-/// Arguments by key, in the order of the files.
-pub fn arguments(effect: &Effect) -> Vec<(&'static str, Argument)> {
-    match effect {
-        Effect::JointCompliance { joint }
-        | Effect::GearRatio { joint }
-        | Effect::Backlash { joint }
-        | Effect::JointNonlinearStiffness { joint }
-        | Effect::JointLateralCompliance { joint }
-        | Effect::JointThermalDrift { joint }
-        | Effect::LinkBending { joint } => vec![("joint", Argument::Joint(*joint))],
-        Effect::JointHarmonic { joint, orders } => {
-            vec![("joint", Argument::Joint(*joint)), ("orders", Argument::Orders(orders.clone()))]
-        }
-        Effect::JointCoupling { joint, from } => {
-            vec![("joint", Argument::Joint(*joint)), ("from", Argument::Joint(*from))]
-        }
-        Effect::LinkThermalBending { link }
-        | Effect::LinkThermalExpansion { link }
-        | Effect::UnmodelledMass { link } => vec![("link", Argument::Link(link.clone()))],
-        Effect::StationShift { at_time } => vec![("at_time_s", Argument::Time(*at_time))],
-        Effect::PayloadMass
-        | Effect::HoistForce
-        | Effect::HoistDirection
-        | Effect::BaseCompliance
-        | Effect::GravityDirection
-        | Effect::DeflectedEquilibrium
-        | Effect::TrackerScale
-        | Effect::TrackerDrift => Vec::new(),
-    }
-}
-
-/// Where an effect is, as its parameters' names say it in brackets: a joint's number, a link, a time; empty for the whole.
-pub fn place(effect: &Effect) -> String {
-    let word = |argument: Argument| match argument {
-        Argument::Joint(joint) => Some(joint.to_string()),
-        Argument::Link(link) => Some(link),
-        Argument::Time(time) => Some(time.to_string()),
-        Argument::Orders(_) => None,
-    };
-    let words: Vec<String> = arguments(effect).into_iter().filter_map(|(_, argument)| word(argument)).collect();
-    words.join(",")
-}
-
-/// What an error of a joint, counted from 1, adds to: d where it slides, else θ.
-pub(super) fn coordinate(problem: &Problem, joint: usize) -> Slot {
-    let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
-    Slot::Joint { joint: joint - 1, field }
-}
-
-/// What a joint, counted from 1, is told.
-pub(super) fn command(problem: &Problem, joint: usize) -> Driver {
-    if slides(problem, joint) { Driver::Travel(joint - 1) } else { Driver::Command(joint - 1) }
-}
+use crate::problem::{Body, Joint, JointKind, Problem};
 
 /// Whether a joint, counted from 1, slides.
 pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
-    problem.joints[joint - 1].kind == JointKind::Prismatic
+    joint.checked_sub(1).and_then(|index| problem.joints.get(index)).is_some_and(|own| own.kind == JointKind::Prismatic)
+}
+
+impl Slot {
+    /// What an error of a joint adds to: d where it slides, else θ. The joint is numbered from 1, as in files.
+    pub fn coordinate(problem: &Problem, joint: usize) -> Self {
+        Self::of_joint(joint, if slides(problem, joint) { JointField::D } else { JointField::Theta })
+    }
+}
+
+impl Driver {
+    /// What a joint is told: q [rad] or [m]. The joint is numbered from 1, as in files.
+    pub fn command(problem: &Problem, joint: usize) -> Self {
+        let index = joint.wrapping_sub(1);
+        if slides(problem, joint) { Self::Travel(index) } else { Self::Command(index) }
+    }
 }
 
 /// Numbers, from 1, of the joints that take a command.

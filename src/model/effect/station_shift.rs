@@ -1,6 +1,6 @@
 //! `station-shift`: measured positions are moved by d from a time on.
 
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
@@ -20,4 +20,10 @@ pub(super) const FAMILY: Family = Family {
         Effect::StationShift { at_time } => format!("the measuring station moved at {at_time} s"),
         _ => String::new(),
     },
+    describe_by_row: |effect| match effect {
+        Effect::StationShift { at_time } => Some(format!("the measuring station moved after row {}", at_time.ceil())),
+        _ => None,
+    },
+    is_searched: true,
+    ..USUAL
 };

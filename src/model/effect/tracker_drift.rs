@@ -1,6 +1,6 @@
 //! `tracker-drift`: measured positions move by v (t − t_first).
 
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
@@ -23,4 +23,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::TrackerDrift => "the measuring station drifts".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,6 +1,6 @@
 //! `tracker-scale`: measured positions are scaled by 1 + s.
 
-use super::{Candidate, Family, Term};
+use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::Slot;
 use crate::problem::Effect;
 
@@ -16,4 +16,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::TrackerScale => "the scale of the measurement is off".to_owned(),
         _ => String::new(),
     },
+    ..USUAL
 };

@@ -1,8 +1,8 @@
 //! `unmodelled-mass`: a mass m at s along a beam.
 
 use super::coverage::NO_LOADS;
+use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links};
-use super::{Candidate, Family, Term};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -32,4 +32,5 @@ pub(super) const FAMILY: Family = Family {
         Effect::UnmodelledMass { link } => format!("link {link} carries a mass that is not declared"),
         _ => String::new(),
     },
+    ..USUAL
 };

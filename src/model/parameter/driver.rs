@@ -4,7 +4,7 @@ use crate::problem::PoseView;
 
 /// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the observation.
 ///
-/// Joints are counted from 0; configurations are those commanded.
+/// Joints are counted from 0, [`Driver::command`] takes the numbers of files; configurations are those commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Driver {
     /// 1: the parameter acts the same in every pose.
@@ -57,7 +57,7 @@ pub enum Driver {
     },
 }
 
-/// A quantity that is known of every pose.
+/// A quantity that is known of every pose; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity {
     /// q of a joint [rad] or [m], joints counted from 0.

@@ -2,7 +2,7 @@
 
 use crate::quantity::Unit;
 
-/// Where a parameter enters the model; joints are counted from 0.
+/// Where a parameter enters the model; joints are counted from 0, [`Slot::of_joint`] takes the numbers of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Slot {
     /// A field of a joint.
@@ -178,6 +178,11 @@ impl BeamField {
 }
 
 impl Slot {
+    /// A field of a joint that is numbered from 1, as in files.
+    pub fn of_joint(number: usize, field: JointField) -> Self {
+        Self::Joint { joint: number.wrapping_sub(1), field }
+    }
+
     /// Kind of quantity.
     pub fn unit(self) -> Unit {
         match self {

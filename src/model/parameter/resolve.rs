@@ -2,7 +2,7 @@
 
 use super::{BeamField, Driver, JointField, Parameter, Slot, unit};
 use crate::error::{InputError, InputErrorKind};
-use crate::problem::effects;
+use crate::problem::effect;
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
 use crate::quantity::Unit;
@@ -131,8 +131,8 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
     if known.iter().any(|name| matches(&wanted, &head(name))) {
         return None;
     }
-    let effects: Vec<&str> = effects::NAMES.into_iter().filter(|name| matches(&wanted, name)).collect();
-    let write = effects::example(effects.first()?, &problem.joints);
+    let effects: Vec<&str> = effect::NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
+    let write = effect::example(effects.first()?, &problem.joints);
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 

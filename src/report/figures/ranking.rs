@@ -6,7 +6,6 @@ use plotters::style::text_anchor::HPos;
 use super::Drawing;
 use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
 use crate::diagnose::{Ranked, Trace};
-use crate::model::effect;
 use crate::problem::Effect;
 use crate::report::quantity::number;
 
@@ -20,14 +19,14 @@ const LEAST_P: f64 = 1e-300;
 
 /// Name of an effect with its place, as in a problem file.
 fn named(found: &Effect, trace: &Trace) -> String {
-    let place = effect::place(found);
+    let place = found.place();
     let orders = match found {
         Effect::JointHarmonic { orders, .. } => {
             format!(" ×{}", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(","))
         }
         _ => String::new(),
     };
-    let name = effect::name(found);
+    let name = found.name();
     match found {
         Effect::StationShift { at_time } if trace.time_measured => format!("{name} {at_time:.0} s"),
         Effect::StationShift { at_time } => format!("{name} row {}", at_time.ceil()),

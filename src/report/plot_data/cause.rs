@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 
 use super::joint::{along, levers, telling};
 use super::states::{Arm, Sight};
-use crate::model::effect;
 use crate::model::parameter::{EffectParameter, JointField, Slot};
 use crate::problem::PoseView;
 use crate::problem::{Effect, JointKind, Problem};
@@ -118,7 +117,7 @@ struct Rows<'a> {
 
 /// The picture of an effect's cause at the fit of `problem`, which declares it.
 pub(super) fn of(found: &Effect, problem: &Problem, arm: &Arm, sight: &Sight) -> Option<Cause> {
-    let parameters = effect::parameters_of(found, problem);
+    let parameters = found.parameters(problem);
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
     let mut without = arm.clone();
@@ -144,7 +143,7 @@ pub(super) fn of(found: &Effect, problem: &Problem, arm: &Arm, sight: &Sight) ->
         }
         None => elsewhere(found, problem, &rows, &values),
     };
-    Some(view.cause(effect::describe_in(found, sight.measurements.time_measured), &rows, sight))
+    Some(view.cause(found.describe_in(sight.measurements.time_measured), &rows, sight))
 }
 
 /// The joint whose coordinate an effect changes, what it depends on, and the coordinate.

@@ -1,0 +1,137 @@
+//! All families, and what effects say of themselves through them.
+
+use super::coverage::{Columns, DataCoverage};
+use super::custom::custom;
+use super::family::{Candidate, Family, Term, USUAL};
+use super::{
+    backlash, base_compliance, deflected_equilibrium, gear_ratio, gravity_direction, hoist_direction, hoist_force,
+    joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance, joint_nonlinear_stiffness,
+    joint_thermal_drift, link_bending, link_thermal_bending, link_thermal_expansion, payload_mass, station_shift,
+    tracker_drift, tracker_scale, unmodelled_mass,
+};
+use crate::model::parameter::EffectParameter;
+use crate::problem::{Effect, Problem};
+
+/// Every family, in the order of the file format.
+pub const FAMILIES: [&Family; 21] = [
+    &joint_compliance::FAMILY,
+    &joint_harmonic::FAMILY,
+    &gear_ratio::FAMILY,
+    &backlash::FAMILY,
+    &joint_nonlinear_stiffness::FAMILY,
+    &joint_lateral_compliance::FAMILY,
+    &joint_thermal_drift::FAMILY,
+    &joint_coupling::FAMILY,
+    &link_bending::FAMILY,
+    &link_thermal_bending::FAMILY,
+    &link_thermal_expansion::FAMILY,
+    &unmodelled_mass::FAMILY,
+    &payload_mass::FAMILY,
+    &hoist_force::FAMILY,
+    &hoist_direction::FAMILY,
+    &base_compliance::FAMILY,
+    &gravity_direction::FAMILY,
+    &deflected_equilibrium::FAMILY,
+    &tracker_scale::FAMILY,
+    &tracker_drift::FAMILY,
+    &station_shift::FAMILY,
+];
+
+/// Every effect of the catalogue that is conceivable on an arm, with the reason why these data cannot show it.
+pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
+    FAMILIES.iter().flat_map(|family| (family.candidates)(problem, data)).collect()
+}
+
+/// Parameters of every effect that `problem` declares, in order.
+pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
+    problem.effects.iter().flat_map(|declared| declared.effect.parameters(problem)).collect()
+}
+
+impl Effect {
+    /// The family; for a custom effect one that has nothing special.
+    fn family(&self) -> &'static Family {
+        let own = FAMILIES.into_iter().find(|family| family.name == self.name());
+        own.filter(|_| custom(self).is_none()).unwrap_or(&USUAL)
+    }
+
+    /// Its parameters with where and how each enters the model.
+    pub fn terms(&self, problem: &Problem) -> Vec<Term> {
+        match custom(self) {
+            Some(own) => own.terms(problem),
+            None => (self.family().terms)(self, problem),
+        }
+    }
+
+    /// Its parameters with their full names: `gear-ratio[3].error`.
+    pub fn parameters(&self, problem: &Problem) -> Vec<EffectParameter> {
+        let place = self.place();
+        let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
+        let name = self.name();
+        let parameter = |term: Term| EffectParameter {
+            name: format!("{name}{bracket}.{}", term.name),
+            plain: format!("{name}.{}", term.name),
+            slot: term.slot,
+            driver: term.driver,
+            nominal: term.nominal,
+            sigma: term.size,
+        };
+        self.terms(problem).into_iter().map(parameter).collect()
+    }
+
+    /// What it is, in words for people.
+    pub fn describe(&self) -> String {
+        custom(self).map_or_else(|| (self.family().describe)(self), |own| own.describe())
+    }
+
+    /// The same where times may not have been measured: the order of the rows stands for them then, counted from 1.
+    pub fn describe_in(&self, time_measured: bool) -> String {
+        let by_row = if time_measured { None } else { (self.family().describe_by_row)(self) };
+        by_row.unwrap_or_else(|| self.describe())
+    }
+
+    /// Name and place for people; without the place where that is a time that is searched.
+    pub fn name_and_place(&self) -> String {
+        let place = if self.family().is_searched { String::new() } else { self.place() };
+        if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
+    }
+
+    /// Whether its place is a time that is searched: two of its family are the same effect at another time.
+    pub fn is_searched(&self) -> bool {
+        self.family().is_searched
+    }
+
+    /// How often chance has a try at it: one over the share of its family's chance, whose `members` are the candidates.
+    pub fn tries(&self, members: &[&Self]) -> f64 {
+        (self.family().tries)(self, members)
+    }
+
+    /// Parts that are tested one by one: a harmonic order by order.
+    pub fn parts(&self) -> Vec<Self> {
+        (self.family().parts)(self)
+    }
+
+    /// The one effect that is this and another: harmonics of one joint; `None` where they are two.
+    pub fn joined(&self, other: &Self) -> Option<Self> {
+        (self.family().joined)(self, other)
+    }
+
+    /// Whether it holds all of another: a harmonic of more orders.
+    pub fn covers(&self, other: &Self) -> bool {
+        (self.family().covers)(self, other)
+    }
+
+    /// The joint at which it is a function of a command alone, and the joint commanded, both from 1.
+    pub fn function_of(&self) -> Option<(usize, usize)> {
+        (self.family().function_of)(self)
+    }
+
+    /// The column without which it cannot be fitted, if measurements with these columns lack it, as a message names it.
+    pub fn missing_column(&self, problem: &Problem, columns: Columns) -> Option<&'static str> {
+        (self.family().missing_column)(self, problem, columns)
+    }
+
+    /// Why these data cannot show a custom effect, if they cannot; those of the catalogue come with their reason.
+    pub fn untestable(&self, problem: &Problem, data: &DataCoverage) -> Option<&'static str> {
+        custom(self).and_then(|own| own.untestable(problem, data))
+    }
+}

@@ -1,0 +1,202 @@
+//! Arguments of effects: what there are, how each is read, and an example of each.
+
+use serde::Serialize;
+
+use super::section::Section;
+use super::{Joint, JointKind};
+use crate::error::{InputError, InputErrorKind};
+use crate::quantity::Unit;
+
+/// An argument of an effect as the files write it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Argument {
+    /// Number of a joint, from 1.
+    Joint(usize),
+    /// Orders of harmonics.
+    Orders(Vec<u32>),
+    /// Name of a beam, or the place of a custom effect.
+    Name(String),
+    /// A time [s].
+    Time(f64),
+}
+
+impl Argument {
+    /// As TOML writes it.
+    pub fn toml(&self) -> String {
+        match self {
+            Self::Joint(joint) => joint.to_string(),
+            Self::Orders(orders) => format!("{orders:?}"),
+            Self::Name(name) => format!("{name:?}"),
+            Self::Time(time) => format!("{time:?}"),
+        }
+    }
+
+    /// Its part of the place of an effect: orders have none.
+    pub(super) fn place(&self) -> Option<String> {
+        match self {
+            Self::Joint(joint) => Some(joint.to_string()),
+            Self::Name(name) => Some(name.clone()),
+            Self::Time(time) => Some(time.to_string()),
+            Self::Orders(_) => None,
+        }
+    }
+}
+
+impl From<&usize> for Argument {
+    fn from(joint: &usize) -> Self {
+        Self::Joint(*joint)
+    }
+}
+
+impl From<&Vec<u32>> for Argument {
+    fn from(orders: &Vec<u32>) -> Self {
+        Self::Orders(orders.clone())
+    }
+}
+
+impl From<&String> for Argument {
+    fn from(name: &String) -> Self {
+        Self::Name(name.clone())
+    }
+}
+
+impl From<&f64> for Argument {
+    fn from(time: &f64) -> Self {
+        Self::Time(*time)
+    }
+}
+
+/// The arguments of one effect, read one after the other and checked against the arm: a method for each kind.
+pub(crate) struct Reader<'s, 'a, 'i> {
+    pub section: Section<'a, 'i>,
+    joints: &'s [Joint],
+    /// The joint that was read last.
+    last: Option<usize>,
+}
+
+impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
+    pub fn new(section: Section<'a, 'i>, joints: &'s [Joint]) -> Self {
+        Self { section, joints, last: None }
+    }
+
+    /// A joint's number, counted from 1.
+    pub fn any_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let item = self.section.require(key, &format!("{key} = …, a joint's number"))?;
+        let joint = item.whole(0)?;
+        match usize::try_from(joint) {
+            Ok(number) if (1..=self.joints.len()).contains(&number) => Ok(number),
+            _ => Err(item.error(InputErrorKind::UnknownJoint { joint, joints: self.joints.len() })),
+        }
+    }
+
+    /// The number of a joint before which there is a link.
+    pub fn linked_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        self.any_joint(key)
+    }
+
+    /// The number of a joint that takes a command.
+    pub fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let joint = self.any_joint(key)?;
+        match (self.joints[joint - 1].kind, self.section.peek(key)) {
+            (JointKind::Fixed, Some(item)) => Err(item.error(InputErrorKind::NoCommand { joint })),
+            _ => {
+                self.last = Some(joint);
+                Ok(joint)
+            }
+        }
+    }
+
+    /// The number of another joint that takes a command than the one before.
+    pub fn other_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let before = self.last;
+        let joint = self.moving_joint(key)?;
+        if before == Some(joint) {
+            return Err(self.section.error(InputErrorKind::CoupledToItself { joint }));
+        }
+        Ok(joint)
+    }
+
+    /// The name of a beam.
+    pub fn beam(&mut self, key: &str) -> Result<String, InputError> {
+        let item = self.section.require(key, &format!("{key} = \"…\", the name of a beam"))?;
+        let link = item.text()?.to_owned();
+        let links = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone());
+        if links().any(|known| known == link) {
+            Ok(link)
+        } else {
+            Err(item.error(InputErrorKind::UnknownLink { link, links: links().collect() }))
+        }
+    }
+
+    /// Orders of harmonics, at least one, each once.
+    pub fn orders(&mut self, key: &str) -> Result<Vec<u32>, InputError> {
+        let item = self.section.require(key, &format!("{key} = [1], the harmonics"))?;
+        let mut orders = Vec::new();
+        for element in item.list("a list of whole numbers")? {
+            let order = u32::from(element.small()?);
+            if orders.contains(&order) {
+                return Err(element.error(InputErrorKind::RepeatedOrder { order }));
+            }
+            orders.push(order);
+        }
+        if orders.is_empty() { Err(item.error(InputErrorKind::NoOrders)) } else { Ok(orders) }
+    }
+
+    /// A time [s]; its key ends in the unit.
+    pub fn time(&mut self, key: &str) -> Result<f64, InputError> {
+        let base = key.strip_suffix("_s").unwrap_or(key);
+        self.section.number(base, Unit::Time)?.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
+    }
+}
+
+/// Examples of the same kinds on an arm, as TOML writes them.
+pub(super) struct Examples<'s> {
+    joints: &'s [Joint],
+}
+
+impl<'s> Examples<'s> {
+    pub fn new(joints: &'s [Joint]) -> Self {
+        Self { joints }
+    }
+
+    fn moving(&self) -> impl Iterator<Item = usize> {
+        (1..=self.joints.len()).filter(|number| self.joints[number - 1].kind != JointKind::Fixed)
+    }
+
+    fn first(&self) -> usize {
+        self.moving().next().unwrap_or(1)
+    }
+
+    pub fn any_joint(&self) -> String {
+        self.first().to_string()
+    }
+
+    pub fn moving_joint(&self) -> String {
+        self.first().to_string()
+    }
+
+    pub fn other_joint(&self) -> String {
+        self.moving().nth(1).unwrap_or(self.first() + 1).to_string()
+    }
+
+    pub fn linked_joint(&self) -> String {
+        let long = (1..=self.joints.len()).find(|number| self.joints[number - 1].a != 0.0);
+        long.unwrap_or(self.first()).to_string()
+    }
+
+    pub fn beam(&self) -> String {
+        let name = self.joints.iter().find_map(|joint| joint.beam.as_ref()).map_or("A", |beam| beam.name.as_str());
+        format!("{name:?}")
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn orders(&self) -> String {
+        "[1]".to_owned()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn time(&self) -> String {
+        "600.0".to_owned()
+    }
+}
