@@ -145,10 +145,10 @@ fn growth(check: &Check) -> Table {
 fn enough(check: &Check) -> String {
     match check.growth.enough {
         Some(enough) => format!(
-            "From {enough} poses on they see all that such poses can, and the arm predicts as exactly as one position is measured."
+            "From {enough} poses on they identify all that such poses can, and predictions are as accurate as one measured position."
         ),
         None => format!(
-            "Even {} poses do not make the arm predict as exactly as one position is measured.",
+            "Even {} poses do not make predictions as accurate as one measured position.",
             check.growth.steps.last().map_or(0, |step| step.poses)
         ),
     }

@@ -321,8 +321,8 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
     ];
     if let Some(sigma) = closure.harmonic_sigma {
         blocks.push(Block::Text(format!(
-            "Waves of joints are many: every order up to the highest that stands out is in the model, with one prior of {} ° \
-             for all. With it, poses are predicted best where whole parts of a joint's range are left out.",
+            "Many harmonics were found: every order up to the highest that stands out is in the model, with one prior of {} ° for \
+             all, the one that predicts poses best where part of a joint's range is left out.",
             number(sigma.to_degrees(), 6)
         )));
     }
@@ -331,7 +331,7 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
 
 fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     let mut details = effect::values(found);
-    let mut chance = format!("p {}, the probability that it is chance", p_value(found.p_value));
+    let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));
     if let Some(then) = closure.held_out_once(found) {
         let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
     }
@@ -340,7 +340,7 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
         let named = found.alternatives.iter().map(|other| closure.before.describe(other));
         let (mut named, more) = some_of(named, alternatives);
         named.extend((more > 0).then(|| format!("and {more} more")));
-        details.push(format!("these data do not tell it from: {}", named.join("; ")));
+        details.push(format!("these data do not distinguish it from: {}", named.join("; ")));
     }
     Point { text: effect::both(&found.effect, &closure.before), details, mark: None }
 }
@@ -381,7 +381,9 @@ fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
     sentences.push(catalogue + ".");
     match correction {
         None => {
-            sentences.push("No correction without a cause would help on poses that it was not made from.".to_owned());
+            sentences.push(
+                "No empirical correction would improve the prediction of poses that it was not fitted to.".to_owned(),
+            );
         }
         Some(Correction { covariate, range, beyond, cross_validated: (without, with), held_out, .. }) => {
             sentences.push(format!(

@@ -157,7 +157,8 @@ fn arguments(effect: &Effect) -> Value {
 
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found, trace: &Trace) -> Vec<String> {
-    let first = format!("Found by flexcal loop: {}, p {}.", trace.describe(&found.effect), p_value(found.p_value));
+    let first =
+        format!("Found by flexcal loop: {}, p-value {}.", trace.describe(&found.effect), p_value(found.p_value));
     std::iter::once(first).chain(values(found)).collect()
 }
 

@@ -57,9 +57,10 @@ pub(super) fn values(found: &Found) -> Vec<String> {
     }
     let mut waves: Vec<(u32, Estimate)> = orders.iter().copied().zip(estimates.chunks_exact(2).map(height)).collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-    let highest = waves.iter().take(SHOWN_WAVES).map(|(order, height)| line(&format!("wave of order {order}"), height));
+    let highest =
+        waves.iter().take(SHOWN_WAVES).map(|(order, height)| line(&format!("amplitude of order {order}"), height));
     let lower = waves.len().saturating_sub(SHOWN_WAVES);
-    highest.chain((lower > 0).then(|| format!("and {lower} lower waves, in loop.json"))).collect()
+    highest.chain((lower > 0).then(|| format!("and {lower} lower ones, in loop.json"))).collect()
 }
 
 /// Height of a sine and a cosine of one order, with its standard error; the two taken as uncorrelated.

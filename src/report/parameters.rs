@@ -76,7 +76,7 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
         let later = &found.estimates[k + 1..];
         if *more > 0 && !later.iter().any(|other| harmonics.get(&other.name).is_some_and(|(own, _)| own == joint)) {
             let mut cells = vec![String::new(); HEADER.len()];
-            cells[0] = format!("and {more} lower waves of joint {joint}");
+            cells[0] = format!("and {more} lower harmonics of joint {joint}");
             shown.push((cells, Bar::default()));
         }
     }
@@ -85,23 +85,23 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
         Table { minor: vec![1, 3, 6], bars: Some(("change / σ", bars)), ..Table::new(&HEADER, rows, &[0, 5, 6]) }
     };
     let count = lower.len();
-    let mut notes: Vec<String> = (count > 0).then(|| format!("lower waves: in {file}")).into_iter().collect();
+    let mut notes: Vec<String> = (count > 0).then(|| format!("lower harmonics: in {file}")).into_iter().collect();
     if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         notes.push(
-            "–: no standard error: the data say nothing of it or see it in a blind combination only, a bound holds it, or it \
-             was not fitted"
+            "–: no standard error: the data do not identify it, or only in a combination with others, a bound holds it, or it was not \
+             fitted"
                 .to_owned(),
         );
     }
     notes.push(
-        "identified: the share that the data gave; the rest is prior, bound, or choice among blind combinations"
+        "identified: the share that the data gave; the rest is prior, bound, or choice within unidentifiable combinations"
             .to_owned(),
     );
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
-        let on_paper = format!("The lower waves are left out on paper: they are in {file}.");
+        let on_paper = format!("The lower harmonics are left out on paper: they are in {file}.");
         let folded = vec![Block::Table(table(lower))];
-        blocks.push(Block::Folded(format!("The lower waves: {count} coefficients"), folded, on_paper));
+        blocks.push(Block::Folded(format!("The lower harmonics: {count} coefficients"), folded, on_paper));
     }
     blocks
 }
@@ -109,7 +109,7 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
 /// What Markdown says below the table where waves are left out.
 pub(super) fn lower_waves<'a>(problem: &Problem, found: &Identification, file: &str) -> Option<Block<'a>> {
     let some = highest(&found.estimates, &harmonics(problem)).values().any(|(_, more)| *more > 0);
-    some.then(|| Block::Words(vec![Block::Text(format!("Lower waves: in {file}."))]))
+    some.then(|| Block::Words(vec![Block::Text(format!("Lower harmonics: in {file}."))]))
 }
 
 fn row(estimate: &Estimate) -> Vec<String> {
@@ -169,10 +169,11 @@ fn is_vague(estimate: &Estimate) -> bool {
 pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str) -> Block<'a> {
     let blind = &found.blind;
     if blind.is_empty() {
-        return Block::lines("The data see every combination of the parameters there.");
+        return Block::lines("Every combination of the parameters is identifiable there.");
     }
+    let is = if blind.len() == 1 { "is" } else { "are" };
     let words = format!(
-        "{} of {} combinations cannot be seen there (their parameters can change together in these\n\
+        "{} of {} combinations of parameters {is} not identifiable there (they can change together in these\n\
          proportions, each scaled by its effect, and no predicted position moves):",
         blind.len(),
         unknowns.len()

@@ -81,7 +81,7 @@ pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
         let show = |value: Option<f64>| shown(value, &unit);
         rows.push(cells([&effect::declaration(own), "", "", ""]));
         rows.push(cells(["  found from", &show(random_found), &show(planned.found.worst), &unit.symbol]));
-        rows.push(cells(["  told from the other from", &show(random_told), &show(planned.told.worst), &unit.symbol]));
+        rows.push(cells(["  told apart from", &show(random_told), &show(planned.told.worst), &unit.symbol]));
         let at = format!("  p beside the other at {} {}", show(Some(size)), unit.symbol);
         rows.push(cells([&at, &p_value(random_p), &p_value(p), ""]));
     }
@@ -89,8 +89,9 @@ pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
         Block::Table(Table::new(&["told apart", "random", "planned", "unit"], rows, &[0, 3])),
         Block::Text(
             "The angle is that between the two once all parameters have been fitted: at 0° nothing tells them apart, at 90° they \
-             have nothing in common. Sizes are those found, or told from the other, in 80 of 100 such sets; p is what to expect \
-             for the other in its place. Random: median over as many random poses, drawn again and again."
+             have nothing in common. An effect of the size given is found, or told apart from the other, in 80 of 100 such sets of \
+             measurements; p is the p-value to expect with the other in its place. Random: median over as many random poses, \
+             drawn again and again."
                 .to_owned(),
         ),
     ]

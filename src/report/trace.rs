@@ -197,7 +197,7 @@ pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
         blocks.push(Block::List(effect::reasons(trace.untestable.iter().cloned())));
     }
     if !trace.absorbed.is_empty() {
-        blocks.push(Block::heading("What the fitted parameters take up wholly, so that it would not show"));
+        blocks.push(Block::heading("What the fitted parameters absorb completely, so that it would not show"));
         blocks.push(Block::list(effect::listed(&trace.absorbed)));
     }
     blocks

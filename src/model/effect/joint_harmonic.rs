@@ -38,7 +38,8 @@ pub(super) const FAMILY: Family = Family {
     },
     describe: |effect| match effect {
         Effect::JointHarmonic { joint, orders } => {
-            format!("angle of joint {joint} errs {} × a turn", listed(orders))
+            let cycles = if orders == &[1] { "cycle" } else { "cycles" };
+            format!("angle of joint {joint} errs with {} {cycles} a revolution", listed(orders))
         }
         _ => String::new(),
     },

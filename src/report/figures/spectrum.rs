@@ -19,10 +19,10 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
     let lowest = values.iter().map(|at| at.1).fold(0.0, f64::min).floor().min(-2.0);
     let blind = found.blind.len();
     let svg = figure((WIDTH, HEIGHT), "Singular values", |area| {
-        let entries = [("seen", ACCENT, true), ("blind", WARM, true)];
+        let entries = [("identifiable", ACCENT, true), ("not identifiable", WARM, true)];
         legend(area, if blind > 0 { &entries } else { &entries[..1] })?;
         let (_, body) = area.split_vertically(px(20));
-        let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best seen first");
+        let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best identified first");
         let y = Axis::logarithmic((lowest, 0.3), "relative singular value [1]");
         let mut chart = chart(&body, &x, &y)?;
         for (k, at) in values.iter().enumerate() {
@@ -33,9 +33,9 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         Ok(())
     });
     let tells = match blind {
-        0 => "every combination is seen".to_owned(),
-        1 => "one combination is blind: it can change and no predicted position moves".to_owned(),
-        n => format!("{n} combinations are blind: they can change and no predicted position moves"),
+        0 => "every combination is identifiable".to_owned(),
+        1 => "one combination is not identifiable: it can change and no predicted position moves".to_owned(),
+        n => format!("{n} combinations are not identifiable: they can change and no predicted position moves"),
     };
     Some(Drawing {
         name: "singular-values".to_owned(),
