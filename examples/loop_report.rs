@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (data, _warnings) = Dataset::read_files(files, &problem)?;
     let closure = close(&problem, &data, &Options::default())?;
     let shown = plot_data::of_closure(&problem, &data, &closure)?;
-    let page = report::loop_page(&problem, &closure, &shown);
+    let page = report::loop_report(&problem, &closure, &shown);
     fs::create_dir_all(folder.join("figures"))?;
     for (name, figure) in &page.figures {
         fs::write(folder.join("figures").join(name), figure)?;

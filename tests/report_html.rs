@@ -11,7 +11,7 @@ use flexcal::identify::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::plot_data;
-use flexcal::report::{self, Page};
+use flexcal::report::{self, Report};
 use nalgebra::Vector3;
 
 /// Elements without an end.
@@ -47,7 +47,7 @@ fn badly_nested(text: &str) -> Option<String> {
 }
 
 /// What every page and figure must be.
-fn check(page: &Page) {
+fn check(page: &Report) {
     assert_eq!(badly_nested(&page.html), None);
     let namespace = "http://www.w3.org/2000/svg";
     for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())]) {
@@ -79,7 +79,7 @@ fn a_closed_loop_shows_what_it_found() {
     }
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let shown = plot_data::of_closure(&problem, &data, &closure).unwrap();
-    let page = report::loop_page(&problem, &closure, &shown);
+    let page = report::loop_report(&problem, &closure, &shown);
     check(&page);
     assert!(closure.effects.iter().any(|found| found.effect.name() == "tracker-drift"));
     assert_eq!(shown.causes.len(), closure.effects.len());
@@ -96,10 +96,10 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((slope * 3600.0 / 0.707e-3 - 1.0).abs() < 0.25, "{slope}");
     let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
-    let again = report::loop_page(&problem, &closure, &shown);
+    let again = report::loop_report(&problem, &closure, &shown);
     assert_eq!(page, again);
     let other = plot_data::of_closure(&problem, &data, &closure).unwrap();
-    assert_eq!(report::loop_page(&problem, &closure, &other).html, page.html);
+    assert_eq!(report::loop_report(&problem, &closure, &other).html, page.html);
 }
 
 #[test]
@@ -121,14 +121,14 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
         let shown = shown.correlations.matrix[(name(&a), name(&b))];
         assert_eq!(shown.to_bits(), rho.to_bits(), "{a} {b}: {shown} {rho}");
     }
-    let page = report::identification_page(&problem, &found, &shown);
+    let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     // Every check with its verdict, on the page and in Markdown.
     assert!(shown.findings.tests.len() > 5);
     for check in &shown.findings.tests {
         assert!(page.html.contains(&check.to_string().replace('&', "&amp;")), "{check}");
     }
-    let told = report::identification_markdown(&problem, &found, &shown);
+    let told = report::identification_report(&problem, &found, &shown).markdown;
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
@@ -147,16 +147,18 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     found.fitted.held_out = ErrorSummary::of(errors);
     let count = errors.len();
     let words = format!("3 of {count} held-out poses have no equilibrium");
-    let page = report::identification_page(&problem, &found, &shown);
+    let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     assert!(page.html.contains(&words) && page.html.contains("3 poses without an equilibrium are left out"));
-    let dots = |page: &Page| {
+    let dots = |page: &Report| {
         page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
     };
     let whole = plot_data::of_identification(&problem, &data, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
-    assert_eq!(dots(&page) + 12, dots(&report::identification_page(&problem, &found, &whole)));
-    for text in [report::identification_markdown(&problem, &found, &shown), report::estimate_text(&problem, &found)] {
+    assert_eq!(dots(&page) + 12, dots(&report::identification_report(&problem, &found, &whole)));
+    for text in
+        [report::identification_report(&problem, &found, &shown).markdown, report::estimate_text(&problem, &found)]
+    {
         assert!(text.contains(&words) && !text.contains("NaN"), "{text}");
     }
 }
@@ -168,7 +170,7 @@ fn thousands_of_poses_make_no_large_page() {
     let many = part(&few.measurements, (0..6600).map(|k| k % few.measurements.len()));
     let many = Dataset::of(&problem, many).unwrap();
     let shown = plot_data::of_identification(&problem, &many, &found).unwrap();
-    let page = report::identification_page(&problem, &found, &shown);
+    let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
     assert!(page.html.contains("is drawn."), "what is left out is said");

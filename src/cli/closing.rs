@@ -46,10 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = [
         ("loop.json", json.as_str()),
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
-        ("report.md", &report::loop_markdown(&problem, &closure, &shown)),
     ];
-    let page = report::loop_page(&problem, &closure, &shown);
-    output::write_report(&folder, &results, &page)?;
+    let told = report::loop_report(&problem, &closure, &shown);
+    output::write_report(&folder, &results, &told)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

@@ -34,9 +34,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
     let shown = plot_data::of_comparison(&problem, &data, &comparison)?;
-    let told = report::comparison_markdown(&problem, &comparison, &shown);
-    let page = report::comparison_page(&problem, &comparison, &shown);
-    output::write_report(&folder, &[("compare.json", &json), ("report.md", &told)], &page)?;
+    let told = report::comparison_report(&problem, &comparison, &shown);
+    output::write_report(&folder, &[("compare.json", &json)], &told)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

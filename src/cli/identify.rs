@@ -96,9 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
     let shown = plot_data::of_identification(&problem, &data, &identification)?;
-    let told = report::identification_markdown(&problem, &identification, &shown);
-    let page = report::identification_page(&problem, &identification, &shown);
-    output::write_report(&folder, &[("estimate.json", &json), ("report.md", &told)], &page)?;
+    let told = report::identification_report(&problem, &identification, &shown);
+    output::write_report(&folder, &[("estimate.json", &json)], &told)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use flexcal::report::{Page, is_figure};
+use flexcal::report::{Report, is_figure};
 
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -31,14 +31,15 @@ pub fn write_all(folder: &Path, texts: &[(&str, &str)]) -> Result<(), WriteError
     keep(texts.iter().map(|(name, text)| (folder.join(name), *text)).collect())
 }
 
-/// The same with a page: `report.html` and its figures in `figures`, from where those of an older page go.
-pub fn write_report(folder: &Path, texts: &[(&str, &str)], page: &Page) -> Result<(), WriteError> {
+/// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where those of an older page go.
+pub fn write_report(folder: &Path, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
     let drawn = folder.join("figures");
-    let texts = texts.iter().copied().chain([("report.html", page.html.as_str())]);
+    let texts =
+        texts.iter().copied().chain([("report.md", report.markdown.as_str()), ("report.html", report.html.as_str())]);
     let mut files: Vec<(PathBuf, &str)> = texts.map(|(name, text)| (folder.join(name), text)).collect();
-    files.extend(page.figures.iter().map(|(name, figure)| (drawn.join(name), figure.as_str())));
+    files.extend(report.figures.iter().map(|(name, figure)| (drawn.join(name), figure.as_str())));
     keep(files)?;
-    forget(&drawn, page).map_err(|source| WriteError { path: drawn, source })
+    forget(&drawn, report).map_err(|source| WriteError { path: drawn, source })
 }
 
 /// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its place.
@@ -76,11 +77,11 @@ fn prepared(path: &Path, text: &str) -> io::Result<tempfile::NamedTempFile> {
 }
 
 /// Removes figures from a folder that are not on the page; files that are no figures of flexcal stay.
-fn forget(drawn: &Path, page: &Page) -> io::Result<()> {
+fn forget(drawn: &Path, report: &Report) -> io::Result<()> {
     for entry in fs::read_dir(drawn)? {
         let entry = entry?;
         let name = entry.file_name();
-        let is_old = |name: &str| is_figure(name) && page.figures.iter().all(|(own, _)| own != name);
+        let is_old = |name: &str| is_figure(name) && report.figures.iter().all(|(own, _)| own != name);
         if name.to_str().is_some_and(is_old) && entry.file_type()?.is_file() {
             fs::remove_file(entry.path())?;
         }

@@ -9,7 +9,7 @@ use super::identify::{change, fitted_parameters, poses, short_mm, size, spread, 
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, p_value};
-use super::render::{Page, markdown, page, text};
+use super::render::{Report, report, text};
 use super::{effect, findings, trace};
 use crate::diagnose::{
     ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Unexplained, Verdict,
@@ -135,17 +135,12 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     text(&blocks)
 }
 
-/// The whole story of the loop as Markdown, ending in a line break.
-pub fn loop_markdown(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> String {
-    markdown(&problem.title, &report(problem, closure, plots))
+/// The report of `loop`.
+pub fn loop_report(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Report {
+    report(problem, "closed loop", &blocks(problem, closure, plots))
 }
 
-/// The report of the loop.
-pub fn loop_page(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Page {
-    page(problem, "closed loop", &report(problem, closure, plots))
-}
-
-fn report<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -> Vec<Block<'a>> {
+fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -> Vec<Block<'a>> {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let file = format!("the estimate.json of {}", code("flexcal identify problem.closed.toml"));
     let counts = format!(

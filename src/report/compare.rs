@@ -5,7 +5,7 @@ use super::figures::{Figure, PlotData};
 use super::identify::{change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
 use super::json::{Both, object, to_text};
 use super::quantity::{mm, number};
-use super::render::{Page, markdown, page, text};
+use super::render::{Report, report, text};
 use crate::identify::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
 use crate::least_squares::solver::Termination;
 use crate::model::Ablation;
@@ -152,17 +152,12 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     text(&blocks)
 }
 
-/// A comparison as Markdown, ending in a line break.
-pub fn comparison_markdown(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> String {
-    markdown(&problem.title, &report(problem, comparison, plots))
-}
-
 /// The report of `compare`.
-pub fn comparison_page(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> Page {
-    page(problem, "comparison", &report(problem, comparison, plots))
+pub fn comparison_report(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> Report {
+    report(problem, "comparison", &blocks(problem, comparison, plots))
 }
 
-fn report<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData) -> Vec<Block<'a>> {
+fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData) -> Vec<Block<'a>> {
     let joint = &comparison.joint;
     let held_out = joint.fitted.held_out;
     let head = Headline {

@@ -9,7 +9,7 @@ use super::findings;
 use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters};
 use super::quantity::{decimals, mm, number};
-use super::render::{Page, markdown, page, text};
+use super::render::{Report, report, text};
 use crate::identify::{ActiveConstraint, Distrust, ErrorSummary, Estimate, Identification, Noise, Outlier};
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
@@ -106,17 +106,12 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     text(&blocks)
 }
 
-/// An identification as Markdown, ending in a line break.
-pub fn identification_markdown(problem: &Problem, found: &Identification, plots: &PlotData) -> String {
-    markdown(&problem.title, &report(problem, found, plots))
-}
-
 /// The report of `identify`.
-pub fn identification_page(problem: &Problem, found: &Identification, plots: &PlotData) -> Page {
-    page(problem, "identification", &report(problem, found, plots))
+pub fn identification_report(problem: &Problem, found: &Identification, plots: &PlotData) -> Report {
+    report(problem, "identification", &blocks(problem, found, plots))
 }
 
-fn report<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
+fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let held_out = found.fitted.held_out;
     let head = Headline {
         change: change(&found.registered.held_out, &held_out),

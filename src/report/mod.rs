@@ -28,14 +28,14 @@ mod study;
 mod trace;
 
 pub use check::{check_json, check_text, why_not_sufficient};
-pub use closed_loop::{loop_json, loop_markdown, loop_page, loop_text};
+pub use closed_loop::{loop_json, loop_report, loop_text};
 pub use closed_problem::closed_problem;
-pub use compare::{compare_json, compare_text, comparison_markdown, comparison_page};
+pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use figures::is_figure;
-pub use identify::{estimate_json, estimate_text, identification_markdown, identification_page, why_not_trusted};
+pub use identify::{estimate_json, estimate_text, identification_report, why_not_trusted};
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
-pub use render::Page;
+pub use render::Report;
 pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};
 pub use trace::{trace_json, trace_text};

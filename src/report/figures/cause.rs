@@ -3,9 +3,9 @@
 use plotters::prelude::*;
 
 use super::frame::{
-    ACCENT, Axis, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
+    ACCENT, Axis, Drawing, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, thinned,
+    with_margin,
 };
-use super::{Drawing, thinned};
 use crate::quantity::Unit;
 use crate::report::plot_data::{Abscissa, Cause, Ordinate, Point};
 

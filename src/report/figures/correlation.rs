@@ -3,8 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::Drawing;
-use super::frame::{ACCENT, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
+use super::frame::{ACCENT, Drawing, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
 use crate::report::plot_data::Correlations;
 
 /// Parameters that are drawn at most.

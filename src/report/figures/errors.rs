@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use plotters::prelude::*;
 
 use super::frame::{
-    ACCENT, Area, Axis, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, legend, line, px, radius, range,
+    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, left_out, legend, line, px,
+    radius, range, thinned,
 };
-use super::{Drawing, left_out, thinned};
 use crate::report::plot_data::{Picture, Stand, State};
 use crate::report::quantity::number;
 

@@ -36,6 +36,19 @@ pub const ACCENT: RGBColor = RGBColor(0x0B, 0x6B, 0xCB);
 /// Its opposite: negative, failed.
 pub const WARM: RGBColor = RGBColor(0xC2, 0x52, 0x1B);
 
+/// A figure as it is drawn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Drawing {
+    /// Name of its file, without the ending.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// What to see in it.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+}
+
 /// A part of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Why drawing failed; writing to memory never does.
@@ -137,7 +150,7 @@ impl<'a> Axis<'a> {
 }
 
 /// 10⁻⁶ for −6.
-pub fn power_of_ten(exponent: f64) -> String {
+fn power_of_ten(exponent: f64) -> String {
     let raised = |digit: char| match digit {
         '-' => Some('⁻'),
         digit => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize),
@@ -302,4 +315,18 @@ pub fn legend(area: &Area, entries: &[(&str, RGBColor, bool)]) -> Result<(), Fai
 /// Every how many of `count` are drawn so that there are no more than `most`.
 pub fn every(count: usize, most: usize) -> usize {
     count.div_ceil(most).max(1)
+}
+
+/// " 3 poses without an equilibrium are left out." where there are any.
+pub fn left_out(poses: usize) -> String {
+    match poses {
+        0 => String::new(),
+        1 => " One pose without an equilibrium is left out.".to_owned(),
+        n => format!(" {n} poses without an equilibrium are left out."),
+    }
+}
+
+/// " One pose in 3 is drawn." where poses are left out of a drawing.
+pub fn thinned(every: usize) -> String {
+    if every > 1 { format!(" One pose in {every} is drawn.") } else { String::new() }
 }

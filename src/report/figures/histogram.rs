@@ -2,8 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::Drawing;
-use super::frame::{ACCENT, Axis, FAINT, WIDTH, chart, figure, legend, line, px};
+use super::frame::{ACCENT, Axis, Drawing, FAINT, WIDTH, chart, figure, legend, line, px};
 use crate::report::plot_data::Picture;
 
 const HEIGHT: i32 = 280;

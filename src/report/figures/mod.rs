@@ -11,7 +11,7 @@ mod spectrum;
 mod strategies;
 mod vectors;
 
-pub use frame::{ACCENT, FAINT, GRID, INK, MUTED, WARM};
+pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 
 use crate::diagnose::Trace;
 use crate::identify::Comparison;
@@ -55,19 +55,6 @@ impl Figure<'_> {
     }
 }
 
-/// A figure as it is drawn.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Drawing {
-    /// Name of its file, without the ending.
-    pub name: String,
-    /// What it shows.
-    pub title: String,
-    /// What to see in it.
-    pub caption: String,
-    /// The drawing.
-    pub svg: String,
-}
-
 /// Every name but those of effects, which are numbered.
 const NAMES: [&str; 10] = [
     "ablations",
@@ -87,18 +74,4 @@ pub fn is_figure(file: &str) -> bool {
     let Some(name) = file.strip_suffix(".svg") else { return false };
     let numbered = |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
     NAMES.contains(&name) || name.strip_prefix("effect-").is_some_and(numbered)
-}
-
-/// " 3 poses without an equilibrium are left out." where there are any.
-fn left_out(poses: usize) -> String {
-    match poses {
-        0 => String::new(),
-        1 => " One pose without an equilibrium is left out.".to_owned(),
-        n => format!(" {n} poses without an equilibrium are left out."),
-    }
-}
-
-/// " Every third pose is drawn." where poses are left out of a drawing.
-fn thinned(every: usize) -> String {
-    if every > 1 { format!(" One pose in {every} is drawn.") } else { String::new() }
 }

@@ -3,9 +3,9 @@
 use plotters::prelude::*;
 
 use super::frame::{
-    ACCENT, Axis, FAINT, GRID, WIDTH, chart, every, figure, legend, line, px, radius, range, with_margin,
+    ACCENT, Axis, Drawing, FAINT, GRID, WIDTH, chart, every, figure, left_out, legend, line, px, radius, range,
+    thinned, with_margin,
 };
-use super::{Drawing, left_out, thinned};
 use crate::report::plot_data::{Picture, Residual};
 
 /// Poses that are drawn at most.

@@ -3,8 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::Drawing;
-use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
+use super::frame::{ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
 use crate::diagnose::{Ranked, Trace};
 use crate::problem::Effect;
 use crate::report::quantity::number;

@@ -2,8 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::Drawing;
-use super::frame::{ACCENT, Axis, FAINT, WARM, WIDTH, chart, figure, legend, line, px, radius};
+use super::frame::{ACCENT, Axis, Drawing, FAINT, WARM, WIDTH, chart, figure, legend, line, px, radius};
 use crate::least_squares::Identifiability;
 
 const HEIGHT: i32 = 280;

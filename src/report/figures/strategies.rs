@@ -3,8 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::Drawing;
-use super::frame::{ACCENT, BELOW, FAINT, GRID, INK, MUTED, WIDTH, figure, legend, line, px, radius, write};
+use super::frame::{ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, WIDTH, figure, legend, line, px, radius, write};
 use crate::identify::{Comparison, Errors};
 use crate::report::quantity::{decimals, number};
 

@@ -4,10 +4,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::frame::{
-    ACCENT, Area, Axis, BELOW, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, legend, line, px, radius, range,
-    with_margin, write,
+    ACCENT, Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, left_out, legend, line,
+    px, radius, range, thinned, with_margin, write,
 };
-use super::{Drawing, left_out, thinned};
 use crate::report::plot_data::{Picture, Residual};
 use crate::report::quantity::number;
 

@@ -2,6 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::markdown::markdown;
 use super::style;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
@@ -12,15 +13,18 @@ const REACH: f64 = 10.0;
 
 /// A report for people.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Page {
+#[non_exhaustive]
+pub struct Report {
+    /// In brief and without figures.
+    pub markdown: String,
     /// The whole page: no scripts, nothing to load.
     pub html: String,
     /// File name and SVG text of every figure.
     pub figures: Vec<(String, String)>,
 }
 
-/// The page of some blocks; `kind` says what was done.
-pub(in crate::report) fn page(problem: &Problem, kind: &str, blocks: &[Block]) -> Page {
+/// The report of some blocks; `kind` says what was done.
+pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block]) -> Report {
     let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
     let mut figures = Vec::new();
     let body = sections(blocks, &mut figures);
@@ -53,7 +57,7 @@ pub(in crate::report) fn page(problem: &Problem, kind: &str, blocks: &[Block]) -
         }
     };
     let files = figures.iter().map(|own: &Drawing| (format!("{}.svg", own.name), style::alone(&own.svg)));
-    Page { figures: files.collect(), html: page.into_string() }
+    Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html: page.into_string() }
 }
 
 /// What stands before the first heading, then a section for each heading.

@@ -5,7 +5,6 @@ mod markdown;
 mod style;
 mod text;
 
-pub use html::Page;
-pub(super) use html::page;
-pub(super) use markdown::markdown;
+pub use html::Report;
+pub(super) use html::report;
 pub(super) use text::text;

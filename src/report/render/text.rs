@@ -98,7 +98,7 @@ fn table(table: &Table) -> String {
 mod tests {
     use super::*;
     use crate::report::document::code;
-    use crate::report::render::markdown;
+    use crate::report::render::markdown::markdown;
 
     #[test]
     fn a_story_is_shown_both_ways() {
