@@ -8,7 +8,7 @@ use flexcal::diagnose::close;
 use flexcal::identify::Options;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::report::{self, plot_data};
+use flexcal::report::{self, PlotData};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let files = if files.is_empty() { &problem.data.files } else { &files };
     let (data, _warnings) = Dataset::read_files(files, &problem)?;
     let closure = close(&problem, &data, &Options::default())?;
-    let shown = plot_data::of_closure(&problem, &data, &closure)?;
+    let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let page = report::loop_report(&problem, &closure, &shown);
     fs::create_dir_all(folder.join("figures"))?;
     for (name, figure) in &page.figures {

@@ -10,8 +10,7 @@ use flexcal::diagnose::close;
 use flexcal::identify::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::report::plot_data;
-use flexcal::report::{self, Report};
+use flexcal::report::{self, PlotData, Report};
 use nalgebra::Vector3;
 
 /// Elements without an end.
@@ -78,7 +77,7 @@ fn a_closed_loop_shows_what_it_found() {
         data.measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
     }
     let closure = close(&problem, &data, &Options::default()).unwrap();
-    let shown = plot_data::of_closure(&problem, &data, &closure).unwrap();
+    let shown = PlotData::of_loop(&problem, &data, &closure).unwrap();
     let page = report::loop_report(&problem, &closure, &shown);
     check(&page);
     assert!(closure.effects.iter().any(|found| found.effect.name() == "tracker-drift"));
@@ -98,7 +97,7 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
     let again = report::loop_report(&problem, &closure, &shown);
     assert_eq!(page, again);
-    let other = plot_data::of_closure(&problem, &data, &closure).unwrap();
+    let other = PlotData::of_loop(&problem, &data, &closure).unwrap();
     assert_eq!(report::loop_report(&problem, &closure, &other).html, page.html);
 }
 
@@ -106,13 +105,13 @@ fn a_closed_loop_shows_what_it_found() {
 fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     let (problem, data) = case("tests/cases/a-none.csv");
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let shown = plot_data::of_identification(&problem, &data, &found).unwrap();
+    let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let close = |errors: &[Vector3<f64>], summary: &ErrorSummary| {
         let ratio = ErrorSummary::of(errors).rms.norm / summary.rms.norm;
         assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
     };
-    close(&shown.states[0].errors, &found.registered.held_out);
-    close(&shown.states[shown.states.len() - 1].errors, &found.fitted.held_out);
+    close(&shown.stages[0].errors, &found.registered.held_out);
+    close(&shown.stages[shown.stages.len() - 1].errors, &found.fitted.held_out);
     let fitted: Vec<Vector3<f64>> = shown.residuals.iter().filter(|r| !r.held_out).map(|r| r.error).collect();
     close(&fitted, &found.fitted.identification);
     // Strong correlations are those of the estimate.
@@ -138,9 +137,9 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
 fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let (problem, data) = case("tests/cases/a-none.csv");
     let mut found = identify(&problem, &data, &Options::default()).unwrap();
-    let mut shown = plot_data::of_identification(&problem, &data, &found).unwrap();
-    let last = shown.states.len() - 1;
-    let errors = &mut shown.states[last].errors;
+    let mut shown = PlotData::of_identification(&problem, &data, &found).unwrap();
+    let last = shown.stages.len() - 1;
+    let errors = &mut shown.stages[last].errors;
     for error in errors.iter_mut().take(3) {
         *error = Vector3::repeat(f64::NAN);
     }
@@ -153,7 +152,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let dots = |page: &Report| {
         page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
     };
-    let whole = plot_data::of_identification(&problem, &data, &found).unwrap();
+    let whole = PlotData::of_identification(&problem, &data, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
     assert_eq!(dots(&page) + 12, dots(&report::identification_report(&problem, &found, &whole)));
     for text in
@@ -169,7 +168,7 @@ fn thousands_of_poses_make_no_large_page() {
     let found = identify(&problem, &few, &Options::default()).unwrap();
     let many = part(&few.measurements, (0..6600).map(|k| k % few.measurements.len()));
     let many = Dataset::of(&problem, many).unwrap();
-    let shown = plot_data::of_identification(&problem, &many, &found).unwrap();
+    let shown = PlotData::of_identification(&problem, &many, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());

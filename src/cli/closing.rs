@@ -7,7 +7,7 @@ use std::{fs, io};
 use clap::Args;
 use flexcal::diagnose;
 use flexcal::identify::Options;
-use flexcal::report::{self, plot_data};
+use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::loop_json(&problem, &closure);
     let folder = output::folder(&common.folder(&problem))?;
     let files = common.files(&problem).iter().map(|file| seen_from(&folder, file)).collect::<Result<Vec<_>, _>>()?;
-    let shown = plot_data::of_closure(&problem, &data, &closure)?;
+    let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let results = [
         ("loop.json", json.as_str()),
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),

@@ -4,7 +4,7 @@ use std::error::Error;
 
 use clap::Args;
 use flexcal::identify;
-use flexcal::report::{self, plot_data};
+use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
     let folder = common.folder(&problem);
-    let shown = plot_data::of_comparison(&problem, &data, &comparison)?;
+    let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     output::write_report(&folder, &[("compare.json", &json)], &told)?;
     if common.json {

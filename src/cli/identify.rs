@@ -4,7 +4,7 @@ use std::error::Error;
 
 use clap::{Args, ValueEnum};
 use flexcal::identify::{self, Options, SolverChoice, Strategy};
-use flexcal::report::{self, plot_data};
+use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
 use super::progress::Line;
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
     let folder = common.folder(&problem);
-    let shown = plot_data::of_identification(&problem, &data, &identification)?;
+    let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
     output::write_report(&folder, &[("estimate.json", &json)], &told)?;
     if common.json {

@@ -1,134 +1,380 @@
-//! The residual against what drives it, with the law that was fitted.
+//! The residual against what drives an effect: each pose's own measurement of the effect, and the law that was fitted.
+//!
+//! Shown is the partial residual: what the fit leaves, with the effect's own part put back. At a joint it is turned into the
+//! error of the joint's coordinate by the lever of each pose; elsewhere it is the part along the effect's displacement.
 
+use nalgebra::Vector3;
 use plotters::prelude::*;
 
+use super::arm::{Arm, LEAST_LEVER, Poses};
 use super::frame::{
     ACCENT, Axis, Drawing, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, thinned,
     with_margin,
 };
+use crate::diagnose::{Covariate, Unexplained};
+use crate::model::parameter::{EffectParameter, JointField, Slot};
+use crate::problem::{Effect, JointKind, PoseView, Problem};
 use crate::quantity::Unit;
-use crate::report::plot_data::{Abscissa, Cause, Ordinate, Point};
 
+/// Steps of a curve.
+const STEPS: u32 = 160;
 /// Poses that are drawn at most.
 const MOST: usize = 500;
 const HEIGHT: i32 = 300;
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Of an effect that was found, with its number.
-pub fn effect(own: &Cause, number: usize) -> Drawing {
-    cause(own, format!("effect-{number}"), "Found by the loop; the line is the fitted law.")
+/// A quantity along an axis: what it is with its unit, and the factor from SI to that.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// `temperature [°C]`
+    pub label: String,
+    /// From SI.
+    pub factor: f64,
 }
 
-/// Of structure that no effect explains.
-pub fn trend(own: &Cause) -> Drawing {
-    let lead = "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line and \
-                dots: a constant is what base and geometry take up.";
-    cause(own, "unexplained".to_owned(), lead)
+/// One pose's own measurement of an effect, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// What drives the effect.
+    pub x: f64,
+    /// What it does.
+    pub y: f64,
+    /// Whether the pose was held out.
+    pub held_out: bool,
 }
 
-/// Each pose's own measurement of it, and the fitted law as a line.
-fn cause(cause: &Cause, name: String, lead: &str) -> Drawing {
-    let finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
-    let all: Vec<&Point> = cause.points.iter().filter(finite).collect();
-    let step = every(all.len(), MOST);
-    let shown: Vec<&Point> = all.into_iter().step_by(step).collect();
-    let across = Shown::abscissa(cause.abscissa, range(cause.curve.iter().map(|at| at.0)));
-    let heights = range(shown.iter().map(|point| point.y).chain(cause.curve.iter().map(|at| at.1)));
-    let up = Shown::ordinate(&cause.ordinate, heights);
-    let at = |x: f64, y: f64| (x * across.factor, y * up.factor);
-    let points: Vec<((f64, f64), bool)> = shown.iter().map(|point| (at(point.x, point.y), point.held_out)).collect();
-    let curve: Vec<(f64, f64)> = cause.curve.iter().map(|&(x, y)| at(x, y)).collect();
-    let x = with_margin(range(points.iter().map(|(at, _)| at.0).chain(curve.iter().map(|at| at.0))), 0.04);
-    let y = with_margin((heights.0 * up.factor, heights.1 * up.factor), 0.06);
-    let svg = figure((WIDTH, HEIGHT), &cause.title, |area| {
-        let held_out = points.iter().any(|(_, held_out)| *held_out);
-        let law = if matches!(cause.ordinate, Ordinate::Place { .. }) { "correction" } else { "fitted law" };
-        let entries = [("fitted pose", FAINT, true), ("held-out pose", INK, true), (law, ACCENT, true)];
-        let kept: Vec<_> = entries.into_iter().filter(|(name, ..)| held_out || *name != "held-out pose").collect();
-        legend(area, &kept)?;
-        let (_, body) = area.split_vertically(px(20));
-        let mut chart = chart(&body, &Axis::linear(x, &across.label), &Axis::linear(y, &up.label))?;
-        if y.0 < 0.0 && y.1 > 0.0 {
-            chart.draw_series([PathElement::new(vec![(x.0, 0.0), (x.1, 0.0)], line(FAINT, 1.0))])?;
+/// The residual against the cause of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cause {
+    /// The effect in words.
+    pub title: String,
+    /// From left to right.
+    pub across: Quantity,
+    /// From bottom to top.
+    pub up: Quantity,
+    /// Poses that say something about it, in the order of the rows.
+    pub points: Vec<Point>,
+    /// The fitted law.
+    pub curve: Vec<(f64, f64)>,
+    /// What a point is.
+    reading: &'static str,
+}
+
+const COORDINATE: &str = "Each dot is the error of this coordinate as one pose alone measures it, all other parameters as fitted. \
+                          Poses that hardly feel the coordinate are left out.";
+const ALONG: &str = "Each dot is the residual of one pose along the direction in which the effect moves it, all other parameters \
+                     as fitted.";
+const SIZE: &str = "Each dot is the effect's size as one pose alone measures it, all other parameters as fitted. Poses that \
+                    hardly feel it are left out.";
+
+impl Quantity {
+    fn new(label: impl Into<String>, factor: f64) -> Self {
+        Self { label: label.into(), factor }
+    }
+
+    fn command(problem: &Problem, joint: usize) -> Self {
+        let (unit, factor) = if slides(problem, joint) { ("mm", 1e3) } else { ("°", DEGREES) };
+        Self::new(format!("command of joint {joint}, q{joint} [{unit}]"), factor)
+    }
+
+    fn temperature() -> Self {
+        Self::new("temperature [°C]", 1.0)
+    }
+
+    /// Up to `most` [s].
+    fn elapsed(most: f64) -> Self {
+        let (unit, factor) = if most > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
+        Self::new(format!("time since the first pose [{unit}]"), factor)
+    }
+
+    /// An error of a coordinate, in a unit that suits its largest value.
+    fn error(of: &str, unit: Unit, most: f64) -> Self {
+        match unit {
+            Unit::Length => Self::new(format!("error of {of} [mm]"), 1e3),
+            _ => Self::small(&format!("error of {of}"), "rad", most),
         }
-        for (only, colour) in [(false, FAINT), (true, INK)] {
-            let dots = points.iter().filter(|(_, held_out)| *held_out == only);
-            chart.draw_series(dots.map(|(at, _)| Circle::new(*at, radius(2.2), colour.filled())))?;
-        }
-        chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
-        Ok(())
+    }
+
+    fn small(what: &str, unit: &str, most: f64) -> Self {
+        let (prefix, factor) = if most < 1e-3 { ('µ', 1e6) } else { ('m', 1e3) };
+        Self::new(format!("{what} [{prefix}{unit}]"), factor)
+    }
+}
+
+fn slides(problem: &Problem, joint: usize) -> bool {
+    problem.joints[joint - 1].kind == JointKind::Prismatic
+}
+
+/// An effect over its cause, before it is known which poses say something.
+struct View<'a> {
+    across: Quantity,
+    /// By the largest value [SI] that is shown.
+    up: Box<dyn Fn(f64) -> Quantity + 'a>,
+    /// The cause in each row.
+    x: Vec<f64>,
+    /// What one unit of the ordinate does to each row [m].
+    levers: Vec<Vector3<f64>>,
+    /// The ordinate at a value of the cause.
+    law: Box<dyn Fn(f64) -> f64 + 'a>,
+    reading: &'static str,
+}
+
+/// Every row with its conditions and what an effect does to it.
+struct Rows<'a> {
+    poses: Vec<PoseView<'a>>,
+    /// The effect's displacement [m].
+    own: Vec<Vector3<f64>>,
+    parameters: &'a [EffectParameter],
+    values: &'a [f64],
+}
+
+/// The cause of an effect at the fit of `problem`, which declares it.
+pub fn of(found: &Effect, problem: &Problem, arm: &Arm, poses: &Poses) -> Option<Cause> {
+    let parameters = found.parameters(problem);
+    let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
+    let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
+    let mut without = arm.clone();
+    places.iter().for_each(|&k| without.x[k] = 0.0);
+    let (left, with) = (poses.errors(arm, &poses.rows()), poses.errors(&without, &poses.rows()));
+    let all = poses.all(1.0);
+    let values: Vec<f64> = places.iter().map(|&k| arm.x[k]).collect();
+    let rows = Rows {
+        poses: all.iter().map(|pose| pose.setup).collect(),
+        own: with.iter().zip(&left).map(|(with, left)| with - left).collect(),
+        parameters: &parameters,
+        values: &values,
+    };
+    let view = at_joint(found, problem, &rows, arm, poses).unwrap_or_else(|| elsewhere(found, problem, &rows));
+    let most = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let point = |k: usize| Point {
+        x: view.x[k],
+        y: along(&view.levers[k], &with[k]),
+        held_out: poses.split.held_out.binary_search(&k).is_ok(),
+    };
+    let telling = (0..with.len()).filter(|&k| view.levers[k].norm() > LEAST_LEVER * most);
+    let points: Vec<Point> = telling.map(point).collect();
+    let (low, high) = range(points.iter().map(|point| point.x));
+    let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(STEPS);
+    let curve: Vec<(f64, f64)> = (0..=STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
+    let up = (view.up)(largest(&points, &curve));
+    let title = found.describe_in(poses.measurements.time_measured);
+    Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
+}
+
+/// The change of a coordinate that explains a displacement best.
+fn along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
+    lever.dot(displacement) / lever.norm_squared()
+}
+
+fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
+    let heights = points.iter().map(|point| point.y).chain(curve.iter().map(|at| at.1));
+    heights.filter(|height| height.is_finite()).map(f64::abs).fold(0.0, f64::max)
+}
+
+/// An effect that changes the coordinate of a joint.
+fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm, poses: &Poses) -> Option<View<'a>> {
+    let first = rows.values.first().copied().unwrap_or_default();
+    let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
+    let commands = |joint: usize| rows.poses.iter().map(|pose| pose.configuration[joint - 1]).collect();
+    let lever = |joint: usize| {
+        let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
+        poses.levers(arm, Slot::Joint { joint: joint - 1, field })
+    };
+    let of_command: Law = Box::new(|q: f64| {
+        let configuration = vec![q; rows.poses[0].configuration.len()];
+        rows.driven(&PoseView::of(&configuration))
     });
-    Drawing { name, title: capital(&cause.title), caption: format!("{lead} {}{}", reading(cause), thinned(step)), svg }
+    let own = |levers: &[Vector3<f64>]| -> Vec<f64> {
+        levers.iter().zip(&rows.own).map(|(lever, own)| along(lever, own)).collect()
+    };
+    let (joint, across, x, levers, law): (_, _, Vec<f64>, _, Law) = match *found {
+        Effect::JointHarmonic { joint, .. } | Effect::GearRatio { joint } => {
+            (joint, Quantity::command(problem, joint), commands(joint), lever(joint), of_command)
+        }
+        Effect::JointCoupling { joint, from } => {
+            (joint, Quantity::command(problem, from), commands(from), lever(joint), of_command)
+        }
+        Effect::JointThermalDrift { joint } => {
+            let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(t), ..PoseView::of(&[]) }));
+            (joint, Quantity::temperature(), rows.temperatures(), lever(joint), law)
+        }
+        Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
+            let across = Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
+            let sides = rows.poses.iter().map(|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
+            (joint, across, sides.collect(), lever(joint), Box::new(move |side| 0.5 * first * side))
+        }
+        // Δθ = c M, c₃ M³: the moment follows from the law itself.
+        Effect::JointCompliance { joint } => {
+            let levers = lever(joint);
+            let moments = own(&levers).into_iter().map(|own| own / first).collect();
+            (joint, moment(joint), moments, levers, Box::new(move |moment| first * moment))
+        }
+        Effect::JointNonlinearStiffness { joint } => {
+            let levers = lever(joint);
+            let moments = own(&levers).into_iter().map(|own| (own / first).cbrt()).collect();
+            (joint, moment(joint), moments, levers, Box::new(move |moment| first * moment.powi(3)))
+        }
+        _ => return None,
+    };
+    let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
+    let up = Box::new(move |most| Quantity::error(&format!("joint {joint}"), unit, most));
+    Some(View { across, up, x, levers, law, reading: COORDINATE })
 }
 
-/// With a capital letter.
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
+type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
-/// What a point is.
-fn reading(cause: &Cause) -> &'static str {
-    match cause.ordinate {
-        Ordinate::Joint { .. } | Ordinate::Place { .. } => {
-            "Each dot is the error of this coordinate as one pose alone measures it, all other parameters as fitted. Poses that hardly feel the coordinate are left out."
-        }
-        Ordinate::Displacement => {
-            "Each dot is the residual of one pose along the direction in which the effect moves it, all other parameters as \
-             fitted."
-        }
-        Ordinate::Curvature(_) | Ordinate::Strain(_) | Ordinate::Mass => {
-            "Each dot is the effect's size as one pose alone measures it, all other parameters as fitted. \
-             Poses that hardly feel it are left out."
-        }
-    }
-}
-
-/// A quantity as an axis shows it.
-struct Shown {
-    factor: f64,
-    label: String,
-}
-
-impl Shown {
-    fn abscissa(abscissa: Abscissa, range: (f64, f64)) -> Self {
-        let of = |factor: f64, label: String| Self { factor, label };
-        match abscissa {
-            Abscissa::Command { joint, slides: false } => {
-                of(180.0 / std::f64::consts::PI, format!("command of joint {joint}, q{joint} [°]"))
-            }
-            Abscissa::Command { joint, slides: true } => of(1e3, format!("command of joint {joint}, q{joint} [mm]")),
-            Abscissa::Approach(joint) => of(1.0, format!("side from which joint {joint} came [−1 … +1]")),
-            Abscissa::Moment(joint) => of(1.0, format!("moment about joint {joint} [N·m]")),
-            Abscissa::Temperature => of(1.0, "temperature [°C]".to_owned()),
-            Abscissa::Elapsed if range.1 > 7200.0 => of(1.0 / 3600.0, "time since the first pose [h]".to_owned()),
-            Abscissa::Elapsed => of(1.0, "time since the first pose [s]".to_owned()),
-            Abscissa::Payload => of(1.0, "payload [kg]".to_owned()),
-            Abscissa::Hoist => of(1.0, "hoist force [N]".to_owned()),
-            Abscissa::Displacement => of(1e3, "displacement by the law [mm]".to_owned()),
-        }
+impl Rows<'_> {
+    /// Σ value · driver.
+    fn driven(&self, pose: &PoseView) -> f64 {
+        self.parameters.iter().zip(self.values).map(|(own, value)| value * own.driver.value(pose)).sum()
     }
 
-    fn ordinate(ordinate: &Ordinate, (low, high): (f64, f64)) -> Self {
-        let small = |what: &str, unit: &str| {
-            if low.abs().max(high.abs()) < 1e-3 {
-                Self { factor: 1e6, label: format!("{what} [µ{unit}]") }
-            } else {
-                Self { factor: 1e3, label: format!("{what} [m{unit}]") }
-            }
+    fn temperatures(&self) -> Vec<f64> {
+        self.poses.iter().map(|pose| pose.temperature.unwrap_or_default()).collect()
+    }
+
+    /// The effect's displacement over a size in each row; none where that is 0.
+    fn over(&self, size: impl Fn(&PoseView) -> f64) -> Vec<Vector3<f64>> {
+        let lever = |(own, pose): (&Vector3<f64>, &PoseView)| match size(pose) {
+            0.0 => Vector3::zeros(),
+            size => own / size,
         };
-        match ordinate {
-            Ordinate::Joint { joint, unit: Unit::Length } => {
-                Self { factor: 1e3, label: format!("error of joint {joint} [mm]") }
+        self.own.iter().zip(&self.poses).map(lever).collect()
+    }
+}
+
+/// An effect that is no error of a joint's coordinate.
+fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
+    let sum: f64 = rows.values.iter().sum();
+    let norm = rows.values.iter().map(|value| value * value).sum::<f64>().sqrt();
+    let elapsed: Vec<f64> = rows.poses.iter().map(|pose| pose.elapsed).collect();
+    let last = elapsed.iter().copied().fold(0.0, f64::max);
+    let most = rows.own.iter().fold(Vector3::zeros(), |a: Vector3<f64>, b| if b.norm() > a.norm() { *b } else { a });
+    let measured = |_| Quantity::new("displacement, measured [mm]", 1e3);
+    // Of the measuring frame: every pose moves in one direction.
+    let of_time = |law: Law<'a>| View {
+        across: Quantity::elapsed(last),
+        up: Box::new(measured),
+        x: elapsed.clone(),
+        levers: vec![most.try_normalize(0.0).unwrap_or_default(); rows.own.len()],
+        law,
+        reading: ALONG,
+    };
+    match found {
+        Effect::LinkThermalBending { link } | Effect::LinkThermalExpansion { link } => {
+            let reference = problem.data.reference_temperature.unwrap_or_default();
+            let (bends, link) = (matches!(found, Effect::LinkThermalBending { .. }), link.clone());
+            // An expansion has one coefficient with a sign; a bending's two make one size.
+            let size = if bends { norm } else { sum };
+            View {
+                across: Quantity::temperature(),
+                up: Box::new(move |most| match bends {
+                    true => Quantity::small(&format!("curvature of link {link}"), "rad/m", most),
+                    false => Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6),
+                }),
+                x: rows.temperatures(),
+                levers: rows.over(|pose| size * (pose.temperature.unwrap_or(reference) - reference)),
+                law: Box::new(move |t| size * (t - reference)),
+                reading: SIZE,
             }
-            Ordinate::Joint { joint, .. } => small(&format!("error of joint {joint}"), "rad"),
-            Ordinate::Place { place, unit: Unit::Length } => {
-                Self { factor: 1e3, label: format!("error of {place} [mm]") }
-            }
-            Ordinate::Place { place, .. } => small(&format!("error of {place}"), "rad"),
-            Ordinate::Curvature(link) => small(&format!("curvature of link {link}"), "rad/m"),
-            Ordinate::Strain(link) => Self { factor: 1e6, label: format!("strain of link {link} [10⁻⁶]") },
-            Ordinate::Mass => Self { factor: 1.0, label: "missing mass [kg]".to_owned() },
-            Ordinate::Displacement => Self { factor: 1e3, label: "displacement, measured [mm]".to_owned() },
         }
+        Effect::PayloadMass => View {
+            across: Quantity::new("payload [kg]", 1.0),
+            up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
+            x: rows.poses.iter().map(|pose| pose.payload.unwrap_or_default()).collect(),
+            levers: rows.over(|_| sum),
+            law: Box::new(move |_| sum),
+            reading: SIZE,
+        },
+        Effect::TrackerDrift => {
+            let speed = if last > 0.0 { most.norm() / last } else { 0.0 };
+            of_time(Box::new(move |t| speed * t))
+        }
+        Effect::StationShift { at_time } => {
+            let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
+            let (at, step) = (at_time - first, most.norm());
+            of_time(Box::new(move |t| if t >= at { step } else { 0.0 }))
+        }
+        _ => View {
+            across: Quantity::new("displacement by the law [mm]", 1e3),
+            up: Box::new(measured),
+            x: rows.own.iter().map(Vector3::norm).collect(),
+            levers: rows.own.iter().map(|own| own.try_normalize(0.0).unwrap_or_default()).collect(),
+            law: Box::new(|displacement| displacement),
+            reading: ALONG,
+        },
+    }
+}
+
+/// The correction of structure without a cause, less its mean; none where it is one of the order of the rows.
+pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
+    let correction = left.correction.as_ref()?;
+    let trapezoid = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) * 0.5 * (pair[0].1 + pair[1].1);
+    let width = correction.curve.last()?.0 - correction.curve.first()?.0;
+    let area: f64 = correction.curve.windows(2).map(trapezoid).sum();
+    let mean = if width > 0.0 { area / width } else { 0.0 };
+    let curve: Vec<(f64, f64)> = correction.curve.iter().map(|&(x, y)| (x, y - mean)).collect();
+    let across = match correction.covariate {
+        Covariate::Temperature => Quantity::temperature(),
+        Covariate::Time => Quantity::elapsed(range(curve.iter().map(|at| at.0)).1),
+        Covariate::Payload => Quantity::new("payload [kg]", 1.0),
+        Covariate::Hoist => Quantity::new("hoist force [N]", 1.0),
+        Covariate::Command(joint) => Quantity::command(problem, joint + 1),
+        _ => return None,
+    };
+    let most = correction.points.iter().map(|point| point.lever).fold(0.0, f64::max);
+    let telling = correction.points.iter().filter(|point| point.lever > LEAST_LEVER * most);
+    let points: Vec<Point> =
+        telling.map(|point| Point { x: point.covariate, y: point.value - mean, held_out: false }).collect();
+    let up = Quantity::error(&left.place.to_string(), correction.unit, largest(&points, &curve));
+    let title = format!("{}: structure without a known cause", left.place);
+    Some(Cause { title, across, up, points, curve, reading: COORDINATE })
+}
+
+impl Cause {
+    /// Of an effect that was found, with its number.
+    pub fn draw_effect(&self, number: usize) -> Drawing {
+        self.draw(format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
+    }
+
+    /// Of structure that no effect explains.
+    pub fn draw_unexplained(&self) -> Drawing {
+        let lead = "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line \
+                    and dots: a constant is what base and geometry take up.";
+        self.draw("unexplained".to_owned(), "correction", lead)
+    }
+
+    /// Each pose's own measurement, and the law as a line.
+    fn draw(&self, name: String, law: &str, lead: &str) -> Drawing {
+        let finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
+        let all: Vec<&Point> = self.points.iter().filter(finite).collect();
+        let step = every(all.len(), MOST);
+        let at = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
+        let shown = all.into_iter().step_by(step);
+        let points: Vec<((f64, f64), bool)> = shown.map(|point| (at(point.x, point.y), point.held_out)).collect();
+        let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| at(x, y)).collect();
+        let every_point = || points.iter().map(|(at, _)| *at).chain(curve.iter().copied());
+        let (x, y) = (range(every_point().map(|at| at.0)), range(every_point().map(|at| at.1)));
+        let (x, y) = (with_margin(x, 0.04), with_margin(y, 0.06));
+        let svg = figure((WIDTH, HEIGHT), &self.title, |area| {
+            let held_out = points.iter().any(|(_, held_out)| *held_out);
+            let entries = [("fitted pose", FAINT, true), ("held-out pose", INK, true), (law, ACCENT, true)];
+            let kept: Vec<_> = entries.into_iter().filter(|(name, ..)| held_out || *name != "held-out pose").collect();
+            legend(area, &kept)?;
+            let (_, body) = area.split_vertically(px(20));
+            let mut chart = chart(&body, &Axis::linear(x, &self.across.label), &Axis::linear(y, &self.up.label))?;
+            if y.0 < 0.0 && y.1 > 0.0 {
+                chart.draw_series([PathElement::new(vec![(x.0, 0.0), (x.1, 0.0)], line(FAINT, 1.0))])?;
+            }
+            for (only, colour) in [(false, FAINT), (true, INK)] {
+                let dots = points.iter().filter(|(_, held_out)| *held_out == only);
+                chart.draw_series(dots.map(|(at, _)| Circle::new(*at, radius(2.2), colour.filled())))?;
+            }
+            chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
+            Ok(())
+        });
+        let mut letters = self.title.chars();
+        let title = letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect());
+        Drawing { name, title, caption: format!("{lead} {}{}", self.reading, thinned(step)), svg }
     }
 }

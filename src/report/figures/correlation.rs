@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::frame::{ACCENT, Drawing, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
-use crate::report::plot_data::Correlations;
+use crate::identify::Correlations;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 20;

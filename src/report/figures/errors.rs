@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use plotters::prelude::*;
 
+use super::data::{PlotData, Stage, StageErrors};
 use super::frame::{
     ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, left_out, legend, line, px,
     radius, range, thinned,
 };
-use crate::report::plot_data::{Picture, Stand, State};
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.
@@ -17,13 +17,13 @@ const FLOOR: f64 = 0.03;
 const PANEL: i32 = 118;
 
 /// A state of the arm in words.
-fn stand_name(stand: Stand) -> &'static str {
-    match stand {
-        Stand::Registered => "before",
-        Stand::GeometryOnly => "geometry only",
-        Stand::Elastic => "with elasticity",
-        Stand::Identified => "identified",
-        Stand::Closed => "after the loop",
+fn stage_name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Registered => "before",
+        Stage::GeometryOnly => "geometry only",
+        Stage::Elastic => "with elasticity",
+        Stage::Identified => "identified",
+        Stage::Closed => "after the loop",
     }
 }
 
@@ -38,9 +38,10 @@ fn colour(place: usize, count: usize) -> RGBColor {
 }
 
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
-pub fn errors(picture: &Picture) -> Drawing {
-    let states = &picture.states;
-    let step = every(picture.held_out.len(), MOST);
+pub fn errors(data: &PlotData) -> Drawing {
+    let states = &data.stages;
+    let count = states.first().map_or(0, |state| state.errors.len());
+    let step = every(count, MOST);
     let size = (WIDTH, 24 + 4 * PANEL + 34);
     let mut norms: Vec<f64> =
         states.last().map_or_else(Vec::new, |state| state.errors.iter().map(Vector3::norm).collect());
@@ -53,7 +54,7 @@ pub fn errors(picture: &Picture) -> Drawing {
     let entries: Vec<(&str, RGBColor, bool)> = states
         .iter()
         .enumerate()
-        .map(|(place, state)| (stand_name(state.stand), colour(place, states.len()), place > 0))
+        .map(|(place, state)| (stage_name(state.stage), colour(place, states.len()), place > 0))
         .collect();
     let svg = figure(size, "Error of each held-out pose in x, y, z and norm", |area| {
         legend(area, &entries)?;
@@ -73,7 +74,7 @@ pub fn errors(picture: &Picture) -> Drawing {
     });
     // In any of the states: their dots are not there.
     let lost = |k: &usize| states.iter().any(|state| !state.errors[*k].norm().is_finite());
-    let without = (0..picture.held_out.len()).filter(lost).count();
+    let without = (0..count).filter(lost).count();
     let floor = number(10.0_f64.powf(floor), 4);
     Drawing {
         name: "held-out-errors".to_owned(),
@@ -89,7 +90,7 @@ pub fn errors(picture: &Picture) -> Drawing {
     }
 }
 
-fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[State], (axis, step): (usize, usize)) -> Result<(), Failure> {
+fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[StageErrors], (axis, step): (usize, usize)) -> Result<(), Failure> {
     let mut chart = chart(panel, x, y)?;
     for (place, state) in states.iter().enumerate() {
         let colour = colour(place, states.len());

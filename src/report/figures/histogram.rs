@@ -2,16 +2,16 @@
 
 use plotters::prelude::*;
 
+use super::data::PlotData;
 use super::frame::{ACCENT, Axis, Drawing, FAINT, WIDTH, chart, figure, legend, line, px};
-use crate::report::plot_data::Picture;
 
 const HEIGHT: i32 = 280;
 /// Least that the axis reaches [σ]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
 const REACH: f64 = 5.0;
 
 /// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
-pub fn histogram(picture: &Picture) -> Option<Drawing> {
-    let fitted = picture.residuals.iter().filter(|residual| !residual.held_out);
+pub fn histogram(data: &PlotData) -> Option<Drawing> {
+    let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
     let values: Vec<f64> =
         fitted.flat_map(|residual| (residual.error / residual.sigma).data.0[0]).filter(|v| v.is_finite()).collect();
     if values.len() < 3 {

@@ -1,7 +1,9 @@
 //! The figures of the report, one a file: numbers in, SVG with its title and caption out.
 
+mod arm;
 mod cause;
 mod correlation;
+mod data;
 mod errors;
 mod frame;
 mod histogram;
@@ -16,8 +18,9 @@ pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 use crate::diagnose::Trace;
 use crate::identify::Comparison;
 use crate::least_squares::Identifiability;
-use crate::report::plot_data::Cause;
-pub use crate::report::plot_data::Picture as PlotData;
+
+pub use cause::{Cause, Point, Quantity};
+pub use data::{PlotData, PoseError, Stage, StageErrors};
 
 /// A figure with its numbers.
 #[derive(Debug, Clone, Copy)]
@@ -49,8 +52,8 @@ impl Figure<'_> {
             Self::Ranking(trace) => ranking::ranking(trace),
             Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
             Self::Ablations(comparison) => strategies::ablations(comparison),
-            Self::Cause(own, number) => Some(cause::effect(own, number)),
-            Self::Trend(own) => Some(cause::trend(own)),
+            Self::Cause(own, number) => Some(own.draw_effect(number)),
+            Self::Trend(own) => Some(own.draw_unexplained()),
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Residual vectors over the workspace.
+//! PoseError vectors over the workspace.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
+use super::data::{PlotData, PoseError};
 use super::frame::{
     ACCENT, Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, left_out, legend, line,
     px, radius, range, thinned, with_margin, write,
 };
-use crate::report::plot_data::{Picture, Residual};
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.
@@ -18,13 +18,13 @@ const LONG: f64 = 0.09;
 const LEAST: f64 = 150.0;
 const GREATEST: f64 = 330.0;
 
-/// Residuals from above and from the side, at their measured positions.
-pub fn vectors(picture: &Picture) -> Drawing {
-    let finite = |residual: &&Residual| residual.error.norm().is_finite();
-    let all: Vec<&Residual> = picture.residuals.iter().filter(finite).collect();
+/// PoseErrors from above and from the side, at their measured positions.
+pub fn vectors(data: &PlotData) -> Drawing {
+    let finite = |residual: &&PoseError| residual.error.norm().is_finite();
+    let all: Vec<&PoseError> = data.residuals.iter().filter(finite).collect();
     let count = all.len();
     let step = every(count, MOST);
-    let shown: Vec<&Residual> = all.into_iter().step_by(step).collect();
+    let shown: Vec<&PoseError> = all.into_iter().step_by(step).collect();
     let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
     let width = f64::from(WIDTH - LEFT - 12);
     let size = |(low, high): (f64, f64)| high - low;
@@ -39,7 +39,7 @@ pub fn vectors(picture: &Picture) -> Drawing {
     let bar = rounded(long);
     let larger = LONG * (across.1 - across.0) / bar;
     let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
-    let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
+    let svg = figure((WIDTH, height), "PoseError vectors from above and from the side", |area| {
         legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
         let length = radius(LONG * width);
         let end = px(WIDTH - 12);
@@ -62,7 +62,7 @@ pub fn vectors(picture: &Picture) -> Drawing {
              too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
              structure; a tangle is noise.{}{}",
             short(larger),
-            left_out(picture.residuals.len() - count),
+            left_out(data.residuals.len() - count),
             thinned(step)
         ),
         svg,
@@ -115,7 +115,7 @@ impl View {
         Self { axis, range: about(range, height * per_pixel), height: shown }
     }
 
-    fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&Residual], larger: f64) -> Result<(), Failure> {
+    fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&PoseError], larger: f64) -> Result<(), Failure> {
         let label = if self.axis == 1 { "y [m]" } else { "z [m]" };
         let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
         let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;

@@ -1,0 +1,158 @@
+//! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
+
+use nalgebra::Vector3;
+
+use super::arm::{Arm, Poses};
+use super::cause::{self, Cause};
+use crate::diagnose::{ClosedLoop, Findings, examine};
+use crate::identify::{Comparison, Correlations, Identification, IdentifyError, Strategy};
+use crate::measurement::Dataset;
+use crate::model::{Ablation, Model};
+use crate::problem::Problem;
+
+/// What has been done for the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// Nothing but to find where base and target are, where these are free.
+    Registered,
+    /// Geometry identified, elasticity left out of the model.
+    GeometryOnly,
+    /// Geometry and elasticity identified.
+    Elastic,
+    /// Identified, where there is nothing to say on elasticity.
+    Identified,
+    /// Identified with the effects that the loop found.
+    Closed,
+}
+
+/// The errors of the arm at one stage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageErrors {
+    /// Which.
+    pub stage: Stage,
+    /// Errors measured − predicted of the held-out poses, measuring frame [m].
+    pub errors: Vec<Vector3<f64>>,
+}
+
+/// A pose and what a fit leaves of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseError {
+    /// Whether it was held out.
+    pub held_out: bool,
+    /// Measured position, measuring frame [m].
+    pub position: Vector3<f64>,
+    /// Residual measured − predicted, measuring frame [m].
+    pub error: Vector3<f64>,
+    /// 1 σ of each coordinate [m].
+    pub sigma: f64,
+    /// Time [s], or the row's number where no time was measured.
+    pub time: f64,
+}
+
+/// Everything that the figures of one report show, and the tests of the residual.
+#[derive(Debug, Clone)]
+pub struct PlotData {
+    /// The arm from nominal to best.
+    pub stages: Vec<StageErrors>,
+    /// What the best leaves, pose by pose, in the order of the rows.
+    pub residuals: Vec<PoseError>,
+    /// Whether `time` of the residuals was measured.
+    pub time_measured: bool,
+    /// Tests of what it leaves of the fitted poses.
+    pub findings: Findings,
+    /// Correlations of its parameters, as estimate.json has them.
+    pub correlations: Correlations,
+    /// The residual against the cause of each found effect, in the order in which they were found.
+    pub causes: Vec<Cause>,
+    /// The residual against what structure without a cause depends on.
+    pub trend: Option<Cause>,
+}
+
+impl PlotData {
+    /// Of one identification.
+    ///
+    /// # Errors
+    /// Problem and data do not fit each other.
+    pub fn of_identification(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Self, IdentifyError> {
+        let poses = Poses::new(data);
+        let fitted = poses.arm(problem, found)?;
+        let stages = vec![registered(&poses, &fitted, found), identified(&poses, &fitted, found)];
+        Ok(Self::of(&poses, stages, &fitted, found, examine(problem, data, found)?))
+    }
+
+    /// Of a comparison: of its joint fit, and of geometry alone.
+    ///
+    /// # Errors
+    /// Problem and data do not fit each other.
+    pub fn of_comparison(problem: &Problem, data: &Dataset, comparison: &Comparison) -> Result<Self, IdentifyError> {
+        let (poses, joint) = (Poses::new(data), &comparison.joint);
+        let fitted = poses.arm(problem, joint)?;
+        let mut stages = vec![registered(&poses, &fitted, joint)];
+        if is_elastic(&fitted.model) {
+            let rigid = Arm { model: fitted.model.ablated(Ablation::Rigid), x: comparison.rigid.x.clone() };
+            stages.push(stage(&poses, Stage::GeometryOnly, &rigid));
+        }
+        stages.push(identified(&poses, &fitted, joint));
+        Ok(Self::of(&poses, stages, &fitted, joint, examine(problem, data, joint)?))
+    }
+
+    /// Of a closed loop, with the cause of every effect that it found.
+    ///
+    /// # Errors
+    /// Problem and data do not fit each other.
+    pub fn of_loop(problem: &Problem, data: &Dataset, closure: &ClosedLoop) -> Result<Self, IdentifyError> {
+        let (poses, fit) = (Poses::new(data), &closure.before.fit);
+        let (before, after) = (poses.arm(problem, fit)?, poses.arm(&closure.closed, &closure.after)?);
+        let stages = vec![
+            registered(&poses, &before, fit),
+            identified(&poses, &before, fit),
+            stage(&poses, Stage::Closed, &after),
+        ];
+        let effects = closure.effects.iter();
+        Ok(Self {
+            causes: effects.filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &poses)).collect(),
+            trend: closure.unexplained.as_ref().and_then(|left| cause::unexplained(left, &closure.closed)),
+            ..Self::of(&poses, stages, &after, &closure.after, closure.findings.clone())
+        })
+    }
+
+    fn of(poses: &Poses, stages: Vec<StageErrors>, best: &Arm, found: &Identification, findings: Findings) -> Self {
+        let time_measured = poses.measurements.time_measured;
+        let errors = poses.errors(best, &poses.rows());
+        let residual = |((row, pose), error): ((usize, crate::model::Pose), Vector3<f64>)| PoseError {
+            held_out: poses.split.held_out.binary_search(&row).is_ok(),
+            position: pose.measured,
+            error,
+            sigma: pose.sigma,
+            time: if time_measured { pose.setup.time } else { (row + 1) as f64 },
+        };
+        Self {
+            stages,
+            residuals: poses.all(found.sigma).into_iter().enumerate().zip(errors).map(residual).collect(),
+            time_measured,
+            findings,
+            correlations: found.correlations(),
+            causes: Vec::new(),
+            trend: None,
+        }
+    }
+}
+
+fn stage(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
+    StageErrors { stage, errors: poses.errors(arm, &poses.split.held_out) }
+}
+
+fn registered(poses: &Poses, fitted: &Arm, found: &Identification) -> StageErrors {
+    stage(poses, Stage::Registered, &Arm { model: fitted.model.clone(), x: found.registered_x.clone() })
+}
+
+fn identified(poses: &Poses, fitted: &Arm, found: &Identification) -> StageErrors {
+    let elastic = is_elastic(&fitted.model) && found.strategy != Strategy::GeometryOnly;
+    stage(poses, if elastic { Stage::Elastic } else { Stage::Identified }, fitted)
+}
+
+/// Whether stiffnesses or rigidities are free.
+fn is_elastic(model: &Model) -> bool {
+    model.parameters.iter().any(|parameter| parameter.slot.is_elastic())
+}
