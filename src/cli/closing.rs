@@ -53,8 +53,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&json)?;
     } else if common.talks() {
         output::print(&report::loop_text(&problem, &closure))?;
-        let names = results.map(|(name, _)| name).join(", ");
-        output::print(&format!("\nWritten to {}: {names}, report.html\n", folder.display()))?;
+        let names = "loop.json, problem.closed.toml, report.md, report.html";
+        output::print(&format!("\nWritten to {}: {names}\n", folder.display()))?;
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))
 }
