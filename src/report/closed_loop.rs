@@ -15,7 +15,7 @@ use crate::diagnose::{
     ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Unexplained, Verdict,
 };
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Effect, JointKind, Problem};
 
 /// Alternatives that are named in words; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
@@ -60,11 +60,11 @@ object! {
 object! {
     FoundEntry<'a>(found: &'a Found, closure: &ClosedLoop) {
         #[serde(flatten)]
-        effect: effect::Entry<'a> = effect::Entry(&found.effect),
+        effect: &'a Effect = &found.effect,
         description: String = closure.before.describe(&found.effect),
         p_value: f64 = found.p_value,
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
-        alternatives: Vec<effect::Entry<'a>> = found.alternatives.iter().map(effect::Entry).collect(),
+        alternatives: &'a [Effect] = &found.alternatives,
         held_out_after: Summary = Summary::of(&found.held_out_after),
     }
 }
@@ -97,7 +97,7 @@ object! {
 }
 object! {
     StepEntry<'a>(step: &'a Round) {
-        effects: Vec<effect::Entry<'a>> = step.effects.iter().map(effect::Entry).collect(),
+        effects: &'a [Effect] = &step.effects,
         identification: Summary = Summary::of(&step.identification),
         held_out: Summary = Summary::of(&step.held_out),
     }

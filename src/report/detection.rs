@@ -22,7 +22,7 @@ object! {
 object! {
     EffectEntry<'a>(own: &'a Detectable) {
         #[serde(flatten)]
-        effect: effect::Entry<'a> = effect::Entry(&own.effect),
+        effect: &'a Effect = &own.effect,
         sizes: Vec<SizeEntry<'a>> = own.sizes.iter().map(SizeEntry::of).collect(),
     }
 }
@@ -92,7 +92,7 @@ fn row(effect: &Effect, size: &Size) -> Vec<String> {
     let unit = size.unit.display(size.prior);
     let short = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
     vec![
-        effect::declaration(effect),
+        effect.declaration(),
         shown(size.worst, &unit),
         shown(size.best, &unit),
         shown(Some(size.prior), &unit),

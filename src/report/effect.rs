@@ -1,7 +1,5 @@
 //! Effects as results name them.
 
-use serde::ser::{Serialize, Serializer};
-
 use super::document::{Point, code};
 use super::json::object;
 use super::quantity::{decimals, number};
@@ -15,35 +13,21 @@ const MOST: usize = 6;
 pub(super) const MOST_LISTED: usize = 8;
 /// Waves of a joint that are shown of more.
 pub(super) const SHOWN_WAVES: usize = 4;
-/// Its name and its arguments: `{"effect": "gear-ratio", "joint": 3}`.
-#[derive(Debug)]
-pub(super) struct Entry<'a>(pub &'a Effect);
-
-impl Serialize for Entry<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.serialize(serializer)
-    }
-}
 
 object! {
     /// An effect that these data cannot show.
     Untestable<'a>(own: &'a (Effect, &'static str)) {
         #[serde(flatten)]
-        effect: Entry<'a> = Entry(&own.0),
+        effect: &'a Effect = &own.0,
         reason: &'static str = own.1,
     }
-}
-
-/// As a problem declares it: `gear-ratio = { joint = 3 }`.
-pub(super) fn declaration(effect: &Effect) -> String {
-    effect.declaration()
 }
 
 /// In words and, unless that is long, as a problem declares it.
 pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
     match effect {
         Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => trace.describe(effect),
-        _ => format!("{}: {}", trace.describe(effect), code(&declaration(effect))),
+        _ => format!("{}: {}", trace.describe(effect), code(&effect.declaration())),
     }
 }
 
@@ -96,27 +80,24 @@ pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<S
     grouped(effects.into_iter().map(|effect| (effect.clone(), ()))).into_iter().map(|(words, ())| words).collect()
 }
 
-/// Effects with the harmonics of one joint that share a reason taken together, in the order in which they come.
+/// Effects that are parts of one, as the harmonics of a joint, taken together where they share a reason, in the order in which
+/// they come.
 pub(super) fn joined<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(Effect, R)> {
     let mut all: Vec<(Effect, R)> = Vec::new();
     for (effect, reason) in effects {
-        if let Effect::JointHarmonic { joint, orders } = &effect {
-            let same = all.iter_mut().find_map(|(known, why)| match known {
-                Effect::JointHarmonic { joint: other, orders } if other == joint && *why == reason => Some(orders),
-                _ => None,
-            });
-            if let Some(known) = same {
-                known.extend(orders);
-                continue;
-            }
+        let same = |(known, why): &mut (Effect, R)| {
+            let both = known.joined(&effect).filter(|_| *why == reason);
+            both.map(|both| *known = both).is_some()
+        };
+        if !all.iter_mut().any(same) {
+            all.push((effect, reason));
         }
-        all.push((effect, reason));
     }
     all
 }
 
 /// Effects in one line for each family and reason: "`backlash` at joints 1, 2, 3".
-pub(super) fn grouped<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(String, R)> {
+fn grouped<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(String, R)> {
     let mut groups: Vec<(Vec<Effect>, R)> = Vec::new();
     for (effect, reason) in joined(effects) {
         let alike = |(members, why): &&mut (Vec<Effect>, R)| {

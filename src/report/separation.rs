@@ -1,12 +1,12 @@
 //! How well a plan tells two effects apart, for programs and for people.
 
 use super::document::{Block, Table};
-use super::effect;
 use super::forecast::size as shown;
 use super::json::object;
 use super::quantity::{number, or_dash, p_value};
 use crate::design::Separated;
 use crate::diagnose::{Separation, Side};
+use crate::problem::Effect;
 
 object! {
     /// All of it.
@@ -21,7 +21,7 @@ object! {
     /// One of the two, sizes in SI; beside each figure the median over random poses.
     SideEntry<'a>(separated: &'a Separated, side: usize, figures: &Figures<'a>) {
         #[serde(flatten)]
-        effect: effect::Entry<'a> = effect::Entry(&separated.effects[side]),
+        effect: &'a Effect = &separated.effects[side],
         parameters: &'a [String] = &figures.planned.found.parameters,
         unit: &'static str = figures.planned.found.unit.symbol(),
         found_from: Option<f64> = figures.planned.found.worst,
@@ -79,7 +79,7 @@ pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
         let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, k);
         let unit = planned.found.unit.display(planned.found.prior);
         let show = |value: Option<f64>| shown(value, &unit);
-        rows.push(cells([&effect::declaration(own), "", "", ""]));
+        rows.push(cells([&own.declaration(), "", "", ""]));
         rows.push(cells(["  found from", &show(random_found), &show(planned.found.worst), &unit.symbol]));
         rows.push(cells(["  told apart from", &show(random_told), &show(planned.told.worst), &unit.symbol]));
         let at = format!("  p beside the other at {} {}", show(Some(size)), unit.symbol);

@@ -33,13 +33,13 @@ object! {
         level: f64 = trace.level,
         ranking: Vec<RankedEntry<'a>> = trace.ranking.iter().map(|ranked| RankedEntry::of(ranked, trace)).collect(),
         untestable: Vec<effect::Untestable<'a>> = untestable.iter().map(effect::Untestable::of).collect(),
-        absorbed: Vec<effect::Entry<'a>> = absorbed.iter().map(|(effect, ())| effect::Entry(effect)).collect(),
+        absorbed: Vec<&'a Effect> = absorbed.iter().map(|(effect, ())| effect).collect(),
     }
 }
 object! {
     RankedEntry<'a>(ranked: &'a Ranked, trace: &Trace) {
         #[serde(flatten)]
-        effect: effect::Entry<'a> = effect::Entry(&ranked.effect),
+        effect: &'a Effect = &ranked.effect,
         description: String = trace.describe(&ranked.effect),
         p_value: f64 = ranked.p_value,
         f: f64 = ranked.f.0,
@@ -55,7 +55,7 @@ object! {
 }
 object! {
     ApartEntry<'a>(apart: &'a TellingPose) {
-        from: effect::Entry<'a> = effect::Entry(&apart.other),
+        from: &'a Effect = &apart.other,
         /// Configuration [rad] or [m].
         q: &'a [f64] = &apart.configuration,
         payload_kg: Option<f64> = apart.payload,
@@ -69,7 +69,7 @@ object! {
 object! {
     AlikeEntry<'a>(alike: &'a (Effect, f64)) {
         #[serde(flatten)]
-        effect: effect::Entry<'a> = effect::Entry(&alike.0),
+        effect: &'a Effect = &alike.0,
         /// 0: the same on these poses; 90: nothing in common.
         angle_deg: f64 = alike.1.to_degrees(),
     }

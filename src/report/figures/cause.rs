@@ -134,7 +134,9 @@ pub fn of(found: &Effect, problem: &Problem, arm: &Arm, poses: &Poses) -> Option
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
     let mut without = arm.clone();
-    places.iter().for_each(|&k| without.x[k] = 0.0);
+    for &k in &places {
+        without.x[k] = 0.0;
+    }
     let (left, with) = (poses.errors(arm, &poses.rows()), poses.errors(&without, &poses.rows()));
     let all = poses.all(1.0);
     let values: Vec<f64> = places.iter().map(|&k| arm.x[k]).collect();
@@ -268,10 +270,11 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
             let size = if bends { norm } else { sum };
             View {
                 across: Quantity::temperature(),
-                up: Box::new(move |most| match bends {
-                    true => Quantity::small(&format!("curvature of link {link}"), "rad/m", most),
-                    false => Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6),
-                }),
+                up: if bends {
+                    Box::new(move |most| Quantity::small(&format!("curvature of link {link}"), "rad/m", most))
+                } else {
+                    Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
+                },
                 x: rows.temperatures(),
                 levers: rows.over(|pose| size * (pose.temperature.unwrap_or(reference) - reference)),
                 law: Box::new(move |t| size * (t - reference)),
