@@ -7,6 +7,8 @@ use crate::scalar::Scalar;
 
 /// Moment at which play is taken up to three quarters [N·m].
 const PLAY_MOMENT: f64 = 1.0;
+/// tanh does not differ from 1 from here on: 2 exp(−2x) is below half a unit in the last place.
+const FLAT: f64 = 20.0;
 
 /// How a joint turns about its axis other than in proportion to the moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,8 +53,14 @@ impl<S: Scalar> Nonlinear<S> {
     /// Angle under a moment [N·m]; its play counts where the moment `takes_up_play`.
     pub(super) fn twist(&self, moment: S, takes_up_play: bool) -> S {
         let cubic = self.cubic * moment * moment * moment;
-        if takes_up_play { cubic + self.play * (moment / PLAY_MOMENT).tanh() * 0.5 } else { cubic }
+        if takes_up_play { cubic + self.play * tanh(moment / PLAY_MOMENT) * 0.5 } else { cubic }
     }
+}
+
+/// tanh x with its derivative 1 − tanh² x, finite at any x: from [`FLAT`] on they are 1 and 0 to rounding, where sinh x / cosh x
+/// of dual numbers overflows.
+fn tanh<S: Scalar>(x: S) -> S {
+    if x.re().abs() < FLAT { x.tanh() } else { S::from(x.re().signum()) }
 }
 
 impl<S: Scalar> Thermal<S> {

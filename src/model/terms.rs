@@ -87,8 +87,14 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Spline { of: Quantity::Command(joint), .. }
         | Driver::Bump { of: Quantity::Command(joint), .. }
         | Driver::Step { of: Quantity::Command(joint), .. } => joint < joints,
-        Driver::Spline { .. } | Driver::Bump { .. } | Driver::Step { .. } => true,
-        Driver::Constant | Driver::Unit | Driver::Warming { .. } | Driver::Elapsed | Driver::Since(_) => true,
+        Driver::Spline { .. }
+        | Driver::Bump { .. }
+        | Driver::Step { .. }
+        | Driver::Constant
+        | Driver::Unit
+        | Driver::Warming { .. }
+        | Driver::Elapsed
+        | Driver::Since(_) => true,
     };
     driven
         && match parameter.slot {

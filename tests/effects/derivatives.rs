@@ -4,7 +4,7 @@ use flexcal::identify::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::problem::{Effect, Equilibrium, Problem};
+use flexcal::problem::{Effect, Equilibrium, Joint, Problem};
 use flexcal::quantity::Unit;
 use nalgebra::DVector;
 use rand::SeedableRng;
@@ -139,4 +139,52 @@ fn what_drives_the_joints_of_a_rigid_arm() {
     let soft = [effects.as_slice(), &[(Effect::Backlash { joint: 3 }, vec![5e-4])]].concat();
     rows.approach = poses(&arm, 16, true, &mut ChaCha8Rng::seed_from_u64(8)).approach;
     check("UR10 with play", &arm, &soft, &rows, false, &[]);
+}
+
+/// The arm and its poses with all loads and stiffnesses times `factor`: it bends as before, under other moments.
+fn loaded(arm: &Problem, rows: &Measurements, factor: f64) -> (Problem, Measurements) {
+    let (mut arm, mut rows) = (arm.clone(), rows.clone());
+    arm.gravity *= factor;
+    rows.hoist.iter_mut().flatten().for_each(|force| *force *= factor);
+    for joint in &mut arm.joints {
+        joint.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor);
+        for beam in &mut joint.beam {
+            let rigidities = [&mut beam.ea, &mut beam.ei_y, &mut beam.ei_z, &mut beam.gj];
+            rigidities.into_iter().flatten().for_each(|rigidity| *rigidity *= factor);
+            beam.hoist.iter_mut().for_each(|hoist| hoist.force *= factor);
+        }
+    }
+    (arm, rows)
+}
+
+#[test]
+fn every_effect_under_any_load() {
+    let (arm, all) = lunar();
+    let plain = poses(&arm, 4, false, &mut ChaCha8Rng::seed_from_u64(9));
+    // An upper bound of the moments: everything at the end of the outstretched arm.
+    let bodies = |joint: &Joint| joint.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let beam = |joint: &Joint| joint.beam.iter().map(|own| own.mass).sum::<f64>();
+    let mass = plain.payload.iter().flatten().fold(0.0_f64, |most, mass| most.max(*mass))
+        + arm.joints.iter().map(|joint| bodies(joint) + beam(joint)).sum::<f64>();
+    let reach: f64 = arm.joints.iter().map(|joint| joint.a.abs() + joint.d.abs()).sum();
+    for moment in [1.0, 1e1, 1e2, 1e3, 1e4] {
+        let (arm, rows) = loaded(&arm, &plain, moment / (arm.gravity.norm() * mass * reach));
+        for (effect, _) in &all {
+            let problem = declared(&arm, std::slice::from_ref(effect));
+            let model = model_of(&problem, &rows);
+            let unknowns = of_effects(&model);
+            let rest = Placement::of(&rows).poses(&rows, &[0, 1, 2, 3], 1.0);
+            let x = DVector::zeros(model.parameters.len());
+            let residuals = PoseResiduals::new(&model, rest, unknowns.clone(), x);
+            let zero = DVector::zeros(unknowns.len());
+            let exact = jacobian(&residuals, &zero);
+            assert!(exact.iter().all(|value| value.is_finite()), "{effect:?} at {moment} N·m: {exact}");
+            // Steps that move the target by a tenth of a millimetre; the place of a mass that is not there moves nothing.
+            let norms: Vec<f64> = exact.column_iter().map(|column| column.norm()).collect();
+            let step = DVector::from_iterator(norms.len(), norms.iter().map(|norm| 1e-4 / norm.max(1e-12)));
+            for (column, norm) in check_jacobian(&residuals, &zero, &step).columns.iter().zip(&norms) {
+                assert!(*norm < 1e-12 || column.relative_error < WORST, "{effect:?} at {moment} N·m: {column:?}");
+            }
+        }
+    }
 }

@@ -191,8 +191,8 @@ fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bo
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
-        let stays = |known: &Effect| added.iter().any(|own| own.covers(&known));
-        let holds = |step: &&Round| step.effects.iter().any(|known| effect.covers(&known));
+        let stays = |known: &Effect| added.iter().any(|own| own.covers(known));
+        let holds = |step: &&Round| step.effects.iter().any(|known| effect.covers(known));
         let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };

@@ -80,7 +80,10 @@ impl Effect {
 
     /// What it is, in words for people.
     pub fn describe(&self) -> String {
-        custom(self).map_or_else(|| (self.family().describe)(self), |own| own.describe())
+        match custom(self) {
+            Some(own) => own.describe(),
+            None => (self.family().describe)(self),
+        }
     }
 
     /// The same where times may not have been measured: the order of the rows stands for them then, counted from 1.
