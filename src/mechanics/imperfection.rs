@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::link::Hoist;
 use crate::scalar::Scalar;
 
 /// Moment at which play is taken up to three quarters [N·m].
@@ -80,9 +79,9 @@ pub struct Strain<S> {
 }
 
 impl<S: Scalar> Rope<S> {
-    /// Force [N] with the hook at these x and y [m], base frame.
-    pub(super) fn pull(&self, hoist: &Hoist, tension: f64, [x, y]: [S; 2]) -> Vector3<S> {
-        let mut direction = hoist.direction.map(S::from);
+    /// Force [N] of a tension [N] in a declared direction, with the hook at these x and y [m], base frame.
+    pub(super) fn pull(&self, direction: &Vector3<f64>, tension: f64, [x, y]: [S; 2]) -> Vector3<S> {
+        let mut direction = direction.map(S::from);
         direction.x += self.lean[0] + self.trolley * x;
         direction.y += self.lean[1] + self.trolley * y;
         let length = direction.dot(&direction).sqrt();

@@ -1,13 +1,11 @@
-//! What an arm is made of.
+//! Links and the masses and ropes on them.
 
 use nalgebra::Vector3;
 
 use super::Flexibility;
-use super::imperfection::{AddedMass, Rope, Thermal};
-use super::joint::Joint;
-use crate::problem::{self, Equilibrium, PoseView, Problem};
+use super::imperfection::{AddedMass, Thermal};
+use crate::problem;
 use crate::scalar::Scalar;
-use crate::spatial::Frame;
 
 /// A point mass on its carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,96 +86,5 @@ impl Beam<f64> {
             thermal: self.thermal.as_ref().map(Thermal::lift),
             added: self.added.as_ref().map(AddedMass::lift),
         }
-    }
-}
-
-/// A serial arm with its parameters as scalars S; predicts in its own base frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Arm<S> {
-    /// Gravity, arm base frame [m/s²].
-    pub gravity: Vector3<S>,
-    /// On which arm the loads act.
-    pub equilibrium: Equilibrium,
-    /// Closed-form elements per beam.
-    pub beam_elements: usize,
-    /// Joints from the base outwards.
-    pub joints: Vec<Joint<S>>,
-    /// Where a payload hangs, last frame [m].
-    pub payload_at: Vector3<f64>,
-    /// Payload where the pose gives none [kg].
-    pub payload_mass: f64,
-    /// By how much a payload is heavier than declared, whenever one is carried [kg].
-    pub payload_error: S,
-    /// How ropes pull other than declared.
-    pub rope: Option<Rope<S>>,
-    /// Flexibility of the base about its x and y [rad/(N·m)].
-    pub mounting: Option<[S; 2]>,
-    /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics are undeflected.
-    pub mixing: Option<S>,
-    /// Temperature without thermal effects [°C].
-    pub reference_temperature: f64,
-}
-
-impl Arm<f64> {
-    /// The arm as the problem declares it.
-    pub fn nominal(problem: &Problem) -> Self {
-        Self {
-            gravity: problem.gravity,
-            equilibrium: problem.statics.equilibrium,
-            beam_elements: problem.statics.beam_elements,
-            joints: problem.joints.iter().map(Joint::nominal).collect(),
-            payload_at: problem.tool.payload_at,
-            payload_mass: problem.tool.payload_mass,
-            payload_error: 0.0,
-            rope: None,
-            mounting: None,
-            mixing: None,
-            reference_temperature: problem.data.reference_temperature.unwrap_or(0.0),
-        }
-    }
-
-    /// The same arm with its parameters as constants of another scalar.
-    pub fn lift<S: Scalar>(&self) -> Arm<S> {
-        Arm {
-            gravity: self.gravity.map(S::from),
-            equilibrium: self.equilibrium,
-            beam_elements: self.beam_elements,
-            joints: self.joints.iter().map(Joint::lift).collect(),
-            payload_at: self.payload_at,
-            payload_mass: self.payload_mass,
-            payload_error: S::from(self.payload_error),
-            rope: self.rope.as_ref().map(Rope::lift),
-            mounting: self.mounting.map(|mounting| mounting.map(S::from)),
-            mixing: self.mixing.map(S::from),
-            reference_temperature: self.reference_temperature,
-        }
-    }
-}
-
-impl<S: Scalar> Arm<S> {
-    /// Whether any joint or link deflects.
-    pub fn is_elastic(&self) -> bool {
-        let gives = |joint: &Joint<S>| joint.turns() || joint.lateral.is_some() || joint.beam.is_some();
-        self.mounting.is_some() || self.joints.iter().any(gives)
-    }
-
-    /// Degrees above the reference [K]; 0 where the temperature is not known.
-    pub(super) fn warming(&self, setup: &PoseView) -> f64 {
-        setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
-    }
-
-    /// The last frame of the arm that does not deflect, arm base frame.
-    pub(super) fn rigid_frame(&self, setup: &PoseView) -> Frame<S> {
-        let mut frame = Frame::identity();
-        for (joint, &q) in self.joints.iter().zip(setup.configuration) {
-            joint.advance(&mut frame, q);
-        }
-        frame
-    }
-
-    /// Payload of a pose [kg].
-    pub(super) fn payload(&self, setup: &PoseView) -> S {
-        let declared = setup.payload.unwrap_or(self.payload_mass);
-        if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }
     }
 }

@@ -1,23 +1,26 @@
 //! The arm's physics, generic over the scalar: frames, elastic links and joints, static equilibrium.
 
+mod adjoint;
 mod anderson;
-mod apart;
+mod arm;
 mod beam;
 mod element;
+mod forward;
 mod imperfection;
 mod joint;
 mod link;
-mod place;
+mod record;
+mod segment;
 mod sensitivity;
 mod statics;
-mod trail;
-mod virtual_work;
+mod tape;
 mod workspace;
 
-pub use apart::Part;
+pub use arm::Arm;
 pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
 pub use imperfection::{AddedMass, Nonlinear, Rope, Strain, Thermal};
 pub use joint::{Angle, Coordinates, Joint};
-pub use link::{Arm, Beam, Hoist, PointMass};
+pub use link::{Beam, Hoist, PointMass};
+pub use segment::Segment;
 pub use sensitivity::Sensitivity;
 pub use statics::{Equilibrated, Response, StaticsError, Workspace};

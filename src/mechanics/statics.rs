@@ -13,8 +13,8 @@
 use nalgebra::Vector3;
 use num_dual::Dual64;
 
-use super::link::Arm;
-use super::place::Bend;
+use super::arm::Arm;
+use super::forward::Bend;
 use crate::problem::{Equilibrium, PoseView};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;

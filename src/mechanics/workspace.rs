@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::Wrench;
 use super::anderson::Anderson;
-use super::apart::Cut;
 use super::element::LinkLoad;
+use super::segment::Cut;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
@@ -20,7 +20,7 @@ pub(super) enum Event<S> {
     Axis { at: Vector3<S>, axis: Vector3<S> },
     /// What tilts about two axes: the moments about them are unknowns.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
-    /// The end of a part of the arm that was walked alone.
+    /// The end of a segment of the arm that was walked alone.
     Cut,
 }
 
@@ -32,7 +32,7 @@ pub struct Workspace<S> {
     pub(super) next_moments: Vec<S>,
     /// Where each hook is, x and y in the arm base frame [m], if ropes may lean: unknowns before all moments.
     pub(super) hooks: Vec<[S; 2]>,
-    /// Where the parts of the arm end, if it is walked part by part.
+    /// Where the segments of the arm end, if it is walked segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
     /// Force of each link's rope [N], zero without one.
     pub(super) ropes: Vec<Vector3<S>>,

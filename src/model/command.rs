@@ -3,8 +3,6 @@
 use nalgebra::DVector;
 
 use super::Model;
-use super::driven::Commands;
-use super::observation::Observation;
 use crate::model::parameter::{Driver, JointField, Parameter, Slot};
 use crate::problem::{JointKind, Problem};
 
@@ -39,8 +37,8 @@ impl Model {
             .collect();
         Self {
             nominal: arm,
-            driven: Commands::new(self, x.as_slice()).into_driven(),
-            observation: Observation::new(self, x.as_slice()),
+            driven: self.commands(x.as_slice()).into_driven(),
+            observation: self.observed(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             parameters,

@@ -6,12 +6,14 @@
 use nalgebra::{DVector, Vector3};
 use num_dual::DualSVec64;
 
+use super::Model;
 use super::driven::Commands;
 use super::elastic::Elastic;
-use super::inputs::{Input, inputs};
+use super::inputs::inputs;
 use super::observation::Observation;
+use super::pose::Pose;
 use super::rigid::Rigid;
-use super::{Model, Pose};
+use super::rows::Rows;
 use crate::least_squares::Block;
 use crate::model::parameter::{Driver, Slot};
 use crate::problem::PoseView;
@@ -85,8 +87,8 @@ impl Linearised {
         } else {
             Inner::Rigid(Rigid::new(&arm, inputs))
         };
-        let commands = Commands::new(model, x.as_slice());
-        let observation = Observation::new(model, x.as_slice());
+        let commands = model.commands(x.as_slice());
+        let observation = model.observed(x.as_slice());
         Self { commands, observation, scale, shifts, bases, targets, inner }
     }
 
@@ -121,40 +123,6 @@ impl Linearised {
         }
         let seen = self.observation.of(&predicted, &pose.setup);
         rows.put(last_column, &(seen - pose.measured));
-    }
-}
-
-/// Three rows of a block.
-pub(super) struct Rows<'a> {
-    block: &'a mut Block,
-    row: usize,
-    /// From a derivative of the prediction to one of the residual (measured − predicted) / σ.
-    scale: f64,
-}
-
-impl Rows<'_> {
-    #[inline]
-    fn put(&mut self, column: usize, derivative: &Vector3<f64>) {
-        let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
-        out.copy_from_slice((derivative * self.scale).as_slice());
-    }
-
-    #[inline]
-    fn put_if(&mut self, column: Option<usize>, derivative: impl FnOnce() -> Vector3<f64>) {
-        if let Some(column) = column {
-            self.put(column, &derivative());
-        }
-    }
-
-    /// Writes the derivative with respect to an input for each parameter that acts there.
-    #[inline]
-    pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
-        if let Some(column) = input.column {
-            self.put(column, derivative);
-        }
-        for &(column, driver) in &input.driven {
-            self.put(column, &(derivative * driver.value(commanded)));
-        }
     }
 }
 

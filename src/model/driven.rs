@@ -1,7 +1,6 @@
 //! What adds to the joints' commands, pose by pose.
 
-use super::Model;
-use crate::model::parameter::{Driver, JointField, Slot};
+use crate::model::parameter::{Driver, JointField, Parameter, Slot};
 use crate::problem::PoseView;
 
 /// A known addition to a joint's coordinate: value × driver.
@@ -33,10 +32,10 @@ pub(super) struct Commands {
 }
 
 impl Commands {
-    /// Of the model at the full parameter vector `x`.
-    pub fn new(model: &Model, x: &[f64]) -> Self {
-        let free = model.parameters.iter().zip(x);
-        let mut all = model.driven.clone();
+    /// Of what is known to drive and the free parameters at the full parameter vector `x`.
+    pub fn new(known: &[Driven], parameters: &[Parameter], x: &[f64]) -> Self {
+        let free = parameters.iter().zip(x);
+        let mut all = known.to_vec();
         all.extend(free.filter_map(|(parameter, &x)| Driven::of(parameter.slot, parameter.driver, x)));
         Self { all, configuration: Vec::new() }
     }

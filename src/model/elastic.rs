@@ -7,9 +7,9 @@ use nalgebra::{DVector, Vector3};
 use num_dual::Dual64;
 
 use super::Model;
-use super::derivative::Rows;
 use super::inputs::Input;
-use crate::mechanics::{Angle, Arm, Equilibrated, Part, Response, Sensitivity, Workspace};
+use super::rows::Rows;
+use crate::mechanics::{Angle, Arm, Equilibrated, Response, Segment, Sensitivity, Workspace};
 use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
@@ -29,7 +29,7 @@ pub(super) struct Elastic {
 /// An arm to be taken apart, and the direction of each input in its part.
 struct Parts {
     sensitivity: Sensitivity,
-    inputs: Vec<(Input, Part, usize)>,
+    inputs: Vec<(Input, Segment, usize)>,
 }
 
 /// An input with the arm that has it seeded.
@@ -95,13 +95,13 @@ impl Elastic {
 }
 
 /// The part on which alone an input acts; none where it changes loads.
-fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Part> {
+fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Segment> {
     match slot {
-        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Part::Beam(joint)),
-        Slot::Joint { joint, .. } => Some(Part::Joint(joint)),
+        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Segment::Beam(joint)),
+        Slot::Joint { joint, .. } => Some(Segment::Joint(joint)),
         Slot::Beam { field: BeamField::AddedMass, .. } => None,
-        Slot::Beam { joint, .. } => Some(Part::Beam(joint)),
-        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Part::Mounting),
+        Slot::Beam { joint, .. } => Some(Segment::Beam(joint)),
+        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Segment::Mounting),
         _ => None,
     }
 }

@@ -11,12 +11,15 @@ mod enter;
 mod inputs;
 mod observation;
 pub mod parameter;
+mod pose;
 mod poses;
 mod rigid;
+mod rows;
 mod terms;
 
 pub use ablation::Ablation;
-pub use poses::{Pose, PoseResiduals};
+pub use pose::Pose;
+pub use poses::PoseResiduals;
 
 use nalgebra::Vector3;
 
@@ -26,7 +29,7 @@ use crate::model::parameter::{Driver, JointField, LinearConstraint, Parameter, S
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
-use driven::Driven;
+use driven::{Commands, Driven};
 use observation::Observation;
 
 /// What predicts positions, as a function of the free parameters.
@@ -112,6 +115,16 @@ impl Model {
             enter::turn_gravity(&mut arm, tilt);
         }
         arm
+    }
+
+    /// What adds to the joints' commands at the full parameter vector `x`.
+    fn commands(&self, x: &[f64]) -> Commands {
+        Commands::new(&self.driven, &self.parameters, x)
+    }
+
+    /// What the instrument makes of positions at the full parameter vector `x`.
+    fn observed(&self, x: &[f64]) -> Observation {
+        self.observation.with(&self.parameters, x)
     }
 
     /// Base poses in the measuring frame: translation [m] and rotation vector [rad].

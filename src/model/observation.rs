@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::Model;
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{Driver, Parameter, Slot};
 use crate::problem::PoseView;
 
 /// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
@@ -16,10 +15,10 @@ pub(super) struct Observation {
 }
 
 impl Observation {
-    /// Of the model at the full parameter vector `x`.
-    pub fn new(model: &Model, x: &[f64]) -> Self {
-        let mut observation = model.observation.clone();
-        for (parameter, &x) in model.parameters.iter().zip(x) {
+    /// The same with the free parameters at the full parameter vector `x`.
+    pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
+        let mut observation = self.clone();
+        for (parameter, &x) in parameters.iter().zip(x) {
             match parameter.slot {
                 Slot::Scale => observation.scale += x,
                 Slot::Shift { axis } => observation.shifts.push((axis, parameter.driver, x)),

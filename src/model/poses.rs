@@ -7,26 +7,9 @@ use rayon::prelude::*;
 
 use super::Model;
 use super::derivative::Linearised;
-use super::driven::Commands;
-use super::observation::Observation;
+use super::pose::Pose;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::mechanics::{Equilibrated, Workspace};
-use crate::problem::PoseView;
-
-/// One measured pose as the model sees it.
-#[derive(Debug, Clone, Copy)]
-pub struct Pose<'a> {
-    /// What was set.
-    pub setup: PoseView<'a>,
-    /// Which base.
-    pub base: usize,
-    /// Which target.
-    pub target: usize,
-    /// Measured position, measuring frame [m].
-    pub measured: Vector3<f64>,
-    /// 1 σ of each coordinate [m].
-    pub sigma: f64,
-}
 
 /// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the parameters.
 pub struct PoseResiduals<'a> {
@@ -93,8 +76,8 @@ impl<'a> PoseResiduals<'a> {
         let arm = self.model.arm(|k| full[k]);
         let bases = self.model.base_frames(full.as_slice());
         let targets = self.model.target_positions(full.as_slice());
-        let observation = Observation::new(self.model, full.as_slice());
-        let mut commands = Commands::new(self.model, full.as_slice());
+        let observation = self.model.observed(full.as_slice());
+        let mut commands = self.model.commands(full.as_slice());
         let mut ws = Workspace::default();
         let mut rest = Equilibrated::default();
         for pose in &self.poses[items] {
@@ -117,7 +100,7 @@ impl Model {
     pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {
         let arm = self.arm(|k| x[k]);
         let targets = self.target_positions(x);
-        let mut commands = Commands::new(self, x);
+        let mut commands = self.commands(x);
         let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
         let point = |pose: &Pose| {
             arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest).ok()?;

@@ -6,8 +6,8 @@
 use nalgebra::Vector3;
 use num_dual::Dual64;
 
-use super::derivative::Rows;
 use super::inputs::Input;
+use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Coordinates, Joint};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::PoseView;

@@ -1,22 +1,13 @@
 //! The paper's procedure: stiffness by linear least squares, then geometry by the iterated pseudo-inverse, eq. 42-45.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::form::{Form, Misprint, Reading};
-use super::residuals::GeometryResiduals;
+use super::residuals::{GeometryResiduals, Measured};
 use super::{EndPoint, Parameters};
 use crate::least_squares::solver::{PseudoInverseSettings, Solution, minimise_pseudo_inverse, minimum_norm_step};
 use crate::least_squares::{Block, Fit, Triangle};
-use crate::problem::{PoseView, Problem};
-
-/// A pose with its measured position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured<'a> {
-    /// What was set.
-    pub setup: PoseView<'a>,
-    /// `PE_meas`, measuring frame [m].
-    pub position: Vector3<f64>,
-}
+use crate::problem::Problem;
 
 /// Where the stiffness comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -42,10 +42,10 @@ mod transfer;
 
 pub use end_point::EndPoint;
 pub use form::{Form, Misprint, Reading};
-pub use identify::{Identified, IdentifyError, Measured, Options, StiffnessStage, identify, least_squares, stiffness};
+pub use identify::{Identified, IdentifyError, Options, StiffnessStage, identify, least_squares, stiffness};
 pub use kinematics::{Chain, Mdh};
 pub use link::{LinkFlexibility, LinkTerms};
 pub use loads::{JointLoads, LinkLoads, Loads, PointLoad, Wrench};
 pub use parameters::{Flexibility, Parameters};
-pub use residuals::GeometryResiduals;
+pub use residuals::{GeometryResiduals, Measured};
 pub use transfer::{Elastic, joint_transfer, link_transfer, link_transfer_of_eq24, transfer};

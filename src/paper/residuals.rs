@@ -2,13 +2,21 @@
 
 use std::ops::Range;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use super::form::Reading;
-use super::identify::Measured;
 use super::{EndPoint, Parameters};
 use crate::least_squares::{Block, LeastSquares};
-use crate::problem::Problem;
+use crate::problem::{PoseView, Problem};
+
+/// A pose with its measured position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured<'a> {
+    /// What was set.
+    pub setup: PoseView<'a>,
+    /// `PE_meas`, measuring frame [m].
+    pub position: Vector3<f64>,
+}
 
 /// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
 ///

@@ -9,7 +9,6 @@ use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
-use super::section::Section;
 use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, lines};
 
 /// The text that is read, and its name.
@@ -56,10 +55,10 @@ impl Document {
 /// A value and its place.
 #[derive(Clone)]
 pub(crate) struct Item<'a, 'i> {
-    document: &'a Document,
-    key: String,
-    value: &'a DeValue<'i>,
-    span: Range<usize>,
+    pub(super) document: &'a Document,
+    pub(super) key: String,
+    pub(super) value: &'a DeValue<'i>,
+    pub(super) span: Range<usize>,
 }
 
 impl<'a, 'i> Item<'a, 'i> {
@@ -182,17 +181,6 @@ impl<'a, 'i> Item<'a, 'i> {
         }
         let numbers = elements.iter().map(Self::number).collect::<Result<Vec<_>, _>>()?;
         Ok(Vector3::from_column_slice(&numbers))
-    }
-
-    /// A table, as a section.
-    pub fn section(&self) -> Result<Section<'a, 'i>, InputError> {
-        let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
-        Ok(self.section_of(table))
-    }
-
-    /// A section with this item's place and a table from elsewhere.
-    pub fn section_of(&self, table: &'a DeTable<'i>) -> Section<'a, 'i> {
-        Section::new(self.document, self.key.clone(), self.span.clone(), table)
     }
 }
 

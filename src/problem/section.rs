@@ -187,3 +187,16 @@ impl<'a, 'i> Section<'a, 'i> {
         }
     }
 }
+
+impl<'a, 'i> Item<'a, 'i> {
+    /// A table, as a section.
+    pub fn section(&self) -> Result<Section<'a, 'i>, InputError> {
+        let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        Ok(self.section_of(table))
+    }
+
+    /// A section with this item's place and a table from elsewhere.
+    pub fn section_of(&self, table: &'a DeTable<'i>) -> Section<'a, 'i> {
+        Section::new(self.document, self.key.clone(), self.span.clone(), table)
+    }
+}

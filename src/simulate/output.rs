@@ -33,8 +33,12 @@ impl Simulation {
     /// `measurements.csv`.
     pub fn csv(&self) -> String {
         let rows = self.rows.iter().enumerate().map(|(index, row)| self.cells(index + 1, row));
-        let lines = std::iter::once(self.header()).chain(rows);
-        lines.flat_map(|cells| [cells.join(","), "\n".to_owned()]).collect()
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        for cells in std::iter::once(self.header()).chain(rows) {
+            // Writing to memory cannot fail, and every row has the cells of the header.
+            let _ = writer.write_record(cells);
+        }
+        String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
     }
 
     /// Joints that take a q: index, and whether they turn.

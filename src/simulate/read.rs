@@ -14,13 +14,28 @@ use crate::problem::section::Section;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Unit;
 
-pub(super) fn file(path: &Path, problem: &Problem) -> Result<Truth, InputError> {
-    let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
-    truth(&Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?, problem)
-}
+impl Truth {
+    /// Reads a `TRUTH.toml` about a problem, or the one in a folder.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
+        let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
+        truth(&Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?, problem)
+    }
 
-pub(super) fn text(text: &str, file: &Path, problem: &Problem) -> Result<Truth, InputError> {
-    truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
+    /// Reads it from its text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
+        truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
+    }
+
+    /// Reads its sections but `[noise]` where they stand in another document; no noise.
+    pub(crate) fn of_sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Self, InputError> {
+        sections(root, problem)
+    }
 }
 
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
@@ -37,7 +52,7 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
 }
 
 /// The sections that say what is true, without noise.
-pub(super) fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
+fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
     let known = parameters::nominal(problem);
     let parameters = match root.section("parameters")? {
         Some(section) => section.entries().iter().map(|(name, item)| deviation(name, item, &known)).collect(),

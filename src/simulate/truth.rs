@@ -1,12 +1,7 @@
 //! What is true on the test bench, as plain data in SI units.
 
-use std::path::Path;
-
 use super::effect::TrueEffect;
-use super::read;
-use crate::error::InputError;
-use crate::problem::section::Section;
-use crate::problem::{PoseRanges, Problem};
+use crate::problem::PoseRanges;
 use crate::quantity::Unit;
 
 /// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
@@ -59,29 +54,6 @@ pub enum HeldOutRows {
     Share(f64),
     /// All but this many.
     AllBut(usize),
-}
-
-impl Truth {
-    /// Reads a `TRUTH.toml` about a problem, or the one in a folder.
-    ///
-    /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
-    pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
-        read::file(path, problem)
-    }
-
-    /// Reads it from its text; `file` names it in messages.
-    ///
-    /// # Errors
-    /// The first mistake found.
-    pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
-        read::text(text, file, problem)
-    }
-
-    /// Reads its sections but `[noise]` where they stand in another document; no noise.
-    pub(crate) fn of_sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Self, InputError> {
-        read::sections(root, problem)
-    }
 }
 
 impl RandomRule {

@@ -1,16 +1,16 @@
-//! Derivatives of the position at rest, by virtual work.
+//! The adjoint sweep: derivatives of the position at rest, by virtual work.
 //!
 //! With Λ the influence of the moments' equations (see [`super::statics`]), each coordinate of p + Λ·(G − x) changes with
-//! the place of every load, section and part. Walking inwards from the target, the wrench that does that change as virtual
+//! the place of every load, section and segment. Walking inwards from the target, the wrench that does that change as virtual
 //! work on everything passed so far is kept for each of the three coordinates: a load f at r adds the force f × W, with W
-//! the Λ-weighted axes of all sections inwards of it; a section adds what its own place and axes do to its moment. A part's
-//! derivative is then the work of that wrench on the part's twist. For the moments themselves this is Λ again, so that Λ
-//! is a fixed point of the walk, reached by the same contraction as the equilibrium itself.
+//! the Λ-weighted axes of all sections inwards of it; a section adds what its own place and axes do to its moment. A segment's
+//! derivative is then the work of that wrench on the segment's twist. For the moments themselves this is Λ again, so that Λ
+//! is a fixed point of the sweep, reached by the same contraction as the equilibrium itself.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::statics::{MAX_PASSES, SETTLED};
-use super::trail::{Column, Each, Felt, Load, Section, Step, Trail};
+use super::tape::{Column, Each, Felt, Load, Section, Step, Tape};
 use crate::spatial::Frame;
 
 /// The wrench about the base origin that does the coordinates' change as virtual work.
@@ -28,20 +28,20 @@ impl Virtual {
         }
     }
 
-    /// Work on a part's end.
+    /// Work on a segment's end.
     fn on(&self, column: &Column) -> Vector3<f64> {
         let each = |i: usize| self.moment[i].dot(&column.rotation) + self.force[i].dot(&column.translation);
         Vector3::new(each(0), each(1), each(2))
     }
 }
 
-impl Trail {
+impl Tape {
     /// Finds Λ, then the derivatives of the position `at` [m] of the target with respect to all parameters.
     pub(super) fn differentiate(&mut self, at: &Vector3<f64>) {
         self.anderson.restart();
         for _ in 0..MAX_PASSES {
-            self.outwards();
-            self.inwards(at, Sought::Influence);
+            self.weigh_loads();
+            self.adjoint_sweep(at, Sought::Influence);
             let Self { influence, image, anderson, .. } = self;
             let largest = image.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let change = influence.iter().zip(&*image).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
@@ -50,19 +50,21 @@ impl Trail {
             }
             anderson.advance(influence, image);
         }
-        self.outwards();
-        self.inwards(at, Sought::Parameters);
+        self.weigh_loads();
+        self.adjoint_sweep(at, Sought::Parameters);
     }
 
     /// What a move of each load does.
-    fn outwards(&mut self) {
+    fn weigh_loads(&mut self) {
         let Self { steps, loads, influence, .. } = self;
         let mut weights = [Vector3::zeros(); 3];
         let weigh = |load: &mut Load, weights: &Each| load.virtually = weights.each_ref().map(|w| load.force.cross(w));
         for step in steps {
             match step {
                 Step::Load(load) => weigh(&mut loads[*load], &weights),
-                Step::Part(part) => loads[part.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights)),
+                Step::Segment(segment) => {
+                    loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights))
+                }
                 Step::Section(section) => {
                     let own = section.weights(influence);
                     (0..3).for_each(|i| weights[i] += own[i]);
@@ -72,7 +74,7 @@ impl Trail {
     }
 
     /// From the target to the base.
-    fn inwards(&mut self, at: &Vector3<f64>, sought: Sought) {
+    fn adjoint_sweep(&mut self, at: &Vector3<f64>, sought: Sought) {
         let Self { steps, loads, columns, moves, influence, image, derivatives, stride, .. } = self;
         image.fill(0.0);
         let unit = Frame::identity().axes;
@@ -81,34 +83,34 @@ impl Trail {
             match step {
                 Step::Load(load) => wrench.add(&loads[*load].at, &loads[*load].virtually),
                 Step::Section(section) => section.act(influence, &mut wrench),
-                Step::Part(part) => {
-                    let own = &loads[part.loads.clone()];
+                Step::Segment(segment) => {
+                    let own = &loads[segment.loads.clone()];
                     let work = |lane: usize| {
-                        let mut work = wrench.on(&columns[part.column(lane)]);
-                        for (load, moved) in own.iter().zip(&moves[part.moves(lane)]) {
+                        let mut work = wrench.on(&columns[segment.column(lane)]);
+                        for (load, moved) in own.iter().zip(&moves[segment.moves(lane)]) {
                             work += Vector3::from_fn(|i, _| load.virtually[i].dot(moved));
                         }
                         work
                     };
                     match sought {
                         Sought::Influence => {
-                            for (lane, unknown) in (part.moment_lane..).zip(part.unknowns.clone()) {
+                            for (lane, unknown) in (segment.moment_lane..).zip(segment.unknowns.clone()) {
                                 // What tilts does so in two halves.
                                 image[3 * unknown..][..3].iter_mut().zip(&work(lane)).for_each(|(a, w)| *a += w);
                             }
                         }
                         Sought::Parameters => {
-                            for lane in part.parameter_lane..part.lanes {
-                                derivatives[part.index * *stride + lane] += work(lane);
+                            for lane in segment.parameter_lane..segment.lanes {
+                                derivatives[segment.index * *stride + lane] += work(lane);
                             }
                         }
                     }
-                    if part.turns {
+                    if segment.turns {
                         let turned = Matrix3::from_columns(&[work(0), work(1), work(2)]);
                         for (i, about_root) in turned.row_iter().enumerate() {
                             wrench.force[i] += own.iter().map(|load| load.virtually[i]).sum::<Vector3<f64>>();
-                            wrench.moment[i] =
-                                part.root.vector(&about_root.transpose()) + part.root.origin.cross(&wrench.force[i]);
+                            wrench.moment[i] = segment.root.vector(&about_root.transpose())
+                                + segment.root.origin.cross(&wrench.force[i]);
                         }
                     }
                 }
@@ -117,7 +119,7 @@ impl Trail {
     }
 }
 
-/// What a walk inwards is for.
+/// What an adjoint sweep is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sought {
     Influence,

@@ -1,11 +1,12 @@
-//! One walk from the base to the tip: frames, loads, and the sections whose moments bend something.
+//! The forward pass from the base to the tip: frames, loads, and the sections whose moments bend something.
 
 use nalgebra::Vector3;
 
 use super::Wrench;
-use super::apart::{Cut, Part};
+use super::arm::Arm;
 use super::element::{Element, LinkLoad};
-use super::link::{Arm, Beam, Hoist, PointMass};
+use super::link::{Beam, Hoist, PointMass};
+use super::segment::{Cut, Segment};
 use super::workspace::{Event, Workspace};
 use crate::problem::PoseView;
 use crate::scalar::Scalar;
@@ -18,7 +19,7 @@ pub(super) enum Bend<'a, S> {
     Rigid,
     /// By these moments, on the bent arm; records events.
     Bent(&'a [S]),
-    /// The same part by part: each begins at a frame without derivatives, which elements first turn by a rotation
+    /// The same segment by segment: each begins at a frame without derivatives, which elements first turn by a rotation
     /// vector of size zero, if there is one.
     Apart(&'a [S], Option<&'a Vector3<S>>),
     /// By these moments, with forces resolved in the frames of the last rigid walk; records nothing.
@@ -47,21 +48,21 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Ends a part that bends by the last `unknowns` moments, if the arm is walked part by part.
-    fn cut(&mut self, part: Part, unknowns: usize, events: &mut Vec<Event<S>>, cuts: &mut Vec<Cut<S>>) {
+    /// Ends a segment that bends by the last `unknowns` moments, if the arm is walked segment by segment.
+    fn cut(&mut self, segment: Segment, unknowns: usize, events: &mut Vec<Event<S>>, cuts: &mut Vec<Cut<S>>) {
         if let Bend::Apart(..) = self.bend {
-            cuts.push(Cut { frame: self.frame, part, unknowns: (self.next - unknowns, unknowns) });
+            cuts.push(Cut { frame: self.frame, segment, unknowns: (self.next - unknowns, unknowns) });
             events.push(Event::Cut);
             self.frame = self.frame.constant();
         }
     }
 
     /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half way.
-    fn tilt(&mut self, [about_x, about_y]: &[S; 2], part: Part, ws: &mut Workspace<S>) {
+    fn tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
         let half = self.moments().map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
         if let Some(half) = &half {
             self.frame.rotate(half);
-            self.cut(part, 2, &mut ws.events, &mut ws.cuts);
+            self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
         if self.records() {
             let [x, y, _] = self.frame.axes;
@@ -69,7 +70,7 @@ impl<S: Scalar> Walk<'_, S> {
         }
         if let Some(half) = &half {
             self.frame.rotate(half);
-            self.cut(part, 2, &mut ws.events, &mut ws.cuts);
+            self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
     }
 
@@ -112,7 +113,7 @@ impl<S: Scalar> Arm<S> {
         let tension = setup.hoist.unwrap_or(hoist.force);
         match &self.rope {
             None => (hoist.direction * tension).map(S::from),
-            Some(rope) => rope.pull(hoist, tension, hook()),
+            Some(rope) => rope.pull(&hoist.direction, tension, hook()),
         }
     }
 
@@ -132,7 +133,7 @@ impl<S: Scalar> Arm<S> {
             ws.rigid_roots.clear();
         }
         if let Some(mounting) = &self.mounting {
-            walk.tilt(mounting, Part::Mounting, ws);
+            walk.tilt(mounting, Segment::Mounting, ws);
         }
         for (i, joint) in self.joints.iter().enumerate() {
             walk.frame.rotate_x(joint.alpha.sin_cos);
@@ -142,12 +143,12 @@ impl<S: Scalar> Arm<S> {
             if joint.beam.is_none() {
                 walk.frame.translate_x(joint.a);
             }
-            walk.cut(Part::Joint(i), 0, &mut ws.events, &mut ws.cuts);
+            walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             if let Some(beam) = &joint.beam {
                 self.walk_beam(beam, i, &mut walk, ws);
             }
             if let Some(lateral) = &joint.lateral {
-                walk.tilt(lateral, Part::Joint(i), ws);
+                walk.tilt(lateral, Segment::Joint(i), ws);
             }
             let (mut twist, mut slip) = (None, None);
             if joint.turns() {
@@ -159,7 +160,7 @@ impl<S: Scalar> Arm<S> {
                 slip = joint.slip(approach);
             }
             joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
-            walk.cut(Part::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
+            walk.cut(Segment::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
             if walk.records() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
@@ -230,7 +231,7 @@ impl<S: Scalar> Arm<S> {
                         events.push(Event::Load { at, force: load.force });
                     }
                     walk.frame = bent.tip();
-                    walk.cut(Part::Beam(link), 3, events, cuts);
+                    walk.cut(Segment::Beam(link), 3, events, cuts);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
             }

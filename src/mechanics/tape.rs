@@ -33,15 +33,15 @@ pub(super) enum Step {
     Load(usize),
     /// Moments that are unknowns.
     Section(Section),
-    /// A part.
-    Part(Part),
+    /// A segment.
+    Segment(TapedSegment),
 }
 
 /// A part with the places of its numbers: one column for each of its directions, and as many moves as it has loads.
 ///
 /// The first three directions of a part that `turns` are those of its root, in its own axes.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Part {
+pub(super) struct TapedSegment {
     /// Place in a list of all parts.
     pub index: usize,
     pub root: Frame<f64>,
@@ -61,7 +61,7 @@ pub(super) struct Part {
     pub first_move: usize,
 }
 
-impl Part {
+impl TapedSegment {
     pub fn column(&self, lane: usize) -> usize {
         self.first_column + lane
     }
@@ -94,7 +94,7 @@ pub(super) struct Load {
 
 /// A pose at rest taken down part by part, to differentiate its position.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Trail {
+pub(super) struct Tape {
     pub steps: Vec<Step>,
     pub loads: Vec<Load>,
     pub columns: Vec<Column>,
@@ -109,13 +109,13 @@ pub(super) struct Trail {
     pub stride: usize,
 }
 
-impl Trail {
+impl Tape {
     /// For `parts` of at most `lanes` directions.
     pub fn new(parts: usize, lanes: usize) -> Self {
         Self { derivatives: vec![Vector3::zeros(); parts * lanes], stride: lanes, ..Self::default() }
     }
 
-    /// Derivative of the position with respect to the parameter in a direction of a part.
+    /// Derivative of the position with respect to the parameter in a direction of a segment.
     pub fn derivative(&self, part: usize, lane: usize) -> Vector3<f64> {
         self.derivatives[part * self.stride + lane]
     }
@@ -152,14 +152,14 @@ impl Trail {
         }));
     }
 
-    /// A part; its loads are the last ones.
-    pub fn part(&mut self, mut part: Part) {
-        part.loads = self.loads.len() - part.events.len()..self.loads.len();
-        (part.first_column, part.first_move) = (self.columns.len(), self.moves.len());
-        self.columns.resize(part.first_column + part.lanes, Column::default());
-        self.moves.resize(part.first_move + part.lanes * part.loads.len(), Vector3::zeros());
-        self.steps.truncate(self.steps.len() - part.loads.len());
-        self.steps.push(Step::Part(part));
+    /// A segment; its loads are the last ones.
+    pub fn segment(&mut self, mut segment: TapedSegment) {
+        segment.loads = self.loads.len() - segment.events.len()..self.loads.len();
+        (segment.first_column, segment.first_move) = (self.columns.len(), self.moves.len());
+        self.columns.resize(segment.first_column + segment.lanes, Column::default());
+        self.moves.resize(segment.first_move + segment.lanes * segment.loads.len(), Vector3::zeros());
+        self.steps.truncate(self.steps.len() - segment.loads.len());
+        self.steps.push(Step::Segment(segment));
     }
 
     /// Sums the loads beyond every section, once all is taken down.
@@ -174,8 +174,8 @@ impl Trail {
         for step in self.steps.iter_mut().rev() {
             match step {
                 Step::Load(load) => sums = add(&self.loads[*load]),
-                Step::Part(part) => {
-                    for load in &self.loads[part.loads.clone()] {
+                Step::Segment(segment) => {
+                    for load in &self.loads[segment.loads.clone()] {
                         sums = add(load);
                     }
                 }

@@ -1,0 +1,41 @@
+//! Where the derivatives of one pose are written.
+
+use nalgebra::Vector3;
+
+use super::inputs::Input;
+use crate::least_squares::Block;
+use crate::problem::PoseView;
+
+/// Three rows of a block.
+pub(super) struct Rows<'a> {
+    pub block: &'a mut Block,
+    pub row: usize,
+    /// From a derivative of the prediction to one of the residual (measured − predicted) / σ.
+    pub scale: f64,
+}
+
+impl Rows<'_> {
+    #[inline]
+    pub fn put(&mut self, column: usize, derivative: &Vector3<f64>) {
+        let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
+        out.copy_from_slice((derivative * self.scale).as_slice());
+    }
+
+    #[inline]
+    pub fn put_if(&mut self, column: Option<usize>, derivative: impl FnOnce() -> Vector3<f64>) {
+        if let Some(column) = column {
+            self.put(column, &derivative());
+        }
+    }
+
+    /// Writes the derivative with respect to an input for each parameter that acts there.
+    #[inline]
+    pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
+        if let Some(column) = input.column {
+            self.put(column, derivative);
+        }
+        for &(column, driver) in &input.driven {
+            self.put(column, &(derivative * driver.value(commanded)));
+        }
+    }
+}
