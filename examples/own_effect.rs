@@ -22,7 +22,7 @@ struct Belt {
 }
 
 impl CustomEffect for Belt {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "joint-belt"
     }
 

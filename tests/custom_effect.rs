@@ -1,6 +1,8 @@
 //! An effect that no catalogue holds, added by a user of the library without touching it: declared, fitted, traced and found
 //! by the loop. The walk-through of docs/effects.md.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 mod common;
 
 use common::arms::golden_problem;
@@ -26,7 +28,7 @@ struct Creep {
 }
 
 impl CustomEffect for Creep {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "joint-creep"
     }
 

@@ -63,7 +63,7 @@ impl Tape {
             match step {
                 Step::Load(load) => weigh(&mut loads[*load], &weights),
                 Step::Segment(segment) => {
-                    loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights))
+                    loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights));
                 }
                 Step::Section(section) => {
                     let own = section.weights(influence);

@@ -37,7 +37,7 @@ fn check_custom(
     mut others: Vec<EffectParameter>,
     effect: &Effect,
 ) -> Result<(), InputErrorKind> {
-    if !matches!(effect, Effect::Custom(_)) {
+    if !effect.is_custom() {
         return Ok(());
     }
     let name = effect.name();

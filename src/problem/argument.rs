@@ -98,13 +98,11 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     /// The number of a joint that takes a command.
     pub fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let joint = self.any_joint(key)?;
-        match (self.joints[joint - 1].kind, self.section.peek(key)) {
-            (JointKind::Fixed, Some(item)) => Err(item.error(InputErrorKind::NoCommand { joint })),
-            _ => {
-                self.last = Some(joint);
-                Ok(joint)
-            }
+        if let (JointKind::Fixed, Some(item)) = (self.joints[joint - 1].kind, self.section.peek(key)) {
+            return Err(item.error(InputErrorKind::NoCommand { joint }));
         }
+        self.last = Some(joint);
+        Ok(joint)
     }
 
     /// The number of another joint that takes a command than the one before.

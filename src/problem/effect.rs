@@ -157,6 +157,11 @@ impl Effect {
         declaration(self.name(), &arguments)
     }
 
+    /// Whether it is one of one's own, which no file can declare.
+    pub fn is_custom(&self) -> bool {
+        matches!(self, Self::Custom(_))
+    }
+
     /// Whether it follows the temperature.
     pub fn is_thermal(&self) -> bool {
         matches!(

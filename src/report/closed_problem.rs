@@ -63,14 +63,28 @@ fn edited(
     if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
         name_files(data, files);
     }
-    for (k, (effect, comments)) in closed.iter().enumerate() {
+    let (customs, written): (Vec<_>, Vec<_>) = closed.iter().partition(|(effect, _)| effect.is_custom());
+    let declared: Vec<&Effect> = declared.iter().filter(|effect| !effect.is_custom()).collect();
+    for (k, (effect, comments)) in written.into_iter().enumerate() {
         match declared.get(k) {
-            Some(known) if known == effect => {}
+            Some(known) if *known == effect => {}
             Some(_) => replace(&mut document, k, effect),
             None => add(&mut document, effect, comments),
         }
     }
+    for (effect, comments) in customs {
+        say(&mut document, effect, comments);
+    }
     Ok(document.to_string())
+}
+
+/// Says of a custom effect, in comments at the end, that no file can declare it.
+fn say(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
+    let rest = document.trailing().as_str().unwrap_or_default();
+    let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
+    let own = effect.name_and_place();
+    let more = format!("# {own} is an effect of one's own: no file declares it, only the program that defines it.\n");
+    document.set_trailing(format!("{rest}\n{lines}{more}"));
 }
 
 /// Writes the names of the data files.
@@ -185,6 +199,33 @@ mod tests {
                         # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n[[effect]]\nhoist-force = true\n";
         assert_eq!(edit(text, &[], &[gear(), Effect::HoistForce]), expected);
         assert_eq!(edit(text, &[], &[]), text.replace("data.csv", "../data.csv"));
+    }
+
+    #[test]
+    fn what_no_file_can_declare_is_a_comment() {
+        #[derive(Debug)]
+        struct Creep;
+        impl crate::model::effect::CustomEffect for Creep {
+            fn name(&self) -> &'static str {
+                "joint-creep"
+            }
+            fn place(&self) -> String {
+                "3".to_owned()
+            }
+            fn terms(&self, _: &Problem) -> Vec<crate::model::effect::Term> {
+                Vec::new()
+            }
+            fn describe(&self) -> String {
+                String::new()
+            }
+        }
+        let own = || Effect::custom(Creep);
+        let text = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[data]\nfiles = []\n";
+        let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
+        let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[data]\nfiles = [\"../data.csv\"]\n\n\
+                        # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n\
+                        # joint-creep 3 is an effect of one's own: no file declares it, only the program that defines it.\n";
+        assert_eq!(edit(text, &[harmonic(&[1])], &[harmonic(&[1, 2]), own(), gear()]), expected);
     }
 
     #[test]

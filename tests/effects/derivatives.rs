@@ -148,7 +148,7 @@ fn loaded(arm: &Problem, rows: &Measurements, factor: f64) -> (Problem, Measurem
     rows.hoist.iter_mut().flatten().for_each(|force| *force *= factor);
     for joint in &mut arm.joints {
         joint.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor);
-        for beam in &mut joint.beam {
+        if let Some(beam) = &mut joint.beam {
             let rigidities = [&mut beam.ea, &mut beam.ei_y, &mut beam.ei_z, &mut beam.gj];
             rigidities.into_iter().flatten().for_each(|rigidity| *rigidity *= factor);
             beam.hoist.iter_mut().for_each(|hoist| hoist.force *= factor);
