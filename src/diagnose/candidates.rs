@@ -11,6 +11,9 @@ pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 /// Why an effect is not looked for that the problem could not declare as its rules are.
 pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
+/// Why an effect is not judged whose derivative is not a number in these poses.
+pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
+
 /// Why a custom effect is not looked for that the model cannot take.
 pub const NO_ROOM: &str = "the model has no room for it";
 

@@ -8,19 +8,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::covariate::Covariate;
 use super::residual_tests::CovariateValues;
+use super::rules::SelectionRules;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::DataCoverage;
 use crate::model::parameter::Quantity;
 use crate::problem::{Effect, JointKind, Problem};
-
-/// Blocks of a cross-validation.
-const BLOCKS: usize = 10;
-/// Seed of what is random in a diagnosis: blocks, permutations, bootstrap.
-pub(super) const SEED: u64 = 20_211_206;
-/// Poses that a station shift must leave on either side.
-const LEAST_SIDE: usize = 3;
-/// Times of a station shift that are tried at most.
-const MOST_TIMES: usize = 200;
 
 /// Measurements and which of their rows take part.
 #[derive(Debug, Clone)]
@@ -29,6 +21,7 @@ pub(super) struct Data<'a> {
     pub dataset: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
+    pub rules: &'a SelectionRules,
     /// Number of the conditions of each identification row; rows with the same are repeats.
     pub setup: Vec<usize>,
     /// Block of each identification row; repeats share one.
@@ -38,20 +31,20 @@ pub(super) struct Data<'a> {
 }
 
 impl<'a> Data<'a> {
-    pub fn new(dataset: &'a Dataset) -> Self {
+    pub fn new(dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
         let Dataset { measurements, split } = dataset;
         let rows = &split.identification;
         let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
         let configurations = number(rows.iter().map(|&row| bits(measurements.configuration(row))));
         let count = configurations.iter().max().map_or(0, |last| last + 1);
         let mut order: Vec<usize> = (0..count).collect();
-        order.shuffle(&mut ChaCha8Rng::seed_from_u64(SEED));
+        order.shuffle(&mut ChaCha8Rng::seed_from_u64(rules.seed));
         let mut block_of = vec![0; count];
         for (place, configuration) in order.into_iter().enumerate() {
-            block_of[configuration] = place % BLOCKS.min(count.max(1));
+            block_of[configuration] = place % rules.blocks.min(count.max(1));
         }
         let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
-        Self { dataset, measurements, split, setup, block, candidates: &[] }
+        Self { dataset, measurements, split, rules, setup, block, candidates: &[] }
     }
 
     /// The same with more effects to look for.
@@ -72,7 +65,8 @@ impl<'a> Data<'a> {
     /// The same with no more than `most` identification rows, taken evenly.
     pub fn thinned(&self, most: usize) -> Vec<usize> {
         let rows = self.rows();
-        rows.iter().copied().step_by(rows.len().div_ceil(most).max(1)).collect()
+        let taken = rows.len().min(most);
+        (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
     }
 
     /// Values of a quantity at the identification rows.
@@ -136,9 +130,20 @@ impl<'a> Data<'a> {
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
             payload: payload.map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
             ranges: (0..n).map(column).collect(),
-            times: shift_times(self.time()),
+            times: self.shift_times(),
             gravity: problem.gravity,
         }
+    }
+
+    /// Times half way between poses that leave enough of them on either side, thinned evenly.
+    fn shift_times(&self) -> Vec<f64> {
+        let mut times = self.time();
+        times.sort_by(f64::total_cmp);
+        let (count, side) = (times.len(), self.rules.least_side);
+        let between = |k: usize| (times[k] > times[k - 1]).then(|| 0.5 * (times[k - 1] + times[k]));
+        let all: Vec<f64> = (side..count).take_while(|k| k + side <= count).filter_map(between).collect();
+        let every = all.len().div_ceil(self.rules.shift_times).max(1);
+        all.into_iter().step_by(every).collect()
     }
 
     /// Everything that the residual may depend on, one value per identification row.
@@ -170,17 +175,6 @@ impl<'a> Data<'a> {
         }
         covariates
     }
-}
-
-/// Times half way between poses that leave enough of them on either side, thinned evenly.
-fn shift_times(mut times: Vec<f64>) -> Vec<f64> {
-    times.sort_by(f64::total_cmp);
-    let count = times.len();
-    let inner = LEAST_SIDE..count.saturating_sub(LEAST_SIDE) + 1;
-    let between = |k: usize| (times[k] > times[k - 1]).then(|| 0.5 * (times[k - 1] + times[k]));
-    let all: Vec<f64> = inner.filter(|&k| k < count).filter_map(between).collect();
-    let every = all.len().div_ceil(MOST_TIMES).max(1);
-    all.into_iter().step_by(every).collect()
 }
 
 /// What one row was measured under, to the bit.

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::candidates::Candidates;
 use super::data::Data;
-use super::neighbourhood::{Library, Linear, tries};
+use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns, tries};
 use super::power::ScanTest;
-use super::selection::LEVEL;
+use super::rules::SelectionRules;
 use crate::error::InputError;
 use crate::identify::Placement;
 use crate::measurement::{Dataset, Measurements, Split};
@@ -16,12 +16,7 @@ use crate::model::parameter::unit;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 
-/// Probability with which an effect of the stated size is found.
-pub(super) const POWER: f64 = 0.8;
-/// Seconds between poses whose times nobody knows.
-const TIME_STEP: f64 = 60.0;
-/// A direction of which less than this part of the length² is new is absorbed by the fit.
-const ABSORBED: f64 = 1e-8;
+const RULES: &SelectionRules = &SelectionRules::DEFAULT;
 
 /// What measurements in some poses would show of the effects of the catalogue.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,9 +67,9 @@ impl Size {
 
 /// From what size on each effect of the catalogue would be found by the first round of the loop, were `poses` measured.
 ///
-/// Linear about the nominal arm. With the columns C of an effect's parameters p, everything free projected out as a fit with
+/// LinearNeighbourhood about the nominal arm. With the columns C of an effect's parameters p, everything free projected out as a fit with
 /// priors does, an effect of size p has the noncentrality λ = pᵀ CᵀC p; it is found if F on k and ν − k degrees of freedom is
-/// beyond LEVEL / tries. Poses without a time are taken to be a minute apart.
+/// beyond level / tries. Poses without a time are taken to be a minute apart.
 ///
 /// # Errors
 /// Rules of `[parameters]` do not fit the arm.
@@ -82,21 +77,21 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
     let poses = timed(poses);
     let Candidates { testable, untestable } = candidates(problem, &poses);
     let (tries, families) = tries(&testable);
-    let effects = with_linear(problem, &poses, &testable, |library, linear| {
+    let effects = with_linear(problem, &poses, &testable, |linearised, linear| {
         let sizes = |(effect, tries): (&Effect, f64)| Detectable {
-            sizes: sizes(problem, library, linear, effect, tries * families as f64),
+            sizes: sizes(problem, linearised, linear, effect, tries * families as f64),
             effect: effect.clone(),
         };
         testable.par_iter().zip(tries).map(sizes).collect()
     })?;
-    Ok(Detection { power: POWER, level: LEVEL, effects, untestable })
+    Ok(Detection { power: RULES.power, level: RULES.level, effects, untestable })
 }
 
 /// The poses with times.
 pub(super) fn timed(poses: &Measurements) -> Measurements {
     let mut poses = poses.clone();
     if !poses.time_measured {
-        poses.time = (0_u32..).take(poses.len()).map(|row| f64::from(row) * TIME_STEP).collect();
+        poses.time = (0_u32..).take(poses.len()).map(|row| f64::from(row) * RULES.time_step).collect();
     }
     poses
 }
@@ -104,7 +99,7 @@ pub(super) fn timed(poses: &Measurements) -> Measurements {
 /// What of the catalogue all these poses could show.
 pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
     let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
-    Candidates::of(problem, &Data::new(&Dataset::new(poses.clone(), split)))
+    Candidates::of(problem, &Data::new(&Dataset::new(poses.clone(), split), RULES))
 }
 
 /// What `with` makes of the nominal arm in these poses, and of a fit of everything free before anything was measured there:
@@ -113,27 +108,33 @@ pub(super) fn with_linear<T>(
     problem: &Problem,
     poses: &Measurements,
     effects: &[Effect],
-    with: impl FnOnce(&Library, &Linear) -> T,
+    with: impl FnOnce(&Linearised, &LinearNeighbourhood) -> T,
 ) -> Result<T, InputError> {
     let placement = Placement::of(poses);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let n = model.parameters.len();
     let (rows, unknowns): (Vec<usize>, Vec<usize>) = ((0..poses.len()).collect(), (0..n).collect());
     let measured = placement.poses(poses, &rows, problem.data.position_sigma.unwrap_or(1.0));
-    let library = Library::new(problem, &model, measured, &unknowns, &DVector::zeros(n), (effects, &[]));
-    let columns = library.fitted();
+    let linearised = Linearised::new(problem, &model, measured, &unknowns, &DVector::zeros(n), (effects, &[]));
+    let columns = linearised.fitted();
     let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
-    priors.extend(library.let_go());
-    let (residual, x) = (DVector::zeros(columns.nrows()), vec![0.0; priors.len()]);
-    let linear = Linear::new(&columns, &residual, &x, &priors, &DMatrix::zeros(0, priors.len()));
-    Ok(with(&library, &linear))
+    priors.extend(linearised.relaxed());
+    let unknowns = Unknowns { x: vec![0.0; priors.len()], priors, active: DMatrix::zeros(0, columns.ncols()) };
+    let linear = LinearNeighbourhood::new(&columns, &DVector::zeros(columns.nrows()), &unknowns);
+    Ok(with(&linearised, &linear))
 }
 
 /// Sizes of an effect, by the units of its parameters; those whose zero means nothing, as the place of a mass, are left out.
-pub(super) fn sizes(problem: &Problem, library: &Library, linear: &Linear, effect: &Effect, tries: f64) -> Vec<Size> {
-    let score = linear.score(&library.columns(effect));
-    let test = ScanTest::new(score.rank(), linear.expected_freedom(), tries);
-    let needed = test.and_then(|test| test.noncentrality(POWER));
+pub(super) fn sizes(
+    problem: &Problem,
+    linearised: &Linearised,
+    linear: &LinearNeighbourhood,
+    effect: &Effect,
+    tries: f64,
+) -> Vec<Size> {
+    let score = linear.score(&linearised.columns(effect));
+    let test = ScanTest::new(score.rank(RULES), linear.expected_freedom(), tries);
+    let needed = test.and_then(|test| test.noncentrality(RULES.power));
     let parameters = effect.parameters(problem);
     let mut groups: Vec<(Unit, Vec<usize>)> = Vec::new();
     for (k, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0) {
@@ -147,7 +148,8 @@ pub(super) fn sizes(problem: &Problem, library: &Library, linear: &Linear, effec
         let gram = score.gram.select_rows(&members).select_columns(&members);
         let longest = members.iter().map(|&k| score.lengths[k]).fold(0.0, f64::max);
         let seen = gram.symmetric_eigenvalues();
-        let from = |value: f64| (value > ABSORBED * longest).then(|| Some((needed? / value).sqrt())).flatten();
+        let from =
+            |value: f64| (value > RULES.absorbed.powi(2) * longest).then(|| Some((needed? / value).sqrt())).flatten();
         Size {
             parameters: members.iter().map(|&k| parameters[k].name.clone()).collect(),
             unit,

@@ -14,6 +14,7 @@ mod fitted;
 mod neighbourhood;
 mod power;
 mod residual_tests;
+mod rules;
 mod screening;
 mod selection;
 mod separation;
@@ -21,14 +22,15 @@ mod smooth_term;
 mod telling_pose;
 mod unexplained;
 
-pub use candidates::{HELD_FIXED, NO_ROOM, REFUSED};
+pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
 pub use covariate::{Covariate, Place};
 pub use detection::{Detectable, Detection, Size, detectable};
 pub use residual_tests::{
     CovariateValues, Findings, FitResidual, Outcome, ResidualTest, Sequence, Test, Untestable, test_residual,
 };
-pub use screening::{Ranked, Trace, examine, trace};
-pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, close};
+pub use rules::SelectionRules;
+pub use screening::{Ranked, Trace, examine, trace, trace_by};
+pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, close, close_by};
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, PartialResidual, Unexplained};

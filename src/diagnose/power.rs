@@ -2,7 +2,7 @@
 
 use statrs::function::beta::beta_reg;
 
-use super::selection::LEVEL;
+use super::rules::SelectionRules;
 
 /// Halvings of the interval in which a noncentrality is sought.
 const HALVINGS: usize = 24;
@@ -25,14 +25,14 @@ pub(super) struct ScanTest {
 impl ScanTest {
     /// Of a candidate with `k` new directions, ν = `freedom`, and so many `tries`; `None` where nothing would be left to judge by.
     ///
-    /// The part must be beyond chance at LEVEL / tries, and better than nothing by the information criterion
+    /// The part must be beyond chance at level / tries, and better than nothing by the information criterion
     /// ν ln(1 − part) + k ln ν + 2 ln(tries).
     pub fn new(k: usize, freedom: f64, tries: f64) -> Option<Self> {
         let (new, left) = (k as f64 / 2.0, (freedom - k as f64) / 2.0);
         if k == 0 || left < 0.5 {
             return None;
         }
-        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > LEVEL / tries, (0.0, 1.0));
+        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > SelectionRules::DEFAULT.level / tries, (0.0, 1.0));
         let better = -(-(k as f64 * freedom.ln() + 2.0 * tries.ln()) / freedom).exp_m1();
         Some(Self { new, left, threshold: chance.max(better) })
     }

@@ -1,22 +1,15 @@
 //! What the residual of one fit points to.
 
-use super::candidates::Candidates;
-use super::data::{Data, SEED};
+use super::candidates::{Candidates, NOT_FINITE};
+use super::data::Data;
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
 use super::residual_tests::{Findings, FitResidual, test_residual};
-use super::selection::LEVEL;
+use super::rules::SelectionRules;
 use super::telling_pose::{TellingPose, shuffled, telling_pose};
 use crate::identify::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
-
-/// Entries of a ranking.
-const MOST: usize = 20;
-/// Entries whose aliases and cross-validation are worked out.
-const LOOKED_AT: usize = 8;
-/// Two effects are alike where every direction of one is within this of the other [rad].
-const ALIKE: f64 = 0.35;
 
 /// A candidate as the residual sees it.
 #[derive(Debug, Clone)]
@@ -42,7 +35,7 @@ pub struct Ranked {
 pub struct Trace {
     /// The fit.
     pub fit: Identification,
-    /// Checks of its residual.
+    /// Tests of its residual.
     pub findings: Findings,
     /// Candidates by what they explain, best first; the best of each family at each place.
     pub ranking: Vec<Ranked>,
@@ -70,16 +63,30 @@ impl Trace {
 /// # Errors
 /// Problem, data and options do not fit each other.
 pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Trace, IdentifyError> {
-    let data = Data::new(data).with_candidates(&options.candidates);
+    trace_by(problem, data, options, &SelectionRules::DEFAULT)
+}
+
+/// The same by other rules.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn trace_by(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+    rules: &SelectionRules,
+) -> Result<Trace, IdentifyError> {
+    let data = Data::new(data, rules).with_candidates(&options.candidates);
     Ok(trace_fit(&Fitted::new(problem.clone(), &data, options)?, &data))
 }
 
 /// Traces the residual of a fit.
 pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
-    let Candidates { testable, untestable } = Candidates::of(&fitted.problem, data);
-    let library = fitted.library(data, &testable, &[]);
-    let tried = testable.len();
-    let scan = Scan::new(&library, fitted.linear(&library, &[], &[]), testable);
+    let rules = data.rules;
+    let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
+    let linearised = fitted.linearised(data, &testable, &[]);
+    let scan = Scan::new(&linearised, fitted.neighbourhood(&linearised, &[]), testable, rules);
+    untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {
         let known =
@@ -88,32 +95,33 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             best.push(tried);
         }
     }
-    best.truncate(MOST);
-    let looked_at = best.iter().take(LOOKED_AT).filter(|tried| tried.corrected < LEVEL).count();
+    best.truncate(rules.ranked);
+    let looked_at = best.iter().take(rules.looked_at).filter(|tried| tried.corrected < rules.level).count();
     let rms = |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
     let without = scan.linear.cross_validate(&data.block);
     let poses = shuffled(data);
-    let looked: Vec<Effect> = best.iter().take(LOOKED_AT).map(|tried| scan.effects[tried.index].clone()).collect();
+    let looked: Vec<Effect> =
+        best.iter().take(rules.looked_at).map(|tried| scan.effects[tried.index].clone()).collect();
     let all: Vec<usize> = (0..poses.len()).collect();
     let elsewhere = Data { measurements: &poses, ..data.clone() };
-    let there = (looked_at > 0).then(|| fitted.library_of(&elsewhere, &all, &looked, &[]));
+    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked, &[]));
     let ranked = |(place, tried): (usize, &Tried)| {
         let close = place < looked_at;
         let cross_validated = without.filter(|_| close).and_then(|without| {
-            let mut with = scan.linear.clone();
-            with.add(&scan.columns(tried.index));
+            let with = scan.linear.with(&scan.columns(tried.index));
             Some(rms(without) - rms(with.cross_validate(&data.block)?))
         });
-        let alike = best.iter().take(if close { LOOKED_AT } else { 0 }).filter(|other| other.index != tried.index);
+        let alike =
+            best.iter().take(if close { rules.looked_at } else { 0 }).filter(|other| other.index != tried.index);
         let angle = |other: &Tried| {
-            let angle = scan.angle(tried.index, other.index).filter(|angle| *angle < ALIKE)?;
+            let angle = scan.angle(tried.index, other.index).filter(|angle| *angle < rules.alike)?;
             Some((scan.effects[other.index].clone(), angle))
         };
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let own = &scan.effects[tried.index];
         let pair = alike.first().zip(there.as_ref());
         let telling_pose =
-            pair.and_then(|((other, _), there)| telling_pose(fitted, &library, there, &poses, (own, other)));
+            pair.and_then(|((other, _), there)| telling_pose(&scan.linear, [&linearised, there], &poses, (own, other)));
         Ranked {
             effect: scan.effects[tried.index].clone(),
             p_value: tried.corrected,
@@ -130,27 +138,27 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         fit: fitted.found.clone(),
         findings: check_fit(fitted, data),
         ranking,
-        tried,
-        level: LEVEL,
+        tried: scan.effects.len(),
+        level: rules.level,
         untestable,
         absorbed,
         time_measured: data.measurements.time_measured,
     }
 }
 
-/// Checks what a fit of `problem` leaves of the identification rows.
+/// Tests what a fit of `problem` leaves of the identification rows.
 ///
 /// # Errors
 /// Problem, data and fit do not belong together.
 pub fn examine(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Findings, IdentifyError> {
-    let data = Data::new(data);
+    let data = Data::new(data, &SelectionRules::DEFAULT);
     Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
 }
 
-/// Checks what a fit leaves.
+/// Tests what a fit leaves.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
-    let library = fitted.library(data, &[], &[]);
-    let linear = fitted.linear(&library, &[], &[]);
+    let linearised = fitted.linearised(data, &[], &[]);
+    let linear = fitted.neighbourhood(&linearised, &[]);
     let fit = FitResidual {
         residual: &linear.data_residual(),
         fitted: &linear.fitted(),
@@ -160,5 +168,5 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         setup: &data.setup,
         covariates: &data.covariates(&fitted.problem),
     };
-    test_residual(&fit, SEED)
+    test_residual(&fit, data.rules.seed)
 }

@@ -1,9 +1,10 @@
 //! How well poses tell two effects apart, before anyone measures them.
 
 use super::candidates::Candidates;
-use super::detection::{POWER, Size, candidates, sizes, timed, with_linear};
+use super::detection::{Size, candidates, sizes, timed, with_linear};
 use super::neighbourhood::tries;
 use super::power::ScanTest;
+use super::rules::SelectionRules;
 use crate::error::InputError;
 use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
@@ -32,7 +33,9 @@ impl Side {
     /// p to be expected of it beside the other, if it has this size [SI] in the direction that is hardest to tell; 1 where
     /// nothing tells it.
     pub fn expected_p(&self, size: f64) -> f64 {
-        let told = self.test.and_then(|test| Some((test, test.noncentrality(POWER)?, self.told.worst?)));
+        let told = self
+            .test
+            .and_then(|test| Some((test, test.noncentrality(SelectionRules::DEFAULT.power)?, self.told.worst?)));
         told.map_or(1.0, |(test, needed, least)| test.expected_p(needed * (size / least).powi(2)))
     }
 }
@@ -59,18 +62,17 @@ pub fn separation(
         place.map_or(1.0, |place| tries[place] * families as f64)
     };
     let pair = [one.clone(), other.clone()];
-    with_linear(problem, &poses, &pair, |library, linear| {
+    with_linear(problem, &poses, &pair, |linearised, linear| {
         let side = |own: &Effect, beside: &Effect| {
-            let mut both = linear.clone();
-            both.add(&library.columns(beside));
-            let score = both.score(&library.columns(own));
+            let both = linear.with(&linearised.columns(beside));
+            let score = both.score(&linearised.columns(own));
             Side {
-                found: first(sizes(problem, library, linear, own, tries_of(own))),
-                told: first(sizes(problem, library, &both, own, 1.0)),
-                test: ScanTest::new(score.rank(), both.expected_freedom(), 1.0),
+                found: first(sizes(problem, linearised, linear, own, tries_of(own))),
+                told: first(sizes(problem, linearised, &both, own, 1.0)),
+                test: ScanTest::new(score.rank(&SelectionRules::DEFAULT), both.expected_freedom(), 1.0),
             }
         };
-        let angle = linear.angle(&library.columns(one), &library.columns(other));
+        let angle = linear.angle(&linearised.columns(one), &linearised.columns(other));
         Separation { angle, sides: [side(one, other), side(other, one)] }
     })
 }

@@ -4,22 +4,12 @@ use nalgebra::DMatrix;
 
 use super::covariate::Place;
 use super::data::Data;
-use super::neighbourhood::Library;
+use super::neighbourhood::Linearised;
+use super::rules::SelectionRules;
 use crate::model::parameter::{Driver, JointField, Quantity, Slot};
 use crate::problem::PoseView;
 use crate::problem::{JointKind, Problem};
 
-/// Numbers of intervals that are tried.
-const INTERVALS: [usize; 3] = [3, 5, 8];
-/// Poses per spline at least.
-const POSES_PER_SPLINE: usize = 3;
-/// Places of a bump or a step along the range.
-const CENTRES: u32 = 16;
-/// Their widths as parts of the range.
-const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
-/// First and last step of the search for a shape, as parts of its width.
-const FIRST_STEP: f64 = 0.4;
-const LAST_STEP: f64 = 0.02;
 /// Steps of a curve.
 const CURVE: u32 = 100;
 
@@ -41,17 +31,18 @@ pub(super) struct SmoothTerm {
 impl SmoothTerm {
     /// Every place and quantity: cubic B-splines as fine as the poses allow, single bumps and single steps.
     pub fn all(problem: &Problem, data: &Data) -> Vec<Self> {
-        let mut all = Vec::new();
+        let (mut all, rules) = (Vec::new(), data.rules);
         for of in quantities(problem, data) {
             let (range, distinct) = (data.range(of), data.distinct(of));
             if range.1 <= range.0 || distinct < 4 {
                 continue;
             }
-            let few =
-                |intervals: usize| (intervals + 3) * POSES_PER_SPLINE <= data.rows().len() && intervals + 3 <= distinct;
+            let few = |intervals: usize| {
+                (intervals + 3) * rules.poses_per_spline <= data.rows().len() && intervals + 3 <= distinct
+            };
             let splines: Vec<Vec<Driver>> =
-                INTERVALS.into_iter().filter(|&n| few(n)).map(|n| splines(of, range, n)).collect();
-            let shapes = if distinct > CENTRES as usize { shapes(of, range) } else { Vec::new() };
+                rules.spline_intervals.into_iter().filter(|&n| few(n)).map(|n| splines(of, range, n)).collect();
+            let shapes = if distinct > rules.shape_centres as usize { shapes(of, range, rules) } else { Vec::new() };
             for functions in [splines, shapes] {
                 let tries = functions.len();
                 for functions in functions {
@@ -64,7 +55,7 @@ impl SmoothTerm {
     }
 
     /// A single bump or step with centre and width fitted: where `gain` is largest, by a search along both in turn.
-    pub fn refined(mut self, gain: impl Fn(&Self) -> f64) -> Self {
+    pub fn refined(mut self, rules: &SelectionRules, gain: impl Fn(&Self) -> f64) -> Self {
         let (Some(first), 1) = (self.functions.first().copied(), self.functions.len()) else { return self };
         let moved = |function: Driver, along: f64, wider: f64| match function {
             Driver::Bump { of, centre, width } => {
@@ -75,9 +66,9 @@ impl SmoothTerm {
             }
             other => other,
         };
-        let (mut function, mut step) = (first, FIRST_STEP);
+        let (mut function, mut step) = (first, rules.shape_steps.0);
         let mut best = gain(&self);
-        while step > LAST_STEP {
+        while step > rules.shape_steps.1 {
             let moves = [(step, 1.0), (-step, 1.0), (0.0, 1.0 + step), (0.0, (1.0 + step).recip())];
             let tried = moves.map(|(along, wider)| {
                 let function = moved(function, along, wider);
@@ -95,6 +86,11 @@ impl SmoothTerm {
         self
     }
 
+    /// Whether it is a single bump or step.
+    pub fn is_single(&self) -> bool {
+        self.functions.len() == 1
+    }
+
     /// Whether a pose is within the range that the identification poses cover.
     pub fn reaches(&self, setup: &PoseView) -> bool {
         (self.range.0..=self.range.1).contains(&self.of.value(setup))
@@ -102,10 +98,10 @@ impl SmoothTerm {
 
     /// Its columns: those of the place times its functions, shape = (3 N, functions); beyond the range they keep their last
     /// values.
-    pub fn columns(&self, library: &Library) -> DMatrix<f64> {
-        let poses = library.poses();
+    pub fn columns(&self, linearised: &Linearised) -> DMatrix<f64> {
+        let poses = linearised.poses();
         let mut columns = DMatrix::zeros(3 * poses.len(), self.functions.len());
-        let Some(place) = library.place(self.slot) else { return columns };
+        let Some(place) = linearised.place(self.slot) else { return columns };
         for (function, mut out) in self.functions.iter().zip(columns.column_iter_mut()) {
             for (k, pose) in poses.iter().enumerate() {
                 let value = function.at(self.of.value(&pose.setup).clamp(self.range.0, self.range.1));
@@ -159,13 +155,14 @@ fn splines(of: Quantity, (low, high): (f64, f64), intervals: usize) -> Vec<Drive
     (0..intervals + 3).map(|k| Driver::Spline { of, begin: low + (k as f64 - 3.0) * step, step }).collect()
 }
 
-fn shapes(of: Quantity, (low, high): (f64, f64)) -> Vec<Vec<Driver>> {
-    let centre = |k: u32| low + (high - low) * (f64::from(k) + 0.5) / f64::from(CENTRES);
+fn shapes(of: Quantity, (low, high): (f64, f64), rules: &SelectionRules) -> Vec<Vec<Driver>> {
+    let count = rules.shape_centres;
+    let centre = |k: u32| low + (high - low) * (f64::from(k) + 0.5) / f64::from(count);
     let of_width = |part: f64| {
         let width = part * (high - low);
-        (0..CENTRES).map(centre).flat_map(move |centre| {
+        (0..count).map(centre).flat_map(move |centre| {
             [vec![Driver::Bump { of, centre, width }], vec![Driver::Step { of, centre, width }]]
         })
     };
-    WIDTHS.into_iter().flat_map(of_width).collect()
+    rules.shape_widths.into_iter().flat_map(of_width).collect()
 }

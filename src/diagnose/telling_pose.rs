@@ -4,14 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::data::{Data, SEED};
-use super::fitted::{Fitted, Normal};
-use super::neighbourhood::Library;
+use super::data::Data;
+use super::neighbourhood::{LinearNeighbourhood, Linearised};
 use crate::measurement::Measurements;
 use crate::problem::Effect;
-
-/// Poses that are looked at.
-const POSES: usize = 400;
 
 /// A pose that tells two effects apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,13 +28,13 @@ pub struct TellingPose {
 
 /// Poses within the measured ranges: every quantity of a pose from some identification row, each from another.
 pub(super) fn shuffled(data: &Data) -> Measurements {
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let rows = data.rows();
-    let drawn: Vec<usize> = (0..POSES).map(|_| rows[rng.random_range(0..rows.len())]).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
+    let (rows, count) = (data.rows(), data.rules.telling_poses);
+    let drawn: Vec<usize> = (0..count).map(|_| rows[rng.random_range(0..rows.len())]).collect();
     let mut poses = data.measurements.select(&drawn);
     let mut from = || rows[rng.random_range(0..rows.len())];
     let (measured, n) = (data.measurements, poses.joints);
-    for pose in 0..POSES {
+    for pose in 0..count {
         for joint in 0..n {
             poses.configurations[pose * n + joint] = measured.configurations[from() * n + joint];
         }
@@ -56,18 +52,16 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
     poses
 }
 
-/// The pose of `poses`, which `there` describes, where the fits with the one effect and with the other differ most.
+/// The pose of `poses`, linearised `there`, where the fits with the one effect and with the other differ most.
 pub(super) fn telling_pose(
-    fitted: &Fitted,
-    here: &Library,
-    there: &Library,
+    fit: &LinearNeighbourhood,
+    [here, there]: [&Linearised; 2],
     poses: &Measurements,
     (one, other): (&Effect, &Effect),
 ) -> Option<TellingPose> {
     let moved = |effect: &Effect| {
-        let columns = beside(here.fitted(), &here.columns(effect));
-        let step = fitted.step(here, &columns);
-        beside(there.fitted(), &there.columns(effect)) * step
+        let fit = fit.with(&here.columns(effect));
+        beside(there.fitted(), &there.columns(effect)) * fit.step()
     };
     let difference: DVector<f64> = moved(one) - moved(other);
     let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
@@ -81,21 +75,6 @@ pub(super) fn telling_pose(
         temperature: at(&poses.temperature),
         difference: distance(best),
     })
-}
-
-impl Fitted {
-    /// Step of all fitted parameters and those of `columns` behind them to their common optimum.
-    fn step(&self, library: &Library, columns: &DMatrix<f64>) -> DVector<f64> {
-        let own = self.unknowns.iter().map(|&k| self.model.parameters[k].sigma);
-        let priors: Vec<Option<f64>> = own.chain(library.let_go().iter().copied()).collect();
-        let mut gradient = columns.tr_mul(library.residual());
-        for (j, &k) in self.unknowns.iter().enumerate() {
-            if let Some(sigma) = self.model.parameters[k].sigma {
-                gradient[j] += self.found.x[k] / (sigma * sigma);
-            }
-        }
-        Normal::new(columns, priors, &gradient, &self.closed_among(columns.ncols())).step
-    }
 }
 
 fn beside(left: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {

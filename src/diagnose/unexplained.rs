@@ -1,31 +1,20 @@
 //! Structure that no effect of the catalogue explains: where it is, what it depends on, and what a smooth correction gains.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::covariate::{Covariate, Place};
 use super::data::Data;
-use super::fitted::{Fitted, with_smooth_terms};
-use super::neighbourhood::{Gain, Library, Linear, tries};
+use super::fitted::Fitted;
+use super::neighbourhood::{Gain, LinearNeighbourhood, Linearised, tries};
 use super::residual_tests::Findings;
+use super::rules::SelectionRules;
 use super::smooth_term::SmoothTerm;
 use crate::identify::ErrorSummary;
 use crate::model::Pose;
 use crate::model::parameter::{JointField, Quantity, Slot};
 use crate::problem::Effect;
 use crate::quantity::Unit;
-
-/// By how much a smooth function must be the better explanation to replace effects that depend on the same: odds of 20 to 1.
-const BETTER: f64 = 6.0;
-
-/// A correction without a cause is worth stating where it takes poses that were left out to this part of their rms error.
-const WORTHWHILE: f64 = 0.95;
-/// Poses that are enough to find a place.
-const ENOUGH: usize = 1000;
-/// Splines whose places and quantities are looked at for single bumps and steps.
-const PROMISING: usize = 12;
-/// Bumps and steps whose shape is fitted.
-const REFINED: usize = 4;
 
 /// Structure that is left.
 #[derive(Debug, Clone)]
@@ -90,43 +79,46 @@ pub(super) struct Tried {
 
 /// The best of some smooth terms against a fit.
 pub(super) fn best(
-    linear: &Linear,
-    library: &Library,
+    fit: &LinearNeighbourhood,
+    linearised: &Linearised,
     smooth_terms: &[SmoothTerm],
+    rules: &SelectionRules,
     wanted: impl Fn(&SmoothTerm) -> bool,
 ) -> Option<Tried> {
     // Half of the chance for splines, half for single bumps and steps; an equal part for each place and quantity.
     let mut places: Vec<(Slot, Quantity)> = Vec::new();
-    for smooth_term in smooth_terms {
-        if !places.contains(&(smooth_term.slot, smooth_term.of)) {
-            places.push((smooth_term.slot, smooth_term.of));
+    for term in smooth_terms {
+        if !places.contains(&(term.slot, term.of)) {
+            places.push((term.slot, term.of));
         }
     }
-    let score = |smooth_term: &SmoothTerm| linear.score(&smooth_term.columns(library));
-    let tried = |smooth_term: SmoothTerm| {
-        let gain = linear.sums().gain(&score(&smooth_term))?;
-        let (squares, freedom) = (gain.squares, gain.freedom + smooth_term.fitted);
-        let gain = linear.sums().gain_of(squares, freedom)?;
+    let gain = |term: &SmoothTerm| fit.sums().gain(&fit.score(&term.columns(linearised)), rules);
+    let tried = |smooth_term: &SmoothTerm| {
+        let gain = gain(smooth_term)?;
+        let gain = fit.sums().gain_of(gain.squares, gain.freedom + smooth_term.fitted, rules)?;
         let count = 2.0 * (places.len() * smooth_term.tries) as f64;
         let (criterion, corrected) = (gain.criterion + 2.0 * count.ln(), (gain.p * count).min(1.0));
-        Some(Tried { smooth_term, gain, criterion, corrected })
+        Some(Tried { smooth_term: smooth_term.clone(), gain, criterion, corrected })
+    };
+    let sorted = |mut all: Vec<Tried>| {
+        all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
+        all
     };
     // Splines everywhere; single bumps and steps where splines find most.
-    let wanted: Vec<&SmoothTerm> = smooth_terms.iter().filter(|smooth_term| wanted(smooth_term)).collect();
-    let (single, splines): (Vec<&SmoothTerm>, Vec<&SmoothTerm>) = wanted.iter().partition(|g| g.functions.len() == 1);
-    let mut all: Vec<Tried> = splines.into_par_iter().filter_map(|smooth_term| tried(smooth_term.clone())).collect();
-    all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
+    let wanted: Vec<&SmoothTerm> = smooth_terms.iter().filter(|term| wanted(term)).collect();
+    let (single, splines): (Vec<&SmoothTerm>, Vec<&SmoothTerm>) = wanted.iter().partition(|term| term.is_single());
+    let mut all: Vec<Tried> = sorted(splines.into_par_iter().filter_map(tried).collect());
     let near: Vec<(Slot, Quantity)> =
-        all.iter().take(PROMISING).map(|t| (t.smooth_term.slot, t.smooth_term.of)).collect();
-    let promising = |smooth_term: &&&SmoothTerm| near.is_empty() || near.contains(&(smooth_term.slot, smooth_term.of));
-    let single: Vec<&SmoothTerm> = single.iter().filter(promising).copied().collect();
-    all.extend(single.into_par_iter().filter_map(|smooth_term| tried(smooth_term.clone())).collect::<Vec<_>>());
-    all.sort_by(|a, b| a.gain.criterion.total_cmp(&b.gain.criterion));
-    let shapes: Vec<SmoothTerm> =
-        all.iter().map(|tried| &tried.smooth_term).filter(|g| g.functions.len() == 1).take(REFINED).cloned().collect();
-    let squares = |smooth_term: &SmoothTerm| linear.sums().gain(&score(smooth_term)).map_or(0.0, |gain| gain.squares);
-    all.extend(shapes.into_iter().filter_map(|shape| tried(shape.refined(squares))));
-    all.into_iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+        all.iter().take(rules.promising).map(|t| (t.smooth_term.slot, t.smooth_term.of)).collect();
+    let promising = |term: &SmoothTerm| near.is_empty() || near.contains(&(term.slot, term.of));
+    let single: Vec<&SmoothTerm> = single.into_iter().filter(|term| promising(term)).collect();
+    all.extend(single.into_par_iter().filter_map(tried).collect::<Vec<_>>());
+    all = sorted(all);
+    let shapes = all.iter().map(|tried| &tried.smooth_term).filter(|term| term.is_single()).take(rules.refined);
+    let refined =
+        |shape: &SmoothTerm| tried(&shape.clone().refined(rules, |term| gain(term).map_or(0.0, |gain| gain.squares)));
+    let refined: Vec<Tried> = shapes.filter_map(refined).collect();
+    all.into_iter().chain(refined).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
 /// Added effects that are functions of one joint's command at one joint, where a smooth function is the better explanation:
@@ -138,35 +130,31 @@ pub(super) fn withdraw(
     candidates: &[Effect],
 ) -> Option<(SmoothTerm, Vec<Effect>)> {
     let smooth_terms = SmoothTerm::all(&fitted.problem, data);
-    let library = fitted.library(data, &[], &smooth_terms);
+    let linearised = fitted.linearised(data, &[], &smooth_terms);
     let everything: Vec<Effect> = candidates.iter().cloned().chain(added.iter().flat_map(Effect::parts)).collect();
     let (all_tries, families) = tries(&everything);
-    let search = |effect: &Effect| {
-        let parts = effect.parts().into_iter();
-        parts
-            .map(|part| {
-                let known = everything.iter().position(|other| *other == part);
-                2.0 * (known.map_or(1.0, |index| all_tries[index]) * families as f64).ln()
-            })
-            .sum::<f64>()
+    let search_of_part = |part: Effect| {
+        let known = everything.iter().position(|other| *other == part);
+        2.0 * (known.map_or(1.0, |index| all_tries[index]) * families as f64).ln()
     };
+    let search = |effect: &Effect| effect.parts().into_iter().map(search_of_part).sum::<f64>();
     let mut places: Vec<(usize, usize)> = added.iter().filter_map(Effect::function_of).collect();
     places.sort_unstable();
     places.dedup();
     for (joint, from) in places {
         let (own, rest): (Vec<Effect>, Vec<Effect>) =
             added.iter().cloned().partition(|effect| effect.function_of() == Some((joint, from)));
-        let parameters: Vec<usize> = own.iter().flat_map(|effect| fitted.parameters_of(effect)).collect();
-        let linear = fitted.linear(&library, &parameters, &[]);
-        let explained = linear.sums().gain(&linear.score(&fitted.columns(&library, &parameters)));
+        let unknowns: Vec<usize> = own.iter().flat_map(|effect| fitted.unknowns_of(effect)).collect();
+        let fit = fitted.neighbourhood_without(&linearised, &unknowns, &[]);
+        let explained = fit.sums().gain(&fit.score(&linearised.fitted().select_columns(&unknowns)), data.rules);
         let explained = explained.map_or(0.0, |gain| gain.criterion + own.iter().map(search).sum::<f64>());
-        let here = |smooth_term: &SmoothTerm| {
-            let coordinate = matches!(smooth_term.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }
+        let here = |term: &SmoothTerm| {
+            let is_coordinate = matches!(term.slot, Slot::Joint { joint: own, field: JointField::Theta | JointField::D }
                 if own + 1 == joint);
-            coordinate && smooth_term.of == Quantity::Command(from - 1)
+            is_coordinate && term.of == Quantity::Command(from - 1)
         };
-        if let Some(tried) = best(&linear, &library, &smooth_terms, here)
-            && tried.criterion + BETTER < explained
+        if let Some(tried) = best(&fit, &linearised, &smooth_terms, data.rules, here)
+            && tried.criterion + data.rules.beyond_doubt < explained
         {
             return Some((tried.smooth_term, rest));
         }
@@ -174,46 +162,33 @@ pub(super) fn withdraw(
     None
 }
 
-/// The strongest structure that is left, if it is beyond chance.
-pub(super) fn strongest(fitted: &Fitted, data: &Data, level: f64) -> Option<SmoothTerm> {
+/// The strongest structure that is left, at the place and of the quantity of `known` if there is one; none where it is not
+/// beyond chance.
+pub(super) fn strongest(fitted: &Fitted, data: &Data, known: Option<&SmoothTerm>) -> Option<Tried> {
     let smooth_terms = SmoothTerm::all(&fitted.problem, data);
-    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &smooth_terms);
-    let tried = best(&fitted.linear(&library, &[], &[]), &library, &smooth_terms, |_| true)?;
-    (tried.corrected < level && tried.criterion < 0.0).then_some(tried.smooth_term)
+    let linearised = fitted.linearised_at(data, &data.thinned(data.rules.placing_poses), &[], &smooth_terms);
+    let is_wanted = |term: &SmoothTerm| known.is_none_or(|known| (term.slot, term.of) == (known.slot, known.of));
+    let tried = best(&fitted.neighbourhood(&linearised, &[]), &linearised, &smooth_terms, data.rules, is_wanted)?;
+    (tried.corrected < data.rules.level && tried.criterion < 0.0).then_some(tried)
 }
 
-/// What is known of structure at a smooth term, or of the strongest one where `known` is none; `level` is that of chance.
-pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&SmoothTerm>, level: f64) -> Option<Unexplained> {
-    let smooth_terms = SmoothTerm::all(&fitted.problem, data);
-    let library = fitted.library_of(data, &data.thinned(ENOUGH), &[], &smooth_terms);
-    let linear = fitted.linear(&library, &[], &[]);
-    let tried = match known {
-        None => best(&linear, &library, &smooth_terms, |_| true),
-        Some(known) => best(&linear, &library, &smooth_terms, |smooth_term| {
-            smooth_term.slot == known.slot && smooth_term.of == known.of
-        }),
-    }?;
-    if tried.corrected >= level || tried.criterion >= 0.0 {
-        return None;
-    }
-    let Tried { smooth_term, corrected, gain, .. } = tried;
-    debug_assert!(gain.freedom > 0);
-    let library = fitted.library(data, &[], std::slice::from_ref(&smooth_term));
-    let linear = fitted.linear(&library, &[], &[]);
-    let mut with = linear.clone();
-    with.add(&smooth_term.columns(&library));
-    let coordinates = linear.rows() as f64;
-    let rms = |squares: f64| (3.0 * squares / coordinates).sqrt() * fitted.sigma;
-    let validated = linear.cross_validate(&data.block).zip(with.cross_validate(&data.block));
+/// What is known of the strongest structure that is left, as in [`strongest`].
+pub(super) fn localise(fitted: &Fitted, data: &Data, known: Option<&SmoothTerm>) -> Option<Unexplained> {
+    let Tried { smooth_term, corrected, .. } = strongest(fitted, data, known)?;
+    let linearised = fitted.linearised(data, &[], std::slice::from_ref(&smooth_term));
+    let fit = fitted.neighbourhood(&linearised, &[]);
+    let with = fit.with(&smooth_term.columns(&linearised));
+    let rms = |squares: f64| (3.0 * squares / fit.rows() as f64).sqrt() * fitted.sigma;
+    let validated = fit.cross_validate(&data.block).zip(with.cross_validate(&data.block));
     let correction = validated
         .map(|(without, with)| (rms(without), rms(with)))
-        .filter(|(without, with)| *with < WORTHWHILE * without)
-        .map(|validated| correct(fitted, data, &smooth_term, validated));
+        .filter(|(without, with)| *with < data.rules.worthwhile * without)
+        .map(|validated| correct(fitted, data, (&smooth_term, &linearised, &with), validated));
     let depends_on = vec![Covariate::of(smooth_term.of, data.measurements.time_measured)];
     Some(Unexplained { place: smooth_term.place(), depends_on, p_value: corrected, correction })
 }
 
-/// Structure that the checks see and no place or quantity shows.
+/// Structure that the residual tests see and no place or quantity shows.
 pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     if !findings.is_structured() {
         return None;
@@ -227,23 +202,37 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     })
 }
 
-/// Fits the correction together with all parameters, in the linear neighbourhood, and applies it to the held-out poses.
-fn correct(fitted: &Fitted, data: &Data, smooth_term: &SmoothTerm, cross_validated: (f64, f64)) -> Correction {
-    let smooth_terms = std::slice::from_ref(smooth_term);
-    let library = fitted.library(data, &[], smooth_terms);
-    let step = fitted.normal(&library, smooth_terms).step;
-    let coefficients = step.rows(step.len() - smooth_term.functions.len(), smooth_term.functions.len());
-    let held_out = fitted.library_of(data, &data.split.held_out, &[], smooth_terms);
-    let change = with_smooth_terms(&held_out, smooth_terms) * &step;
+/// The correction that the neighbourhood `with` its columns has, applied to the held-out poses.
+fn correct(
+    fitted: &Fitted,
+    data: &Data,
+    (smooth_term, linearised, with): (&SmoothTerm, &Linearised, &LinearNeighbourhood),
+    cross_validated: (f64, f64),
+) -> Correction {
+    let step = with.step();
+    let count = smooth_term.functions.len();
+    let (parameters, coefficients) = (step.rows(0, step.len() - count), step.rows_range(step.len() - count..));
+    let change = |at: &Linearised| at.fitted() * parameters + smooth_term.columns(at) * coefficients;
+    let held_out = fitted.linearised_at(data, &data.split.held_out, &[], std::slice::from_ref(smooth_term));
+    let moved = change(&held_out);
     let mut errors = fitted.errors(data, &data.split.held_out);
     let mut beyond = 0;
     for (k, (pose, error)) in held_out.poses().iter().zip(&mut errors).enumerate() {
         if smooth_term.reaches(&pose.setup) {
-            *error += Vector3::from_fn(|axis, _| change[3 * k + axis]) * pose.sigma;
+            *error += moved.fixed_rows::<3>(3 * k) * pose.sigma;
         } else {
             beyond += 1;
         }
     }
+    let left = linearised.residual() + change(linearised);
+    let lever = linearised.place(smooth_term.slot).unwrap_or_else(|| DVector::zeros(left.len()));
+    let point = |(k, pose): (usize, &Pose)| {
+        // Both in σ; r = measured − predicted, so that the lever is −∂r/∂(coordinate).
+        let (lever, left) = (-lever.fixed_rows::<3>(3 * k), left.fixed_rows::<3>(3 * k));
+        let covariate = smooth_term.of.value(&pose.setup);
+        let value = smooth_term.at(coefficients.as_slice(), covariate) + lever.dot(&left) / lever.norm_squared();
+        PartialResidual { row: data.rows()[k], covariate, value, lever: lever.norm() * pose.sigma }
+    };
     Correction {
         covariate: Covariate::of(smooth_term.of, data.measurements.time_measured),
         slot: smooth_term.slot,
@@ -253,25 +242,6 @@ fn correct(fitted: &Fitted, data: &Data, smooth_term: &SmoothTerm, cross_validat
         cross_validated,
         held_out: ErrorSummary::of(&errors),
         curve: smooth_term.curve(coefficients.as_slice()),
-        points: partial_residuals(data, &library, smooth_term, (&step, coefficients.as_slice())),
+        points: linearised.poses().iter().enumerate().map(point).collect(),
     }
-}
-
-/// The partial residual of every identification pose, after the `step` of all parameters, the term's own coefficients last.
-fn partial_residuals(
-    data: &Data,
-    library: &Library,
-    smooth_term: &SmoothTerm,
-    (step, coefficients): (&DVector<f64>, &[f64]),
-) -> Vec<PartialResidual> {
-    let Some(column) = library.place(smooth_term.slot) else { return Vec::new() };
-    let left = library.residual() + with_smooth_terms(library, std::slice::from_ref(smooth_term)) * step;
-    let point = |(k, pose): (usize, &Pose)| {
-        // Both are in σ; r = measured − predicted, so that the lever is −∂r/∂(coordinate).
-        let (lever, left) = (-column.fixed_rows::<3>(3 * k), left.fixed_rows::<3>(3 * k));
-        let covariate = smooth_term.of.value(&pose.setup);
-        let value = smooth_term.at(coefficients, covariate) + lever.dot(&left) / lever.norm_squared();
-        PartialResidual { row: data.rows()[k], covariate, value, lever: lever.norm() * pose.sigma }
-    };
-    library.poses().iter().enumerate().map(point).collect()
 }

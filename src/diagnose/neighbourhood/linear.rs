@@ -1,67 +1,141 @@
-//! A fit in its linear neighbourhood: what its residual can still give to columns that were not fitted.
+//! A fit in its linear neighbourhood: what its residual can still give to columns that were not fitted, and what each
+//! fitted parameter gives it.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::open::open;
+use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
 
-/// A direction is taken to be spanned by others when less than this part of its length is new.
-const SPANNED: f64 = 1e-9;
-/// A direction is decided by a block alone when less than this part of it is left without the block.
-const LEAST_DECIDED: f64 = 1e-6;
-/// Least diagonal of a Cholesky factor that can be trusted.
-const CLOSE_TO_DEPENDENT: f64 = 1e-6;
+/// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
+/// the others say nothing of it.
+pub(in crate::diagnose) const LEAST_DECIDED: f64 = 1e-6;
 
-/// Residual and fitted directions of N poses, with a row for each prior below the data's 3 N.
+/// The unknowns of a fit as it ended.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Unknowns {
+    /// Their values, deviations from nominal.
+    pub x: Vec<f64>,
+    /// 1 σ of their priors.
+    pub priors: Vec<Option<f64>>,
+    /// Rows of the constraints that hold them, shape = (constraints, unknowns); may be narrower, the rest being 0.
+    pub active: DMatrix<f64>,
+}
+
+/// Residual r and fitted columns A = [J; P] of N poses, with a row P for each prior below the data's 3 N.
+///
+/// All is kept in an orthonormal basis Q = A T of what was fitted, T of shape (unknowns, rank): the covariance of the
+/// unknowns is T Tᵀ, the step to their common optimum − T Qᵀr. Unknowns that columns before them take up wholly have no part
+/// in T and stay where they are.
 #[derive(Debug, Clone)]
-pub(crate) struct Linear {
+pub(crate) struct LinearNeighbourhood {
     /// Whitened residual at the optimum, priors below.
     residual: DVector<f64>,
-    /// Orthonormal columns that span what was fitted.
+    /// Q, shape = (3 N + priors, rank).
     basis: DMatrix<f64>,
+    /// T.
+    root: DMatrix<f64>,
+    /// Values of the unknowns at the optimum.
+    optimum: DVector<f64>,
+    /// From where the derivatives were taken to the optimum.
+    step: DVector<f64>,
     /// Rows that are data.
     rows: usize,
     /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
     sums: Sums,
 }
 
-impl Linear {
-    /// From the Jacobian ∂r/∂x, shape = (3 N, n), the residual r, for each unknown its place and prior σ, and the rows of
-    /// the constraints that hold them, shape = (constraints, n).
-    pub fn new(
-        jacobian: &DMatrix<f64>,
-        residual: &DVector<f64>,
-        x: &[f64],
-        priors: &[Option<f64>],
-        closed: &DMatrix<f64>,
-    ) -> Self {
+/// What some unknowns alone give a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Share {
+    /// Orthonormal directions that only they fit, shape = (3 N + priors, k).
+    pub directions: DMatrix<f64>,
+    /// Part of the residual along them that they take off: without them the sum of squares is larger by its square.
+    pub part: DVector<f64>,
+}
+
+impl LinearNeighbourhood {
+    /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given.
+    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns) -> Self {
         let (rows, n) = jacobian.shape();
-        let known: Vec<(usize, f64)> = priors.iter().enumerate().filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut all = DMatrix::zeros(rows + known.len(), n);
-        all.rows_mut(0, rows).copy_from(jacobian);
-        let mut long = DVector::zeros(rows + known.len());
-        long.rows_mut(0, rows).copy_from(residual);
+        let priors = unknowns.priors.iter().enumerate();
+        let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
+        let mut columns = jacobian.clone().resize_vertically(rows + known.len(), 0.0);
+        let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
         for (row, &(j, sigma)) in known.iter().enumerate() {
-            all[(rows + row, j)] = sigma.recip();
-            long[rows + row] = x[j] / sigma;
+            columns[(rows + row, j)] = sigma.recip();
+            long[rows + row] = unknowns.x[j] / sigma;
         }
-        let scale: Vec<f64> = all.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-        if let Some(open) = open(closed, &scale) {
-            all.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-            all *= open;
+        let scale: Vec<f64> = columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+        let active = unknowns.active.clone().resize_horizontally(n, 0.0);
+        let (basis, root) = match open(&active, &scale) {
+            Some(open) => {
+                columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
+                let (basis, within) = orthonormal(&(columns * &open), None);
+                let mut root = open * within;
+                root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
+                (basis, root)
+            }
+            None => orthonormal(&columns, None),
+        };
+        let mut fit = Self {
+            residual: long,
+            basis,
+            root,
+            optimum: DVector::from_column_slice(&unknowns.x),
+            step: DVector::zeros(n),
+            rows,
+            sums: Sums::default(),
+        };
+        fit.settle(0);
+        fit
+    }
+
+    /// Fits the directions of the basis from `first` on.
+    fn settle(&mut self, first: usize) {
+        let new = self.basis.columns_range(first..);
+        let along = new.tr_mul(&self.residual);
+        self.residual -= new * &along;
+        let step = -(self.root.columns_range(first..) * along);
+        self.optimum += &step;
+        self.step += step;
+        let before = if first == 0 { self.rows as f64 } else { self.sums.data_freedom };
+        let taken = new.rows(0, self.rows).norm_squared();
+        self.sums = Sums::of(&self.residual, self.rows, before - taken);
+    }
+
+    /// Takes further columns of the data into the fit, shape = (3 N, k), with unknowns of their own behind the others; gives
+    /// the new orthonormal directions.
+    pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
+        let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
+        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        let mut along = DMatrix::zeros(first, k);
+        // Twice is enough [Giraud, Langou & Rozložník 2005].
+        for _ in 0..2 {
+            let more = self.basis.tr_mul(&left);
+            left -= &self.basis * &more;
+            along += more;
         }
-        if let Some(basis) = orthonormal(&all) {
-            let along = basis.tr_mul(&long);
-            let residual = long - &basis * along;
-            let mut linear = Self { residual, basis, rows, sums: Sums::default() };
-            linear.sum(0);
-            return linear;
-        }
-        let basis = DMatrix::zeros(all.nrows(), 0);
-        let mut linear = Self { residual: long, basis, rows, sums: Sums::default() };
-        linear.fit(&all);
-        linear
+        let (new, within) = orthonormal(&left, Some(&lengths));
+        let rank = new.ncols();
+        self.basis = std::mem::take(&mut self.basis).resize_horizontally(first + rank, 0.0);
+        self.basis.columns_range_mut(first..).copy_from(&new);
+        let turned = -(&self.root * (along * &within));
+        self.root = std::mem::take(&mut self.root).resize(n + k, first + rank, 0.0);
+        self.root.view_mut((0, first), (n, rank)).copy_from(&turned);
+        self.root.view_mut((n, first), (k, rank)).copy_from(&within);
+        self.optimum = std::mem::take(&mut self.optimum).resize_vertically(n + k, 0.0);
+        self.step = std::mem::take(&mut self.step).resize_vertically(n + k, 0.0);
+        self.settle(first);
+        new
+    }
+
+    /// The same fit with further columns.
+    pub fn with(&self, columns: &DMatrix<f64>) -> Self {
+        let mut with = self.clone();
+        with.add(columns);
+        with
     }
 
     /// What is left in numbers.
@@ -69,11 +143,10 @@ impl Linear {
         self.sums
     }
 
-    /// What would be left without some of the directions that were fitted: orthonormal, shape = (3 N + priors, k), with the
-    /// part of the residual that they took off.
-    pub fn sums_without(&self, directions: &DMatrix<f64>, given: &DVector<f64>) -> Sums {
-        let freed = directions.rows(0, self.rows).norm_squared();
-        Sums::of(&(&self.residual + directions * given), self.rows, self.sums.data_freedom + freed)
+    /// What would be left without some unknowns.
+    pub fn sums_without(&self, share: &Share) -> Sums {
+        let freed = share.directions.rows(0, self.rows).norm_squared();
+        Sums::of(&(&self.residual + &share.directions * &share.part), self.rows, self.sums.data_freedom + freed)
     }
 
     /// Data rows, 3 N.
@@ -91,54 +164,35 @@ impl Linear {
         self.residual.rows(0, self.rows).into_owned()
     }
 
-    /// Sums anew once the columns from `first` on have been fitted.
-    fn sum(&mut self, first: usize) {
-        let before = if first == 0 { self.rows as f64 } else { self.sums.data_freedom };
-        let taken = self.basis.view((0, first), (self.rows, self.basis.ncols() - first)).norm_squared();
-        self.sums = Sums::of(&self.residual, self.rows, before - taken);
+    /// From where the derivatives were taken to the optimum, all unknowns, those of added columns last.
+    pub fn step(&self) -> &DVector<f64> {
+        &self.step
     }
 
-    /// What [`Linear::freedom`] is to be expected to be where the priors are true: rows, priors included, less what was fitted.
+    /// What the degrees of freedom are to be expected to be where the priors are true: rows, priors included, less rank.
     pub fn expected_freedom(&self) -> f64 {
         (self.basis.nrows() - self.basis.ncols()) as f64
     }
 
-    /// Fits further directions, shape = (3 N + priors, k), and takes them off the residual.
-    fn fit(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let first = self.basis.ncols();
-        let mut found = first;
-        let mut basis = std::mem::take(&mut self.basis).resize_horizontally(first + columns.ncols(), 0.0);
-        for column in columns.column_iter() {
-            let length = column.norm();
-            if length == 0.0 || !length.is_finite() {
-                continue;
-            }
-            let mut column = column / length;
-            // Twice is enough [Giraud, Langou & Rozložník 2005].
-            for _ in 0..2 {
-                let known = basis.columns(0, found);
-                let along = known.tr_mul(&column);
-                column.gemv(-1.0, &known, &along, 1.0);
-            }
-            let new = column.norm();
-            if new > SPANNED {
-                basis.set_column(found, &(column / new));
-                found += 1;
-            }
-        }
-        self.basis = basis.resize_horizontally(found, 0.0);
-        let added = self.basis.columns_range(first..).into_owned();
-        let along = added.tr_mul(&self.residual);
-        self.residual -= &added * along;
-        self.sum(first);
-        added
+    /// What some unknowns x alone give the fit; `None` where the fit does not tell them from others.
+    ///
+    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only they fit the directions Q U, and take − S⁻ᵀ x off along them.
+    pub fn share(&self, unknowns: &[usize]) -> Option<Share> {
+        self.share_within(unknowns).map(|(turned, part)| Share { directions: &self.basis * turned, part })
     }
 
-    /// Fits further columns of the data, shape = (3 N, k); gives the new orthonormal directions.
-    pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut long = DMatrix::zeros(self.residual.len(), columns.ncols());
-        long.rows_mut(0, self.rows).copy_from(columns);
-        self.fit(&long)
+    /// U and − S⁻ᵀ x.
+    fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let own = self.root.select_rows(unknowns).transpose();
+        // U = T_xᵀ W with W = S⁻¹.
+        let (turned, within) = orthonormal(&own, None);
+        let x = self.optimum.select_rows(unknowns);
+        (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
+    }
+
+    /// By how much the sum of squares is larger without some unknowns; `None` where the fit does not tell them from others.
+    pub fn loss_without(&self, unknowns: &[usize]) -> Option<f64> {
+        self.share_within(unknowns).map(|(_, part)| part.norm_squared())
     }
 
     /// Part of the residual along orthonormal directions.
@@ -171,14 +225,9 @@ impl Linear {
         Score { gram, product, lengths: columns.column_iter().map(|column| column.norm_squared()).collect() }
     }
 
-    /// The columns with everything fitted projected out, shape = (3 N + priors, k), orthonormal; dependent ones dropped.
-    pub fn directions(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        self.clone().add(columns)
-    }
-
     /// Largest principal angle [rad] between what two sets of columns add to the fit; `None` where one of them adds nothing.
     pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
-        let (a, b) = (self.directions(one), self.directions(other));
+        let (a, b) = (self.clone().add(one), self.clone().add(other));
         if a.is_empty() || b.is_empty() {
             return None;
         }
@@ -197,7 +246,7 @@ impl Linear {
             let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
             let (basis, residual) = (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
             let inner = DMatrix::identity(n, n) - basis.transpose() * &basis;
-            let step = solve(inner, &basis.tr_mul(&residual));
+            let step = decided(inner, &basis.tr_mul(&residual));
             (residual + basis * step).norm_squared()
         };
         let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
@@ -207,7 +256,7 @@ impl Linear {
 }
 
 /// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly 0.
-fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(factor) = matrix.clone().cholesky()
         && factor.l_dirty().diagonal().iter().all(|value| value * value > LEAST_DECIDED)
     {
@@ -218,25 +267,55 @@ fn solve(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     &eigen.eigenvectors * eigen.eigenvectors.tr_mul(right).component_mul(&inverted)
 }
 
-/// Orthonormal columns with the same span, by Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015]; `None` where
-/// the columns are too close to dependent for that.
-fn orthonormal(columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut basis = columns.clone();
-    for mut column in basis.column_iter_mut() {
-        let length = column.norm();
-        if length == 0.0 || !length.is_finite() {
-            return None;
-        }
-        column /= length;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deterministic numbers without pattern.
+    fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| (12.9898 * i as f64 + 78.233 * (j + 1) as f64).sin() * 43.7 % 1.0)
     }
-    for _ in 0..2 {
-        let factor = (basis.transpose() * &basis).cholesky()?.l();
-        if factor.diagonal().min() < CLOSE_TO_DEPENDENT {
-            return None;
-        }
-        // Q = A L⁻ᵀ, by columns of Qᵀ = L⁻¹ Aᵀ.
-        let inverse = factor.solve_lower_triangular(&DMatrix::identity(factor.nrows(), factor.nrows()))?;
-        basis *= inverse.transpose();
+
+    fn fit(columns: usize) -> (DMatrix<f64>, DVector<f64>, Unknowns) {
+        let x: Vec<f64> = (0..columns).map(|j| 0.1 * j as f64 - 0.2).collect();
+        let priors = (0..columns).map(|j| (j == 1).then_some(0.5)).collect();
+        let active = DMatrix::zeros(0, columns);
+        (matrix(30, columns), matrix(30, 1).column(0).into_owned(), Unknowns { x, priors, active })
     }
-    Some(basis)
+
+    #[test]
+    fn a_share_is_what_the_fit_loses_without_its_unknowns() {
+        let (columns, residual, unknowns) = fit(5);
+        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns);
+        let share = whole.share(&[3, 4]).unwrap();
+        let fewer = Unknowns {
+            x: unknowns.x[..3].to_vec(),
+            priors: unknowns.priors[..3].to_vec(),
+            active: DMatrix::zeros(0, 3),
+        };
+        let without = residual - columns.columns(3, 2) * DVector::from_column_slice(&unknowns.x[3..]);
+        let rest = LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer);
+        let (lost, expected) = (whole.sums_without(&share), rest.sums());
+        assert!((lost.squares - expected.squares).abs() < 1e-10 && share.part.norm() > 0.1);
+        assert!((lost.data_freedom - expected.data_freedom).abs() < 1e-10);
+        let with = rest.with(&columns.columns(3, 2).into_owned());
+        assert!((with.sums().squares - whole.sums().squares).abs() < 1e-10);
+        assert!((with.optimum.rows(0, 3) - whole.optimum.rows(0, 3)).norm() < 1e-10);
+    }
+
+    #[test]
+    fn what_other_columns_take_up_or_what_is_not_finite_changes_nothing() {
+        let (columns, residual, unknowns) = fit(5);
+        let plain = LinearNeighbourhood::new(&columns, &residual, &unknowns);
+        let mut odd = columns.clone().resize_horizontally(7, 0.0);
+        odd.set_column(5, &(columns.column(0) * 3.0 - columns.column(2) * (1.0 + 1e-9)));
+        odd[(4, 6)] = f64::NAN;
+        let mut more = unknowns.clone();
+        more.x.extend([0.0; 2]);
+        more.priors.extend([None; 2]);
+        let odd = LinearNeighbourhood::new(&odd, &residual, &more);
+        assert!((odd.sums().squares - plain.sums().squares).abs() < 1e-9);
+        assert_eq!(odd.fitted().ncols(), 5);
+        assert!(odd.share(&[5]).is_none());
+    }
 }

@@ -1,13 +1,19 @@
-//! Which effects the residual of a fit points to, without fitting any of them.
+//! The linear neighbourhood of a fit, in which candidates are judged without being fitted.
+//!
+//! - [`Linearised`]: the model with a column for every place where an effect may enter; [`LinearNeighbourhood`]: a fit in it.
+//! - [`Score`], [`Sums`], [`Gain`]: what columns would take off the residual, and how probable that is by chance.
+//! - [`Scan`]: all candidates against one fit.
 
-mod library;
+mod left_out;
 mod linear;
-mod open;
+mod linearised;
+mod orthonormal;
 mod scan;
 mod score;
 
-pub(super) use library::Library;
-pub(super) use linear::Linear;
-pub(super) use open::open;
-pub(super) use scan::{Scan, Tried, tries};
-pub(super) use score::{Gain, LEAST_SCATTER};
+pub(super) use left_out::PartSquares;
+pub(super) use linear::LEAST_DECIDED;
+pub(crate) use linear::{LinearNeighbourhood, Unknowns};
+pub(crate) use linearised::Linearised;
+pub(crate) use scan::{Scan, Tried, tries};
+pub(crate) use score::Gain;

@@ -2,20 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::library::Library;
-use super::linear::Linear;
+use super::linear::{LinearNeighbourhood, Share};
+use super::linearised::Linearised;
 use super::score::{Gain, Score, Sums};
+use crate::diagnose::rules::SelectionRules;
 use crate::problem::Effect;
 
 /// The candidates with what the residual says about each.
 pub(crate) struct Scan<'a, 'l> {
-    library: &'l Library<'a>,
-    pub linear: Linear,
+    linearised: &'l Linearised<'a>,
+    pub linear: LinearNeighbourhood,
     /// The candidates tried.
     pub effects: Vec<Effect>,
+    /// Those that cannot be tried: a derivative of theirs is not a finite number.
+    pub refused: Vec<Effect>,
     scores: Vec<Score>,
     /// How often chance has a try at each candidate within its family.
     tries: Vec<f64>,
@@ -23,12 +26,11 @@ pub(crate) struct Scan<'a, 'l> {
     families: usize,
     /// For each candidate's parameters, whether they are never negative.
     never_negative: Vec<Vec<bool>>,
+    pub rules: &'l SelectionRules,
 }
 
 /// Candidates that are projected together.
 const TOGETHER: usize = 16;
-/// Standard errors below zero from which what is never negative is impossible.
-const IMPOSSIBLE: f64 = 3.0;
 
 /// A candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,14 +46,35 @@ pub(crate) struct Tried {
 
 impl<'a, 'l> Scan<'a, 'l> {
     /// Tries `effects` against the fit that `linear` describes.
-    pub fn new(library: &'l Library<'a>, linear: Linear, effects: Vec<Effect>) -> Self {
-        let scores = effects
-            .par_chunks(TOGETHER)
-            .flat_map(|some| linear.scores(&some.iter().map(|effect| library.columns(effect)).collect::<Vec<_>>()));
-        let scores = scores.collect();
-        let (tries, families) = tries(&effects);
-        let never_negative = effects.iter().map(|effect| library.never_negative(effect)).collect();
-        Self { library, linear, effects, scores, tries, families, never_negative }
+    pub fn new(
+        linearised: &'l Linearised<'a>,
+        linear: LinearNeighbourhood,
+        effects: Vec<Effect>,
+        rules: &'l SelectionRules,
+    ) -> Self {
+        let scored = |effects: &[Effect]| -> Vec<Option<Score>> {
+            let columns: Vec<DMatrix<f64>> = effects.iter().map(|effect| linearised.columns(effect)).collect();
+            let is_finite: Vec<bool> = columns.iter().map(|all| all.iter().all(|value| value.is_finite())).collect();
+            let finite: Vec<DMatrix<f64>> =
+                columns.into_iter().zip(&is_finite).filter_map(|(all, fine)| fine.then_some(all)).collect();
+            let mut scores = linear.scores(&finite).into_iter();
+            is_finite.into_iter().map(|fine| if fine { scores.next() } else { None }).collect()
+        };
+        let all: Vec<Option<Score>> = effects.par_chunks(TOGETHER).flat_map_iter(scored).collect();
+        let mut refused = Vec::new();
+        let (mut known, mut scores) = (Vec::new(), Vec::new());
+        for (effect, score) in effects.into_iter().zip(all) {
+            match score {
+                Some(score) => {
+                    known.push(effect);
+                    scores.push(score);
+                }
+                None => refused.push(effect),
+            }
+        }
+        let (tries, families) = tries(&known);
+        let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
+        Self { linearised, linear, effects: known, refused, scores, tries, families, never_negative, rules }
     }
 
     /// Candidates that the fit does not absorb and that are possible, best first.
@@ -59,19 +82,19 @@ impl<'a, 'l> Scan<'a, 'l> {
         self.ranked(&self.scores, self.linear.sums())
     }
 
-    /// The ranking that there would be without some of the directions that were fitted: orthonormal,
-    /// shape = (3 N + priors, k), with the part of the residual that they took off.
-    pub fn ranking_without(&self, directions: &DMatrix<f64>, given: &DVector<f64>) -> Vec<Tried> {
-        let data = directions.rows(0, self.linear.rows()).into_owned();
-        let without =
-            |(effect, score): (&Effect, &Score)| score.give_back(&self.library.columns(effect).tr_mul(&data), given);
+    /// The ranking that there would be without some unknowns of the fit.
+    pub fn ranking_without(&self, share: &Share) -> Vec<Tried> {
+        let data = share.directions.rows(0, self.linear.rows()).into_owned();
+        let without = |(effect, score): (&Effect, &Score)| {
+            score.give_back(&self.linearised.columns(effect).tr_mul(&data), &share.part)
+        };
         let scores: Vec<Score> = self.effects.par_iter().zip(&self.scores).map(without).collect();
-        self.ranked(&scores, self.linear.sums_without(directions, given))
+        self.ranked(&scores, self.linear.sums_without(share))
     }
 
     fn ranked(&self, scores: &[Score], sums: Sums) -> Vec<Tried> {
         let tried = |(index, score): (usize, &Score)| {
-            let gain = sums.gain(score).filter(|_| self.is_possible(index, score, sums))?;
+            let gain = sums.gain(score, self.rules).filter(|_| self.is_possible(index, score, sums))?;
             let tries = self.tries[index] * self.families as f64;
             let (criterion, corrected) = (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
             Some(Tried { index, gain, criterion, corrected })
@@ -88,34 +111,34 @@ impl<'a, 'l> Scan<'a, 'l> {
             return true;
         }
         let scatter = (sums.squares / sums.freedom()).sqrt();
-        let fine = |((value, error), never): ((f64, f64), &bool)| !never || value > -IMPOSSIBLE * error * scatter;
-        score.estimates().into_iter().zip(never_negative).all(fine)
+        let fine =
+            |((value, error), never): ((f64, f64), &bool)| !never || value > -self.rules.impossible * error * scatter;
+        score.estimates(self.rules).into_iter().zip(never_negative).all(fine)
     }
 
     /// Candidates that the fit absorbs, so that nothing is left to show them.
     pub fn absorbed(&self) -> Vec<&Effect> {
-        let gone = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
+        let gone = |(effect, score): (_, &Score)| (score.rank(self.rules) == 0).then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
     }
 
     /// Takes a candidate into the fit, in the linear neighbourhood.
     pub fn take(&mut self, index: usize) {
-        let columns = self.library.columns(&self.effects[index]);
+        let columns = self.columns(index);
         let before = self.linear.clone();
         let added = self.linear.add(&columns);
-        let rows = self.linear.rows();
-        let data = added.rows(0, rows).into_owned();
+        let data = added.rows(0, self.linear.rows()).into_owned();
         let given = before.along(&added);
-        let library = self.library;
+        let linearised = self.linearised;
         let update = |(effect, score): (&Effect, &mut Score)| {
-            score.take_off(&library.columns(effect).tr_mul(&data), &given);
+            score.take_off(&linearised.columns(effect).tr_mul(&data), &given);
         };
         self.effects.par_iter().zip(&mut self.scores).for_each(update);
     }
 
     /// Columns of a candidate, shape = (3 N, k).
     pub fn columns(&self, index: usize) -> DMatrix<f64> {
-        self.library.columns(&self.effects[index])
+        self.linearised.columns(&self.effects[index])
     }
 
     /// Largest principal angle [rad] between what two candidates add to the fit; none where one of them adds nothing.

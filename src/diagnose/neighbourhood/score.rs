@@ -3,10 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-/// A candidate is absorbed by the fit when less than this part of a column's length is new.
-const ABSORBED: f64 = 1e-4;
-/// Scatter, in units of σ, below which the residual is rounding and nothing is sought in it.
-pub(in crate::diagnose) const LEAST_SCATTER: f64 = 1e-3;
+use crate::diagnose::rules::SelectionRules;
 
 /// What the residual says about columns that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,15 +57,15 @@ impl Sums {
     }
 
     /// What the fit gains by columns with this score.
-    pub fn gain(&self, score: &Score) -> Option<Gain> {
-        let (squares, freedom) = score.reduction()?;
-        self.gain_of(squares, freedom)
+    pub fn gain(&self, score: &Score, rules: &SelectionRules) -> Option<Gain> {
+        let (squares, freedom) = score.reduction(rules)?;
+        self.gain_of(squares, freedom, rules)
     }
 
     /// What a reduction of the sum of squares by so many new directions means.
-    pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
+    pub fn gain_of(&self, squares: f64, freedom: usize, rules: &SelectionRules) -> Option<Gain> {
         let degrees = self.freedom();
-        let total = self.squares.max(LEAST_SCATTER.powi(2) * degrees);
+        let total = self.squares.max(rules.rounding.powi(2) * degrees);
         let left = degrees - freedom as f64;
         if left < 1.0 || freedom == 0 {
             return None;
@@ -83,43 +80,42 @@ impl Sums {
 
 impl Score {
     /// What the fit would make of the columns' parameters, −G⁺b, each with its standard error for residuals of unit scatter.
-    pub fn estimates(&self) -> Vec<(f64, f64)> {
-        let k = self.lengths.len();
-        let scale: Vec<f64> = self.lengths.iter().map(|l| if *l > 0.0 { l.sqrt() } else { 1.0 }).collect();
-        let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
-        let inverted = eigen.eigenvalues.map(|value| if value > ABSORBED * ABSORBED { value.recip() } else { 0.0 });
-        let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
-        let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
-        let estimate = &inverse * product;
-        (0..k).map(|i| (-estimate[i] / scale[i], inverse[(i, i)].max(0.0).sqrt() / scale[i])).collect()
+    pub fn estimates(&self, rules: &SelectionRules) -> Vec<(f64, f64)> {
+        let scale = self.scale();
+        let (mut estimates, mut variances) = (vec![0.0; scale.len()], vec![0.0; scale.len()]);
+        for (value, vector, along) in self.seen(rules) {
+            for (i, scale) in scale.iter().enumerate() {
+                estimates[i] -= vector[i] * along / value / scale;
+                variances[i] += vector[i] * vector[i] / value / (scale * scale);
+            }
+        }
+        estimates.into_iter().zip(variances).map(|(estimate, variance)| (estimate, variance.sqrt())).collect()
     }
 
     /// How many new directions the columns have.
-    pub fn rank(&self) -> usize {
-        self.reduction().map_or(0, |(_, rank)| rank)
+    pub fn rank(&self, rules: &SelectionRules) -> usize {
+        self.seen(rules).len()
     }
 
-    /// bᵀ G⁺ b and the rank of G, scaled columns; `None` where nothing new is left of them.
-    fn reduction(&self) -> Option<(f64, usize)> {
-        let scale = DVector::from_iterator(self.lengths.len(), self.lengths.iter().map(|length| length.sqrt()));
-        let kept: Vec<usize> = (0..scale.len()).filter(|&j| scale[j] > 0.0).collect();
-        if kept.is_empty() {
-            return None;
-        }
-        let gram = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-            self.gram[(kept[i], kept[j])] / (scale[kept[i]] * scale[kept[j]])
-        });
-        let product = DVector::from_fn(kept.len(), |i, _| self.product[kept[i]] / scale[kept[i]]);
-        let eigen = gram.symmetric_eigen();
-        let mut sum = 0.0;
-        let mut rank = 0;
-        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > ABSORBED * ABSORBED {
-                sum += vector.dot(&product).powi(2) / value;
-                rank += 1;
-            }
-        }
-        (rank > 0).then_some((sum, rank))
+    /// bᵀ G⁺ b and the rank of G; `None` where nothing new is left of the columns.
+    fn reduction(&self, rules: &SelectionRules) -> Option<(f64, usize)> {
+        let seen = self.seen(rules);
+        let sum = seen.iter().map(|(value, _, along)| along * along / value).sum();
+        (!seen.is_empty()).then_some((sum, seen.len()))
+    }
+
+    fn scale(&self) -> Vec<f64> {
+        self.lengths.iter().map(|length| if *length > 0.0 { length.sqrt() } else { 1.0 }).collect()
+    }
+
+    /// Eigenvalues and vectors of G, for columns of length one, with bᵀ along each; those that the fit absorbs left out.
+    fn seen(&self, rules: &SelectionRules) -> Vec<(f64, DVector<f64>, f64)> {
+        let (k, scale) = (self.lengths.len(), self.scale());
+        let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
+        let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j])).symmetric_eigen();
+        let all = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+        let is_seen = |(value, _): &(&f64, _)| **value > rules.absorbed.powi(2);
+        all.filter(is_seen).map(|(value, vector)| (*value, vector.into_owned(), vector.dot(&product))).collect()
     }
 
     /// Takes off directions that have been fitted since: `along` = Cᵀq, `given` = qᵀr before they were fitted.

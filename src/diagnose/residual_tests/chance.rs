@@ -2,12 +2,12 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
-use super::normality;
-
 /// Draws that must reach a value for their share to be its probability; else the tail is that of a gamma distribution.
 const ENOUGH: usize = 10;
 /// Least skewness of the gamma distribution; with less it is normal.
 const LEAST_SKEWNESS: f64 = 0.02;
+/// Values of A² beyond this have the same p-value: the fitted curve of [Stephens 1986] ends.
+const LARGEST: f64 = 150.0;
 
 /// The distribution of a statistic without structure; large values are improbable.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ impl Chance {
         let p = match self {
             Self::ChiSquared { distribution, scale } => distribution.sf(statistic / scale),
             Self::Fisher { distribution, of } => of * distribution.sf(statistic),
-            Self::AndersonDarling => normality::p_value(statistic),
+            Self::AndersonDarling => anderson_darling_p(statistic),
             Self::Drawn(drawn) => drawn.p_value(statistic),
         };
         p.clamp(f64::MIN_POSITIVE, 1.0)
@@ -39,7 +39,7 @@ impl Chance {
         match self {
             Self::ChiSquared { distribution, scale } => scale * distribution.inverse_cdf(1.0 - level),
             Self::Fisher { distribution, of } => distribution.inverse_cdf(1.0 - level / of),
-            Self::AndersonDarling => normality::upper(level),
+            Self::AndersonDarling => anderson_darling_upper(level),
             Self::Drawn(drawn) => drawn.upper(level),
         }
     }
@@ -109,4 +109,30 @@ impl Drawn {
             self.origin + self.unit * self.tail.inverse_cdf(1.0 - level)
         }
     }
+}
+
+/// Probability of Anderson and Darling's A² or more [Stephens 1986, table 4.9].
+fn anderson_darling_p(statistic: f64) -> f64 {
+    let a = statistic.clamp(0.0, LARGEST);
+    let curve = |c0: f64, c1: f64, c2: f64| (c0 + c1 * a + c2 * a * a).exp();
+    match a {
+        _ if a < 0.2 => 1.0 - curve(-13.436, 101.14, -223.73),
+        _ if a < 0.34 => 1.0 - curve(-8.318, 42.796, -59.938),
+        _ if a < 0.6 => curve(0.9177, -4.279, -1.38),
+        _ => curve(1.2937, -5.709, 0.0186),
+    }
+}
+
+/// The value that is reached with probability `level`, by bisection.
+fn anderson_darling_upper(level: f64) -> f64 {
+    let (mut low, mut high) = (0.0, LARGEST);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if anderson_darling_p(middle) > level {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
 }

@@ -1,10 +1,11 @@
-//! The verdict of all checks together.
+//! The verdict of all residual tests together.
 
 use super::chance::Chance;
 use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
+use crate::diagnose::rules::SelectionRules;
 
-/// Probability that noise alone makes any check fail.
-pub(super) const ALPHA: f64 = 0.01;
+/// Probability that noise alone makes any test fail.
+pub(super) const ALPHA: f64 = SelectionRules::DEFAULT.level;
 
 /// A test, and what it found before others are considered.
 pub(super) struct Tried {
@@ -42,7 +43,7 @@ pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
         }
         levels[k] = level;
     }
-    let check = |(k, Tried { test, trial }): (usize, Tried)| {
+    let judged = |(k, Tried { test, trial }): (usize, Tried)| {
         let outcome = trial.map(|Trial { statistic, chance, shown }| Outcome {
             statistic: shown(statistic),
             bounds: (shown(chance.lower(levels[k])), shown(chance.upper(levels[k]))),
@@ -51,5 +52,5 @@ pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
         });
         ResidualTest { test, outcome }
     };
-    Findings { tests: tried.into_iter().enumerate().map(check).collect(), outliers }
+    Findings { tests: tried.into_iter().enumerate().map(judged).collect(), outliers }
 }

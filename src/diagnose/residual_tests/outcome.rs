@@ -1,5 +1,7 @@
 //! What the residual tests found.
 
+use std::fmt;
+
 use crate::diagnose::covariate::Covariate;
 
 /// An order of the poses.
@@ -42,7 +44,7 @@ pub enum Test {
     Normality,
 }
 
-/// Why a check says nothing.
+/// Why a test says nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Untestable {
     /// The fit leaves (nearly) no degrees of freedom.
@@ -76,17 +78,17 @@ pub enum Untestable {
 pub struct Outcome {
     /// Its value.
     pub statistic: f64,
-    /// Where chance keeps it, from and to, at the level at which Holm's procedure judges this check.
+    /// Where chance keeps it, from and to, at the level at which Holm's procedure judges this test.
     ///
     /// Above is what fails; below the lower bound (of χ² / ν alone; else 0) σ is overstated.
     pub bounds: (f64, f64),
     /// Probability that chance alone gives as much, by itself.
     pub p_value: f64,
-    /// Whether it failed, all checks together taken into account.
+    /// Whether it failed, all tests together taken into account.
     pub failed: bool,
 }
 
-/// One check; its `Display` is a sentence for people.
+/// One test; its `Display` is a sentence for people.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualTest {
     /// What was tested.
@@ -132,10 +134,10 @@ impl ResidualTest {
     }
 }
 
-/// All checks of what a fit leaves.
+/// All tests of what a fit leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
-    /// Every check, testable or not.
+    /// Every test, testable or not.
     pub tests: Vec<ResidualTest>,
     /// Poses that were left out as outliers, counted from 0.
     pub outliers: Vec<usize>,
@@ -147,15 +149,90 @@ impl Findings {
         self.strongest().is_some()
     }
 
-    /// The failed check of structure that chance explains least.
+    /// The failed test of structure that chance explains least.
     pub fn strongest(&self) -> Option<&ResidualTest> {
-        let p_value = |check: &ResidualTest| check.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value);
-        let failed = self.tests.iter().filter(|check| check.is_structure() && check.failed());
+        let p_value = |test: &ResidualTest| test.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value);
+        let failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
     /// Whether anything was tested for structure.
     pub fn is_testable(&self) -> bool {
-        self.tests.iter().any(|check| check.is_structure() && check.outcome.is_ok())
+        self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())
+    }
+}
+
+impl fmt::Display for ResidualTest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.outcome {
+            Ok(outcome) => tested(&self.test, outcome, f),
+            Err(why) => write!(f, "{} not tested: {why}", untested(&self.test)),
+        }
+    }
+}
+
+fn tested(test: &Test, outcome: &Outcome, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let Outcome { statistic, bounds: (from, to), failed, .. } = outcome;
+    let chance = format!("chance gives up to {to:.2}");
+    match test {
+        Test::ReducedChiSquared => {
+            let size = match (failed, statistic < from) {
+                (true, _) => "residuals are larger than σ explains",
+                (false, true) => "residuals are smaller than σ, which is overstated",
+                (false, false) => "residuals are as large as σ",
+            };
+            write!(f, "{size} (χ²/ν {statistic:.2}, chance gives {from:.2} to {to:.2})")
+        }
+        Test::LackOfFit => {
+            let size = if *failed { "larger than" } else { "as large as" };
+            write!(f, "residuals are {size} repeats of a setup scatter (F {statistic:.2}, {chance})")
+        }
+        Test::Runs { sequence } => {
+            let sign = if *failed { "keep their sign" } else { "do not keep their sign beyond chance" };
+            let percent = (100.0 * statistic, 100.0 * to);
+            write!(
+                f,
+                "residuals {sign} {} (at {:.0} % of the steps, chance gives up to {:.0} %)",
+                order(*sequence),
+                percent.0,
+                percent.1
+            )
+        }
+        Test::LjungBox { sequence } => {
+            let follow = if *failed { "follow one another" } else { "do not follow one another beyond chance" };
+            write!(f, "residuals {follow} {} (Ljung–Box {statistic:.1}, chance gives up to {to:.1})", order(*sequence))
+        }
+        Test::Dependence { covariate } => {
+            let depend = if *failed { "depend" } else { "do not depend beyond chance" };
+            write!(f, "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {chance})")
+        }
+        Test::Outliers { worst } => {
+            let pose = worst.map_or_else(String::new, |pose| format!("pose {} ", pose + 1));
+            let far = if *failed { "is too far off to be noise" } else { "is farthest off, not beyond chance" };
+            write!(f, "{pose}{far} ({statistic:.1} times the scatter, chance gives up to {to:.1})")
+        }
+        Test::Normality => {
+            let normal = if *failed { "are not" } else { "may well be" };
+            write!(f, "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, {chance})")
+        }
+    }
+}
+
+fn order(sequence: Sequence) -> &'static str {
+    match sequence {
+        Sequence::Time => "in the order of time",
+        Sequence::Rows => "in the order of the rows",
+    }
+}
+
+fn untested(test: &Test) -> String {
+    match test {
+        Test::ReducedChiSquared => "size against σ".to_owned(),
+        Test::LackOfFit => "size against repeats".to_owned(),
+        Test::Runs { sequence } => format!("signs {}", order(*sequence)),
+        Test::LjungBox { sequence } => format!("autocorrelation {}", order(*sequence)),
+        Test::Dependence { covariate } => format!("dependence on {covariate}"),
+        Test::Outliers { .. } => "outliers".to_owned(),
+        Test::Normality => "normal distribution".to_owned(),
     }
 }

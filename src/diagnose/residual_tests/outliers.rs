@@ -3,11 +3,10 @@
 use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::FitResidual;
 use super::chance::Chance;
-use super::deletion::{Kept, Others, each_left_out};
+use super::fit_residual::FitResidual;
 use super::judgement::{Trial, Tried};
-use super::leverage::Leverage;
+use super::leverage::{Kept, Leverage, Others, each_left_out};
 use super::outcome::{Test, Untestable};
 
 /// Poses left out in one round: one in so many, at least one. Large outliers pull the fit off others and hide smaller ones.

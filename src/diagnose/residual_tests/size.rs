@@ -1,15 +1,20 @@
-//! Whether residuals are larger than noise.
+//! Whether residuals are larger than noise, and normally distributed.
 
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-use statrs::distribution::{ChiSquared, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Normal};
 
-use super::FitResidual;
 use super::chance::Chance;
-use super::deletion::Kept;
+use super::fit_residual::FitResidual;
 use super::judgement::{Trial, Tried};
+use super::leverage::Kept;
 use super::outcome::{Test, Untestable};
+
+/// Coordinates below which the distribution is not tested.
+const LEAST_COORDINATES: usize = 8;
+/// Probabilities are kept this far from 0 and 1.
+const EXTREME: f64 = 1e-300;
 
 /// χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
 ///
@@ -60,4 +65,42 @@ fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
     }
     let statistic = (kept.residual.norm_squared() - pure) / freedom / (pure / pure_freedom);
     Ok(Trial { statistic, chance: Chance::Fisher { distribution, of: 1.0 }, shown: |value| value })
+}
+
+/// Anderson and Darling's test on all studentised coordinates, mean and variance estimated.
+///
+/// A² = −n − (1/n) Σᵢ (2i − 1) [ln Φ(z₍ᵢ₎) + ln Φ(−z₍ₙ₊₁₋ᵢ₎)], times 1 + 0.75/n + 2.25/n²
+///                            [Stephens 1986, in D'Agostino and Stephens, Goodness-of-Fit Techniques, section 4.8.5]
+///
+/// The fit mixes the noise of many poses in each residual, which makes it more normal than the noise; so few poses hide
+/// heavy tails, but do not make them up.
+pub(super) fn anderson_darling(studentised: &[Vector3<f64>]) -> Tried {
+    let mut values: Vec<f64> = studentised.iter().flatten().copied().filter(|value| *value != 0.0).collect();
+    let trial = squared_distance(&mut values).map(|statistic| Trial {
+        statistic,
+        chance: Chance::AndersonDarling,
+        shown: |value| value,
+    });
+    Tried { test: Test::Normality, trial }
+}
+
+fn squared_distance(values: &mut [f64]) -> Result<f64, Untestable> {
+    if values.len() < LEAST_COORDINATES {
+        return Err(Untestable::TooFewPoses);
+    }
+    values.sort_by(f64::total_cmp);
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let spread = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    if !spread.is_normal() {
+        return Err(Untestable::Constant);
+    }
+    let normal = Normal::standard();
+    let log = |z: f64| normal.cdf(z).max(EXTREME).ln();
+    let terms =
+        values.iter().zip(values.iter().rev()).enumerate().map(|(i, (low, high))| {
+            (2.0 * i as f64 + 1.0) * (log((low - mean) / spread) + log((mean - high) / spread))
+        });
+    let squared = -n - terms.sum::<f64>() / n;
+    Ok(squared * (1.0 + 0.75 / n + 2.25 / (n * n)))
 }

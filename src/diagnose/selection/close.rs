@@ -4,27 +4,24 @@ use super::super::candidates::Candidates;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
+use super::super::rules::SelectionRules;
 use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
 use super::alternatives::Replacements;
 use super::harmonics;
 use super::interval::{self, Interval};
-use super::pick::LEVEL;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
 use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
 
-/// Effects that are exchanged for better ones at most.
-const MOST_EXCHANGES: usize = 4;
-
 /// What the loop came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// No effect, no structure.
     NothingFound,
-    /// Effects were found and what is left passes the checks.
+    /// Effects were found and what is left passes the residual tests.
     Explained,
     /// Structure is left.
     Unexplained,
@@ -51,11 +48,11 @@ pub struct Found {
 pub struct ClosedLoop {
     /// What it came to.
     pub verdict: Verdict,
-    /// The fit of the declared problem, its checks, and what its residual points to.
+    /// The fit of the declared problem, its residual tests, and what its residual points to.
     pub before: Trace,
     /// The fit with every effect that was found.
     pub after: Identification,
-    /// Checks of what it leaves.
+    /// Residual tests of what it leaves.
     pub findings: Findings,
     /// The problem with what was found declared.
     pub closed: Problem,
@@ -63,7 +60,7 @@ pub struct ClosedLoop {
     pub effects: Vec<Found>,
     /// What each round came to.
     pub rounds: Vec<Round>,
-    /// 1 σ of the prior that the closed problem has for the waves of joints, where they are many [rad].
+    /// 1 σ of the prior that the closed problem has for the harmonics of joints, where they are many [rad].
     pub harmonic_sigma: Option<f64>,
     /// Structure that no effect explains.
     pub unexplained: Option<Unexplained>,
@@ -83,26 +80,34 @@ impl ClosedLoop {
 /// # Errors
 /// Problem, data and options do not fit each other.
 pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<ClosedLoop, IdentifyError> {
-    let data = Data::new(data).with_candidates(&options.candidates);
+    close_by(problem, data, options, &SelectionRules::DEFAULT)
+}
+
+/// The same by other rules.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn close_by(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+    rules: &SelectionRules,
+) -> Result<ClosedLoop, IdentifyError> {
+    let data = Data::new(data, rules).with_candidates(&options.candidates);
     let first = Fitted::new(problem.clone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
-    let declared = first.effects();
-    let mut rounds =
-        Rounds { data: &data, options, declared, smooth_terms: Vec::new(), steps: Vec::new(), seen: Vec::new() };
+    let mut rounds = Rounds::new(&data, options, first.effects());
     let mut fitted = rounds.run(first)?;
-    for _ in 0..if rounds.has_many_poses() { 1 } else { MOST_EXCHANGES } {
+    for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
         let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
         fitted = rounds.run(next)?;
     }
-    let (fitted, unexplained) = with_generic(&mut rounds, fitted)?;
-    let (fitted, harmonic_sigma) = harmonics::filled(&rounds, fitted)?;
+    let (fitted, unexplained) = with_smooth_term(&mut rounds, fitted)?;
+    let (fitted, harmonic_sigma, changed) = harmonics::filled(&rounds, fitted)?;
+    let unexplained =
+        if changed { unexplained::localise(&fitted, &data, rounds.smooth_terms.first()) } else { unexplained };
     let findings = check_fit(&fitted, &data);
-    let unexplained = if rounds.has_many_poses() {
-        unexplained::localise(&fitted, &data, rounds.smooth_terms.first(), LEVEL)
-    } else {
-        unexplained
-    };
     let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
     let effects = found(&rounds, &fitted, (findings.is_structured(), harmonic_sigma.is_some()));
     let verdict = match (&unexplained, effects.is_empty()) {
@@ -118,37 +123,35 @@ pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<Clo
         findings,
         closed: fitted.problem,
         effects,
-        rounds: rounds.steps,
+        rounds: rounds.done,
         harmonic_sigma,
         unexplained,
         gain,
     })
 }
 
-/// The fit without effects that only stood in for smooth structure of another kind, and that structure; the fit as it was
+/// The fit without effects that only stood in for a smooth function, and the structure that this leaves; the fit as it was
 /// where in the end there is none.
-fn with_generic(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<Unexplained>), IdentifyError> {
+fn with_smooth_term(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<Unexplained>), IdentifyError> {
     let data = rounds.data;
     let candidates = Candidates::of(&fitted.problem, data).testable;
-    let without =
-        if let Some((smooth_term, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates) {
-            rounds.smooth_terms.push(smooth_term);
-            let without = rounds.fit(&fitted, &rest)?;
-            let without = rounds.without_insignificant(without)?;
-            rounds.seen.clear();
-            rounds.note(&without);
-            rounds.run(without)?
-        } else if let Some(smooth_term) = unexplained::strongest(&fitted, data, LEVEL) {
-            rounds.smooth_terms.push(smooth_term);
-            let without = rounds.without_insignificant(fitted.clone())?;
-            if rounds.is_new(&without) {
-                rounds.note(&without);
-            }
-            without
-        } else {
-            return Ok((fitted, None));
-        };
-    let left = unexplained::localise(&without, data, rounds.smooth_terms.first(), LEVEL);
+    let without = if let Some((term, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates)
+    {
+        rounds.smooth_terms.push(term);
+        let without = rounds.fit(&fitted, &rest)?;
+        let without = rounds.without_insignificant(without)?;
+        rounds.forget();
+        rounds.note(&without);
+        rounds.run(without)?
+    } else if let Some(tried) = unexplained::strongest(&fitted, data, None) {
+        rounds.smooth_terms.push(tried.smooth_term);
+        let without = rounds.without_insignificant(fitted.clone())?;
+        rounds.enter(&without);
+        without
+    } else {
+        return Ok((fitted, None));
+    };
+    let left = unexplained::localise(&without, data, rounds.smooth_terms.first());
     if left.is_some() {
         return Ok((without, left));
     }
@@ -164,17 +167,14 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
         return Ok(None);
     }
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let smooth_terms = rounds.smooth_terms.clone();
-    let library = fitted.library(rounds.data, &candidates, &smooth_terms);
-    let replacements = Replacements::new(fitted, &library, &candidates, &smooth_terms);
+    let linearised = fitted.linearised(rounds.data, &candidates, &rounds.smooth_terms);
+    let taken_in = rounds.smooth_terms.clone();
+    let replacements = Replacements::new(fitted, &linearised, (&candidates, &taken_in), rounds.data);
     for effect in &added {
-        let other = replacements.of(effect, false);
-        if let Some(better) = &other.better {
-            let kept = added.iter().filter(|known| *known != effect).chain([better]).cloned().collect::<Vec<_>>();
-            let next = rounds.fit(fitted, &kept)?;
-            let next = rounds.without_insignificant(next)?;
-            if rounds.is_new(&next) {
-                rounds.note(&next);
+        if let Some(better) = replacements.of(effect, false).better {
+            let kept: Vec<Effect> = added.iter().filter(|known| *known != effect).chain([&better]).cloned().collect();
+            let next = rounds.without_insignificant(rounds.fit(fitted, &kept)?)?;
+            if rounds.enter(&next) {
                 return Ok(Some(next));
             }
         }
@@ -182,18 +182,18 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     Ok(None)
 }
 
-/// Every added effect with what is known of it, where structure is left, and where waves share a prior.
+/// Every added effect with what is known of it, where structure is left, and where harmonics share a prior.
 fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bool)) -> Vec<Found> {
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let library = fitted.library(rounds.data, &candidates, &rounds.smooth_terms);
-    let replacements = Replacements::new(fitted, &library, &candidates, &rounds.smooth_terms);
+    let linearised = fitted.linearised(rounds.data, &candidates, &rounds.smooth_terms);
+    let replacements = Replacements::new(fitted, &linearised, (&candidates, &rounds.smooth_terms), rounds.data);
     let added = rounds.added(fitted);
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|own| own.covers(known));
         let holds = |step: &&Round| step.effects.iter().any(|known| effect.covers(known));
-        let step = rounds.steps.iter().find(|step| holds(step) && step.effects.iter().all(stays));
+        let step = rounds.done.iter().find(|step| holds(step) && step.effects.iter().all(stays));
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| Found {

@@ -6,12 +6,7 @@ use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::super::data::{Data, SEED, bits};
-
-/// Resamples.
-const DRAWS: usize = 2000;
-/// Part of the resamples within the interval.
-const COVERED: f64 = 0.95;
+use super::super::data::{Data, bits};
 
 /// An estimate with the interval that covers it in 95 of 100 cases.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +21,7 @@ pub struct Interval {
 
 /// Mean reduction of the distance to what was measured on held-out poses [m]; bootstrap over configurations [Efron 1979].
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
-    let rows = &data.split.held_out;
+    let (rows, draws) = (&data.split.held_out, data.rules.resamples);
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
     for ((&row, before), after) in rows.iter().zip(before).zip(after) {
         let gain = before.norm() - after.norm();
@@ -38,11 +33,11 @@ pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>])
         sum / f64::max(count, 1.0)
     };
     let value = mean(&mut sums.iter().copied());
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let mut draws: Vec<f64> =
-        (0..DRAWS).map(|_| mean(&mut (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())]))).collect();
-    draws.sort_by(f64::total_cmp);
+    let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
+    let mut means: Vec<f64> =
+        (0..draws).map(|_| mean(&mut (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())]))).collect();
+    means.sort_by(f64::total_cmp);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
-    let beyond = ((1.0 - COVERED) / 2.0 * DRAWS as f64) as usize;
-    Interval { value, low: draws[beyond], high: draws[DRAWS - 1 - beyond] }
+    let beyond = ((1.0 - data.rules.covered) / 2.0 * draws as f64) as usize;
+    Interval { value, low: means[beyond], high: means[draws - 1 - beyond] }
 }

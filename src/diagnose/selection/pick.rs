@@ -4,21 +4,6 @@ use super::super::data::Data;
 use super::super::neighbourhood::Scan;
 use crate::problem::Effect;
 
-/// Level of a whole scan: probability that noise alone points to anything.
-pub(in crate::diagnose) const LEVEL: f64 = 0.01;
-/// Level above which an effect is taken out again: above that of coming in, so that no effect goes to and fro at the border.
-pub(super) const LEAVING: f64 = 0.05;
-/// Candidates whose criterion is this close to the best are its rivals: odds of about 150 to 1.
-const RIVAL: f64 = 10.0;
-/// Corrected p below which an effect without rivals needs no fit of its own before the next is looked for.
-const OVERWHELMING: f64 = 1e-12;
-/// Poses beyond which rivals are not fitted one by one, nor effects: the linear neighbourhood of so many decides as well.
-pub(super) const MOST_REFITTED: usize = 1000;
-/// Candidates, best first, that may fail the cross-validation before a round adds nothing.
-const MOST_VALIDATED: usize = 8;
-/// Effects that a round adds at most.
-const MOST: usize = 100;
-
 /// What a round adds.
 pub(super) struct Pick {
     pub effect: Effect,
@@ -28,38 +13,35 @@ pub(super) struct Pick {
 
 /// The candidates that stand out of what is left, each the best after those before it: beyond chance, better than nothing,
 /// and better at predicting poses that were left out.
-pub(super) fn pick(scan: &mut Scan, data: &Data) -> Vec<Pick> {
+///
+/// A round ends with the first one that wants a fit of its own, if `affords_fits`: one that has rivals of another family, or
+/// is not overwhelming.
+pub(super) fn pick(scan: &mut Scan, data: &Data, affords_fits: bool) -> Vec<Pick> {
+    let rules = data.rules;
     let mut picks: Vec<Pick> = Vec::new();
     let without = scan.linear.cross_validate(&data.block);
-    let many = data.rows().len() > MOST_REFITTED;
-    while picks.len() < MOST {
+    while picks.len() < rules.picks {
         let ranking = scan.ranking();
-        let mut standing = ranking.iter().filter(|tried| tried.corrected < LEVEL && tried.criterion < 0.0);
-        // The first alone must predict poses that were left out; overwhelming ones after it are judged together.
-        let Some(best) = standing.by_ref().take(MOST_VALIDATED).find(|tried| {
-            if !picks.is_empty() {
-                return true;
-            }
-            let mut with = scan.linear.clone();
-            with.add(&scan.columns(tried.index));
-            improves(without, with.cross_validate(&data.block))
+        let mut standing = ranking.iter().filter(|tried| tried.corrected < rules.level && tried.criterion < 0.0);
+        // The first alone must predict poses that were left out; those after it are judged together.
+        let Some(best) = standing.by_ref().take(rules.validated).find(|tried| {
+            let with = || scan.linear.with(&scan.columns(tried.index));
+            !picks.is_empty() || improves(without, with().cross_validate(&data.block))
         }) else {
             break;
         };
-        let rivals: Vec<Effect> = ranking
-            .iter()
-            .filter(|tried| tried.index != best.index && tried.criterion < best.criterion + RIVAL)
-            .map(|tried| scan.effects[tried.index].clone())
-            .collect();
-        let p = best.corrected;
         let effect = scan.effects[best.index].clone();
-        let alone = many || rivals.iter().all(|rival| rival.name() == effect.name()) && p < OVERWHELMING;
-        if !picks.is_empty() && !alone {
+        let rivals = ranking.iter().filter(|tried| tried.criterion < best.criterion + rules.rival);
+        let rivals: Vec<Effect> =
+            rivals.filter(|tried| tried.index != best.index).map(|tried| scan.effects[tried.index].clone()).collect();
+        let is_clear = best.corrected < rules.overwhelming && rivals.iter().all(|rival| rival.name() == effect.name());
+        let wants_fit = affords_fits && !is_clear;
+        if wants_fit && !picks.is_empty() {
             break;
         }
         let index = best.index;
         picks.push(Pick { effect, rivals });
-        if !alone {
+        if wants_fit {
             break;
         }
         scan.take(index);

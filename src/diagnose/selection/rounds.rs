@@ -1,21 +1,15 @@
 //! Rounds of the loop: pick, fit, test again.
 
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
 use super::super::candidates::{Candidates, joined};
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{Scan, tries};
 use super::super::smooth_term::SmoothTerm;
-use super::pick::{LEAVING, MOST_REFITTED, Pick, pick};
-use super::retest::{Retested, retest};
+use super::pick::{Pick, pick};
 use crate::identify::{ErrorSummary, IdentifyError, Options};
 use crate::problem::{Effect, Problem};
-
-/// Rounds after which the loop ends whatever is left.
-const MOST_ROUNDS: usize = 24;
-/// Steps of a fit to so many poses before the last: what curved valleys still hide decides nothing.
-const FEW_STEPS: u64 = 4;
-/// Rivals that are fitted to decide between them.
-const MOST_RIVALS: usize = 5;
 
 /// One round of the loop.
 #[derive(Debug, Clone)]
@@ -28,6 +22,13 @@ pub struct Round {
     pub held_out: ErrorSummary,
 }
 
+/// An effect of a fit, and the probability that it is none.
+#[derive(Debug, Clone)]
+pub(super) struct Retested {
+    pub effect: Effect,
+    pub p: f64,
+}
+
 /// The rounds of one loop.
 pub(super) struct Rounds<'a> {
     pub data: &'a Data<'a>,
@@ -36,12 +37,18 @@ pub(super) struct Rounds<'a> {
     pub declared: Vec<Effect>,
     /// Smooth structure that is known of and kept out of the search.
     pub smooth_terms: Vec<SmoothTerm>,
-    pub steps: Vec<Round>,
+    /// What each round came to.
+    pub done: Vec<Round>,
     /// Sets of effects that were fitted.
-    pub seen: Vec<Vec<String>>,
+    seen: Vec<Vec<Effect>>,
 }
 
-impl Rounds<'_> {
+impl<'a> Rounds<'a> {
+    /// None yet.
+    pub fn new(data: &'a Data<'a>, options: &'a Options, declared: Vec<Effect>) -> Self {
+        Self { data, options, declared, smooth_terms: Vec::new(), done: Vec::new(), seen: Vec::new() }
+    }
+
     /// Effects that the loop added.
     pub fn added(&self, fitted: &Fitted) -> Vec<Effect> {
         let declared: Vec<Effect> = self.declared.iter().flat_map(Effect::parts).collect();
@@ -53,27 +60,30 @@ impl Rounds<'_> {
     /// Adds effects until none stands out.
     pub fn run(&mut self, mut fitted: Fitted) -> Result<Fitted, IdentifyError> {
         self.is_new(&fitted);
-        while self.steps.len() < MOST_ROUNDS {
+        while self.done.len() < self.data.rules.rounds {
             let candidates = Candidates::of(&fitted.problem, self.data);
             let picks = {
-                let library = fitted.library(self.data, &candidates.testable, &self.smooth_terms);
-                let linear = fitted.linear(&library, &[], &self.smooth_terms);
-                pick(&mut Scan::new(&library, linear, candidates.testable), self.data)
+                let linearised = fitted.linearised(self.data, &candidates.testable, &self.smooth_terms);
+                let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
+                let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
+                pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1)
             };
             let Some(next) = self.with(&fitted, &picks)? else { break };
             let next = self.without_insignificant(next)?;
-            if !self.is_new(&next) {
+            if !self.enter(&next) {
                 break;
             }
-            self.note(&next);
             fitted = next;
         }
         Ok(fitted)
     }
 
-    /// Whether there are so many poses that the linear neighbourhood decides.
-    pub fn has_many_poses(&self) -> bool {
-        self.data.rows().len() > MOST_REFITTED
+    /// Fits of as many parameters as this one that the work of a round pays for, one at least.
+    pub fn affordable_fits(&self, fitted: &Fitted) -> usize {
+        let one = self.data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+        let count = (self.data.rules.round_work / one.max(1.0)) as usize;
+        count.max(1)
     }
 
     /// Fits on until it converges, if the rounds stopped before that.
@@ -89,29 +99,41 @@ impl Rounds<'_> {
         Fitted::new(problem, self.data, &from.onwards(self.options))
     }
 
-    /// The same in a few steps where there are many poses.
-    pub fn fit_few(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
-        let max_steps = self.has_many_poses().then_some(FEW_STEPS);
+    /// The same in as many steps as a round pays for.
+    pub fn fit_on(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
+        let paid = self.data.rules.few_steps * self.affordable_fits(from) as u64;
+        let max_steps = Some(self.options.max_steps.map_or(paid, |most| most.min(paid)));
         Fitted::new(problem, self.data, &Options { max_steps, ..from.onwards(self.options) })
+    }
+
+    /// Enters a fit into the story, if its effects were not fitted together before.
+    pub fn enter(&mut self, fitted: &Fitted) -> bool {
+        let new = self.is_new(fitted);
+        if new {
+            self.note(fitted);
+        }
+        new
     }
 
     /// Enters a fit into the story.
     pub fn note(&mut self, fitted: &Fitted) {
         let errors = fitted.found.fitted;
-        self.steps.push(Round {
-            effects: self.added(fitted),
-            identification: errors.identification,
-            held_out: errors.held_out,
-        });
+        let effects = self.added(fitted);
+        self.done.push(Round { effects, identification: errors.identification, held_out: errors.held_out });
+    }
+
+    /// Sets of effects fitted so far may be fitted again.
+    pub fn forget(&mut self) {
+        self.seen.clear();
     }
 
     /// Whether these effects were not fitted together before.
-    pub fn is_new(&mut self, fitted: &Fitted) -> bool {
-        let mut state: Vec<String> = fitted.effects().iter().map(|effect| format!("{effect:?}")).collect();
-        state.sort();
-        let new = !self.seen.contains(&state);
+    fn is_new(&mut self, fitted: &Fitted) -> bool {
+        let effects = fitted.effects();
+        let is_same = |seen: &Vec<Effect>| seen.len() == effects.len() && effects.iter().all(|own| seen.contains(own));
+        let new = !self.seen.iter().any(is_same);
         if new {
-            self.seen.push(state);
+            self.seen.push(effects);
         }
         new
     }
@@ -119,17 +141,18 @@ impl Rounds<'_> {
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        self.fit_few(fitted.with_effects(&effects), fitted)
+        self.fit_on(fitted.with_effects(&effects), fitted)
     }
 
-    /// The problem fitted with what was picked; among rivals the one that fits best.
+    /// The problem fitted with what was picked; among the best of the rivals of a single pick the one that fits best.
     fn with(&self, fitted: &Fitted, picks: &[Pick]) -> Result<Option<Fitted>, IdentifyError> {
         let present = self.added(fitted);
+        let rivals = self.data.rules.rivals.min(self.affordable_fits(fitted) - 1);
         match picks {
             [] => Ok(None),
-            [Pick { effect, rivals }] if !rivals.is_empty() && !self.has_many_poses() => {
+            [Pick { effect, rivals: others }] if !others.is_empty() && rivals > 0 => {
                 let mut best: Option<(f64, Fitted)> = None;
-                for candidate in std::iter::once(effect).chain(rivals.iter().take(MOST_RIVALS)) {
+                for candidate in std::iter::once(effect).chain(others.iter().take(rivals)) {
                     let next = self.fit(fitted, &joined(&present, candidate))?;
                     let criterion = self.criterion(&next, candidate);
                     if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
@@ -145,27 +168,29 @@ impl Rounds<'_> {
         }
     }
 
-    /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect that was picked.
+    /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect
+    /// that was picked.
     fn criterion(&self, fitted: &Fitted, picked: &Effect) -> f64 {
-        let library = fitted.library(self.data, &[], &self.smooth_terms);
-        let linear = fitted.linear(&library, &[], &self.smooth_terms);
+        let linearised = fitted.linearised(self.data, &[], &self.smooth_terms);
+        let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
         let candidates = Candidates::of(&fitted.problem, self.data).testable;
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
-        let rows = linear.rows() as f64;
-        let squares = linear.sums().squares.ln() + 2.0 * fitted.sigma.ln();
+        let rows = fit.rows() as f64;
+        let squares = fit.sums().squares.ln() + 2.0 * fitted.sigma.ln();
         rows * squares + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
     }
 
-    /// The same without the effects that have lost their significance.
+    /// The same without the effects that have lost their significance: one by one, for what one loses another may gain, or
+    /// as many at once as bring it down to what a round pays for.
     pub fn without_insignificant(&self, mut fitted: Fitted) -> Result<Fitted, IdentifyError> {
         loop {
             let added = self.added(&fitted);
+            let level = self.data.rules.leaving_level;
             let mut leaving: Vec<Retested> =
-                self.tested(&fitted).into_iter().filter(|tested| tested.p >= LEAVING).collect();
+                self.tested(&fitted).into_iter().filter(|tested| tested.p >= level).collect();
             leaving.sort_by(|a, b| b.p.total_cmp(&a.p));
-            // One by one, for what one loses another may gain; with many poses all at once.
-            leaving.truncate(if self.has_many_poses() { leaving.len() } else { 1 });
+            leaving.truncate(leaving.len().div_ceil(self.affordable_fits(&fitted)));
             if leaving.is_empty() {
                 return Ok(fitted);
             }
@@ -180,19 +205,26 @@ impl Rounds<'_> {
         self.test(fitted, self.added(fitted).iter().flat_map(Effect::parts).collect())
     }
 
-    /// Effects of a fit with their p, corrected for the tries: those of all orders of a harmonic together.
+    /// Effects of a fit with the p of what it would lose without each, corrected for the tries: those of all orders of a
+    /// harmonic together.
     pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
-        let library = fitted.library(self.data, &[], &self.smooth_terms);
+        let linearised = fitted.linearised(self.data, &[], &self.smooth_terms);
+        let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
         let mut everything = Candidates::of(&fitted.problem, self.data).testable;
         let first = everything.len();
         everything.extend(own.iter().flat_map(Effect::parts));
-        let (tries, families) = tries(&everything);
-        let mut tries = tries[first..].iter();
-        let mut tested = retest(fitted, &library, &self.smooth_terms, own);
-        for tested in &mut tested {
-            let own: f64 = tries.by_ref().take(tested.effect.parts().len()).sum();
-            tested.p = (tested.p * own * families as f64).min(1.0);
-        }
-        tested
+        let (all_tries, families) = tries(&everything);
+        let mut all_tries = all_tries[first..].iter();
+        let freedom = fit.sums().freedom();
+        let test = |effect: Effect| {
+            let tries: f64 = all_tries.by_ref().take(effect.parts().len()).sum();
+            let k = fitted.parameters_of(&effect).len() as f64;
+            let lost = fit.loss_without(&fitted.unknowns_of(&effect));
+            let chance = FisherSnedecor::new(k, freedom).ok().zip(lost).map_or(1.0, |(chance, lost)| {
+                chance.sf(lost / k / (fit.sums().squares / freedom)).max(f64::MIN_POSITIVE)
+            });
+            Retested { effect, p: (chance * tries * families as f64).min(1.0) }
+        };
+        own.into_iter().map(test).collect()
     }
 }

@@ -11,11 +11,11 @@ use crate::problem::{Effect, Problem};
 
 /// Poses linearised together.
 const CHUNK: usize = 256;
-/// Mass at which the place of an added mass is differentiated: without any, the place does not matter [kg].
-const PROBE_MASS: f64 = 1e-4;
+/// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a one changes nothing else.
+const TRACE_OF_MASS: f64 = 1e-4;
 
 /// A model linearised with every place where effects may enter.
-pub(crate) struct Library<'a> {
+pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
     poses: Vec<Pose<'a>>,
     places: Vec<(Slot, usize)>,
@@ -23,11 +23,11 @@ pub(crate) struct Library<'a> {
     jacobian: DMatrix<f64>,
     residual: DVector<f64>,
     fitted: usize,
-    /// σ of the priors of what is let go: the columns behind those of the fitted parameters.
-    let_go: Vec<Option<f64>>,
+    /// σ of the priors of what the problem holds equal and may differ here: the columns behind those of the fitted parameters.
+    relaxed: Vec<Option<f64>>,
 }
 
-impl<'a> Library<'a> {
+impl<'a> Linearised<'a> {
     /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects and other places
     /// given.
     pub fn new(
@@ -44,7 +44,7 @@ impl<'a> Library<'a> {
                 slots.push((slot, nominal));
             }
         }
-        // Stiffnesses that the problem holds equal are let go: that they differ is no effect of any other kind.
+        // Bending stiffnesses about y and z that the problem holds equal may differ: that they do is no effect of another kind.
         let shared = |&k: &usize| match model.parameters[k].slot {
             Slot::Beam { joint, field: BeamField::Bending } => {
                 let slot = Slot::Beam { joint, field: BeamField::Anisotropy };
@@ -53,14 +53,14 @@ impl<'a> Library<'a> {
             _ => None,
         };
         let shared: Vec<(Slot, Option<f64>)> = unknowns.iter().filter_map(shared).collect();
-        let let_go: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
+        let relaxed: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
         slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
         let first = model.parameters.len();
         let probing = model.probing(&slots);
         let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
         for (index, (slot, _)) in slots.iter().enumerate() {
             if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {
-                at[first + index] = PROBE_MASS;
+                at[first + index] = TRACE_OF_MASS;
             }
         }
         let all: Vec<usize> = unknowns.iter().copied().chain(first..first + slots.len()).collect();
@@ -70,17 +70,17 @@ impl<'a> Library<'a> {
         let (_, residual) = linearise(&plain, &DVector::zeros(0));
         let fitted = unknowns.len();
         let places = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index)).collect();
-        Self { problem, poses, places, jacobian, residual, fitted, let_go }
+        Self { problem, poses, places, jacobian, residual, fitted, relaxed }
     }
 
-    /// Columns of the fitted parameters and of what is let go beside them, shape = (3 N, n).
+    /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
     pub fn fitted(&self) -> DMatrix<f64> {
-        self.jacobian.columns(0, self.fitted + self.let_go.len()).into_owned()
+        self.jacobian.columns(0, self.fitted + self.relaxed.len()).into_owned()
     }
 
-    /// σ of the priors of what is let go, in the order of its columns.
-    pub fn let_go(&self) -> &[Option<f64>] {
-        &self.let_go
+    /// σ of the priors of what is relaxed, in the order of its columns.
+    pub fn relaxed(&self) -> &[Option<f64>] {
+        &self.relaxed
     }
 
     /// Whitened residual, 3 N.

@@ -1,0 +1,61 @@
+//! Parts of the data predicted from the rest, for many priors: normal equations of each part.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::orthonormal::RANK;
+
+/// JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
+struct Squares {
+    gram: DMatrix<f64>,
+    product: DVector<f64>,
+    residual: f64,
+    rows: usize,
+}
+
+impl Squares {
+    fn of(columns: &DMatrix<f64>, residual: &DVector<f64>, poses: &[usize]) -> Self {
+        let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
+        let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));
+        Self { gram: j.transpose() * &j, product: j.tr_mul(&r), residual: r.norm_squared(), rows: rows.len() }
+    }
+}
+
+/// All poses of a fit in sums, and the parts that are left out in turn.
+pub(in crate::diagnose) struct PartSquares {
+    whole: Squares,
+    parts: Vec<Squares>,
+}
+
+impl PartSquares {
+    /// Of columns, shape = (3 N, n), and the residual; `parts` are numbers of poses.
+    pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
+        let every: Vec<usize> = (0..residual.len() / 3).collect();
+        let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();
+        Self { whole: Squares::of(columns, residual, &every), parts }
+    }
+
+    /// Σ rows · ln(mean square) of the parts, each predicted from the others; the first unknowns have these values and 1 σ of
+    /// their priors about 0. `None` where the others do not decide the fit.
+    ///
+    /// Directions that no pose sees stay where they are: to the diagonal comes (RANK)² of each column's length².
+    pub fn left_out(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
+        let predicted = |part: &Squares| {
+            let mut normal = &self.whole.gram - &part.gram;
+            let mut pull = &self.whole.product - &part.product;
+            for j in 0..pull.len() {
+                normal[(j, j)] += RANK * RANK * self.whole.gram[(j, j)] + f64::MIN_POSITIVE;
+            }
+            for (j, (x, sigma)) in priors.iter().enumerate() {
+                let weight = sigma.map_or(0.0, |sigma| sigma.powi(-2));
+                normal[(j, j)] += weight;
+                pull[j] += weight * x;
+            }
+            let step = -normal.cholesky()?.solve(&pull);
+            let squares = part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
+            Some(part.rows as f64 * (squares / part.rows as f64).ln())
+        };
+        let all: Option<Vec<f64>> = self.parts.par_iter().map(predicted).collect();
+        all.map(|all| all.iter().sum()).filter(|sum: &f64| sum.is_finite())
+    }
+}

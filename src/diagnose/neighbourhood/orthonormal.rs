@@ -1,0 +1,97 @@
+//! Orthonormal bases of columns, and the one rule that says how many directions they have.
+
+use nalgebra::DMatrix;
+
+/// A column is a direction of its own where those before it leave more than this part of its length.
+///
+/// Products of columns are exact to some 1e-15 of their lengths, so that what is left of a length² is known to some 1e-14:
+/// below 1e-12, (this part)², it is rounding.
+pub(crate) const RANK: f64 = 1e-6;
+
+/// Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank): columns that are not finite, or that those before
+/// them take up, have no part in it. `lengths` are those that a column had before others were projected out.
+///
+/// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are directions of their own.
+pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let n = columns.ncols();
+    let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
+    let (kept, first) = independent(columns, &own, lengths.unwrap_or(&own));
+    let mut basis = columns.select_columns(&kept);
+    let mut within = DMatrix::zeros(n, kept.len());
+    for (k, &j) in kept.iter().enumerate() {
+        basis.column_mut(k).unscale_mut(own[j]);
+        within[(j, k)] = own[j].recip();
+    }
+    let inverse = turning(&first).unwrap_or_default();
+    basis *= &inverse;
+    within *= inverse;
+    // Once more, for what rounding left.
+    let again = (basis.transpose() * &basis).cholesky().and_then(|factor| turning(&factor.l()));
+    let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
+    (basis * &again, within * again)
+}
+
+/// L⁻ᵀ, which takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+fn turning(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let identity = DMatrix::identity(lower.nrows(), lower.nrows());
+    Some(lower.solve_lower_triangular(&identity)?.transpose())
+}
+
+/// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
+fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
+    let gram = columns.transpose() * columns;
+    let mut kept: Vec<usize> = Vec::new();
+    let mut factor: Vec<Vec<f64>> = Vec::new();
+    for j in (0..columns.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {
+        let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
+        for (&k, known) in kept.iter().zip(&factor) {
+            let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
+            let value = (gram[(k, j)] / (own[k] * own[j]) - along) / known[row.len()];
+            row.push(value);
+        }
+        let left = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
+        if left.max(0.0).sqrt() * own[j] > RANK * lengths[j] {
+            row.push(left.sqrt());
+            factor.push(row);
+            kept.push(j);
+        }
+    }
+    let lower = DMatrix::from_fn(kept.len(), kept.len(), |i, j| if j <= i { factor[i][j] } else { 0.0 });
+    (kept, lower)
+}
+
+/// Z with A D⁻¹ Z = 0 and ZᵀZ = I for the rows A of active constraints, shape = (constraints, n), and the scale D of the
+/// unknowns; `None` where nothing holds them.
+pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
+    let mut rows = DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
+    if rows.iter().all(|coefficient| *coefficient == 0.0) {
+        return None;
+    }
+    for mut row in rows.row_iter_mut() {
+        let length = row.norm();
+        if length > 0.0 {
+            row /= length;
+        }
+    }
+    let eigen = (rows.transpose() * &rows).symmetric_eigen();
+    let left: Vec<usize> = (0..active.ncols()).filter(|&k| eigen.eigenvalues[k] < RANK * RANK).collect();
+    Some(eigen.eigenvectors.select_columns(&left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_open_keeps_every_constraint() {
+        // The third row follows from the others, the last says nothing.
+        let active = DMatrix::from_row_slice(4, 4, &[1., -1., 0., 0., 0., 0., 2., 0., 1., -1., 2., 0., 0., 0., 0., 0.]);
+        let scale = [10.0, 1.0, 1e-3, 5.0];
+        let left = open(&active, &scale).unwrap_or_default();
+        assert_eq!(left.shape(), (4, 2));
+        assert!((left.transpose() * &left - DMatrix::identity(2, 2)).amax() < 1e-14);
+        let moved = DMatrix::from_fn(4, 2, |j, k| left[(j, k)] / scale[j]);
+        assert!((active * moved).amax() < 1e-12);
+        assert_eq!(open(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
+    }
+}

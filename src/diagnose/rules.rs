@@ -1,0 +1,150 @@
+//! Every number of the search for what a model lacks, in one place; docs/selection.md has them with the same words.
+
+use std::ops::RangeInclusive;
+
+/// What decides which effects are found and what is said of them.
+///
+/// Parts are parts of 1, criteria are differences of ν ln(squares) + k ln ν + 2 ln(tries), −2 ln of the odds [Schwarz 1978].
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SelectionRules {
+    /// Probability that noise alone points to any effect, and that it makes any residual test fail. One false alarm in a
+    /// hundred data sets is rare enough to be looked into.
+    pub level: f64,
+    /// Corrected p above which an effect leaves again: larger than `level`, so that no effect goes to and fro at the border.
+    pub leaving_level: f64,
+    /// Criterion by which one explanation must be better than another to be beyond doubt: odds of 20 to 1 [Kass and Raftery 1995].
+    pub beyond_doubt: f64,
+    /// Criterion up to which candidates behind the best are its rivals: odds of 150 to 1, very strong in [Kass and Raftery 1995].
+    pub rival: f64,
+    /// Corrected p below which an effect whose rivals are of its own family needs no fit before the next is looked for.
+    pub overwhelming: f64,
+    /// Part of what an effect explains from which on another explains as much, where structure is left: then residuals are no
+    /// independent noise, and small differences are no evidence.
+    pub as_much: f64,
+    /// Standard errors below zero from which on what is never negative is impossible: one in 700 for normal errors.
+    pub impossible: f64,
+    /// Part of its columns' length that must be new for a candidate to be seen at all; with less, the fitted parameters take it
+    /// up within what the linear neighbourhood describes.
+    pub absorbed: f64,
+    /// Scatter in units of a declared σ below which the residual is rounding and nothing is sought in it.
+    pub rounding: f64,
+    /// Work that the fits of one round may take, in poses × parameters² of all of them together: what it does not pay for is
+    /// decided in the linear neighbourhood. About 0.1 s for each step of all fits on one core.
+    pub round_work: f64,
+    /// Rivals that are fitted at most to decide between them.
+    pub rivals: usize,
+    /// Candidates, best first, that may fail the cross-validation before a round adds nothing.
+    pub validated: usize,
+    /// Effects that one round adds at most.
+    pub picks: usize,
+    /// Rounds after which the search ends whatever is left.
+    pub rounds: usize,
+    /// Effects that are exchanged for better ones at most, once no round adds any.
+    pub exchanges: usize,
+    /// Steps of a fit that the work of a round does not pay for; the last fit converges in any case.
+    pub few_steps: u64,
+    /// Blocks of the cross-validation: ten-fold, as usual [Hastie, Tibshirani and Friedman 2009, section 7.10].
+    pub blocks: usize,
+    /// Poses that a station shift must leave on either side.
+    pub least_side: usize,
+    /// Times of a station shift that are tried at most.
+    pub shift_times: usize,
+    /// Coefficients of harmonics from which on they share one prior, whose scale so many can tell.
+    pub many_coefficients: usize,
+    /// Orders of a joint from which on all up to the highest of them are put in under that prior.
+    pub several_orders: usize,
+    /// Parts of each joint's range that are left out in turn to find the prior's scale.
+    pub range_parts: usize,
+    /// Scales of the prior that are tried, as powers of two of the root mean square of the coefficients found.
+    pub prior_scales: RangeInclusive<i32>,
+    /// Numbers of intervals of the splines that are tried as smooth terms.
+    pub spline_intervals: [usize; 3],
+    /// Poses per spline function at least.
+    pub poses_per_spline: usize,
+    /// Centres of a single bump or step along the range.
+    pub shape_centres: u32,
+    /// Widths of a single bump or step as parts of the range.
+    pub shape_widths: [f64; 5],
+    /// First and last step of the search for a shape, as parts of its width.
+    pub shape_steps: (f64, f64),
+    /// Places and quantities, those where splines find most, that are looked at for single bumps and steps.
+    pub promising: usize,
+    /// Bumps and steps whose centre and width are fitted.
+    pub refined: usize,
+    /// Poses, taken evenly, that are enough to find the place of a smooth term.
+    pub placing_poses: usize,
+    /// Part of their rms error to which a correction must take poses that were left out to be worth stating.
+    pub worthwhile: f64,
+    /// Entries of a ranking.
+    pub ranked: usize,
+    /// Entries of a ranking whose look-alikes and cross-validation are worked out.
+    pub looked_at: usize,
+    /// Largest principal angle [rad] at which two effects are look-alikes: 20°.
+    pub alike: f64,
+    /// Poses among which one is sought that tells two look-alikes apart.
+    pub telling_poses: usize,
+    /// Probability with which an effect of the stated size is found, in `check` and `plan`: 0.8, as usual [Cohen 1988].
+    pub power: f64,
+    /// Seconds between poses whose times nobody knows yet.
+    pub time_step: f64,
+    /// Resamples of the interval of the gain.
+    pub resamples: usize,
+    /// Part of the resamples within that interval.
+    pub covered: f64,
+    /// Seed of what is random: blocks, permutations, resamples, telling poses.
+    pub seed: u64,
+}
+
+impl SelectionRules {
+    /// The rules that commands use.
+    pub const DEFAULT: Self = Self {
+        level: 0.01,
+        leaving_level: 0.05,
+        beyond_doubt: 6.0,
+        rival: 10.0,
+        overwhelming: 1e-12,
+        as_much: 0.9,
+        impossible: 3.0,
+        absorbed: 1e-4,
+        rounding: 1e-3,
+        round_work: 1e7,
+        rivals: 5,
+        validated: 8,
+        picks: 100,
+        rounds: 24,
+        exchanges: 4,
+        few_steps: 4,
+        blocks: 10,
+        least_side: 3,
+        shift_times: 200,
+        many_coefficients: 20,
+        several_orders: 3,
+        range_parts: 5,
+        prior_scales: -8..=2,
+        spline_intervals: [3, 5, 8],
+        poses_per_spline: 3,
+        shape_centres: 16,
+        shape_widths: [0.04, 0.07, 0.12, 0.2, 0.35],
+        shape_steps: (0.4, 0.02),
+        promising: 12,
+        refined: 4,
+        placing_poses: 1000,
+        worthwhile: 0.95,
+        ranked: 20,
+        looked_at: 8,
+        alike: 0.35,
+        telling_poses: 400,
+        power: 0.8,
+        time_step: 60.0,
+        resamples: 2000,
+        covered: 0.95,
+        seed: 20_211_206,
+    };
+}
+
+impl Default for SelectionRules {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
