@@ -207,6 +207,9 @@ impl LinearNeighbourhood {
 
     /// The same of several sets of columns, multiplied together.
     pub fn scores(&self, sets: &[DMatrix<f64>]) -> Vec<Score> {
+        if sets.is_empty() {
+            return Vec::new();
+        }
         let columns = DMatrix::from_columns(&sets.iter().flat_map(DMatrix::column_iter).collect::<Vec<_>>());
         // The narrow side is transposed: this is the product that is fast.
         let along = (columns.transpose() * self.basis.rows(0, self.rows)).transpose();

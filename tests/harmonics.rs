@@ -1,4 +1,5 @@
-//! Joints with waves of many orders, measured over part of their turn: all orders, one prior, and no harm where nothing was measured.
+//! Joints with harmonics of many orders: all orders, one prior, no harm where nothing was measured; and as much is found from any
+//! number of poses in any order.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -9,12 +10,13 @@ use std::path::Path;
 
 use common::arms::parse;
 use common::made::{normal, predicted};
-use flexcal::diagnose::{HARMONICS, close};
+use flexcal::diagnose::{HARMONICS, Verdict, close};
 use flexcal::identify::{Identification, Options};
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, EffectDeclaration, Freedom, Problem};
 use flexcal::simulate::{Truth, simulate};
+use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -103,4 +105,52 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     assert!(after < before);
     assert!(closure.after.is_trusted(), "{:?}", closure.after.distrust);
     assert!(closure.effects.iter().all(|found| found.p_value < 0.05), "{:?}", closure.effects);
+}
+
+/// Two joints, each with twelve harmonics, and little else.
+fn two_joints() -> Problem {
+    parse(
+        "name = 'two joints'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\n[tool]\ntarget_m = [0.5, 0.05, 0.0]\n\
+         [parameters]\n'joint*.theta' = { sigma_deg = 0.5 }\n[data]\nposition_sigma_mm = 0.05\n",
+    )
+}
+
+/// The verdict and the effects by name, place and orders, on the first `identification` rows; the last hundred are held out.
+fn found(problem: &Problem, measured: &Measurements, identification: Vec<usize>) -> (Verdict, Vec<Effect>) {
+    let held_out = (measured.len() - 100..measured.len()).collect();
+    let data = Dataset::new(measured.clone(), Split { identification, held_out });
+    let closed = close(problem, &data, &Options::default()).unwrap();
+    let mut effects: Vec<Effect> = closed.effects.into_iter().map(|found| found.effect).collect();
+    effects.sort_by_key(|effect| format!("{effect:?}"));
+    (closed.verdict, effects)
+}
+
+#[test]
+fn the_number_and_the_order_of_poses_decide_nothing() {
+    let problem = two_joints();
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut text = "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
+                    [poses]\nq1_deg = [-150, 150]\nq2_deg = [-75, 75]\n"
+        .to_owned();
+    let orders: Vec<u32> = (1..=12).collect();
+    for joint in 1..=2 {
+        writeln!(text, "[[effect]]\njoint-harmonic = {{ joint = {joint}, orders = {orders:?} }}").unwrap();
+        for order in &orders {
+            let [sine, cosine] = [0.1 * normal(&mut random), 0.1 * normal(&mut random)];
+            writeln!(text, "sin{order}_deg = {sine}\ncos{order}_deg = {cosine}").unwrap();
+        }
+    }
+    let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &problem).unwrap();
+    let measured = table(&simulate(&problem, &truth, 1110, 4).unwrap().rows);
+    let expected = found(&problem, &measured, (0..1000).collect());
+    assert!(expected.0 == Verdict::Explained && expected.1.len() == 2, "{expected:?}");
+    for (joint, effect) in (1..).zip(&expected.1) {
+        assert!(effect.covers(&Effect::JointHarmonic { joint, orders: orders.clone() }), "{effect:?}");
+    }
+    for poses in [990, 1010] {
+        assert_eq!(found(&problem, &measured, (0..poses).collect()), expected, "{poses} poses");
+    }
+    let mut rows: Vec<usize> = (0..1110).collect();
+    rows[..1000].shuffle(&mut random);
+    assert_eq!(found(&problem, &measured.select(&rows), (0..1000).collect()), expected, "rows in another order");
 }
