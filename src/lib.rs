@@ -53,6 +53,7 @@
 pub mod design;
 pub mod diagnose;
 pub mod error;
+pub mod files;
 pub mod identify;
 pub mod least_squares;
 pub mod measurement;

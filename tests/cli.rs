@@ -95,7 +95,7 @@ fn json_is_all_there_is_on_standard_output_and_quiet_is_quiet() {
     let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
     assert_eq!(json["problem"], "lunar-sampler");
     assert!(bench.path("elsewhere/estimate.json").exists() && !bench.path("out").exists());
-    let assert = bench.identify(&["--quiet"]).success();
+    let assert = bench.identify(&["--quiet", "--out", "out"]).success();
     assert!(assert.get_output().stdout.is_empty() && assert.get_output().stderr.is_empty());
 }
 
@@ -278,6 +278,21 @@ fn a_result_that_cannot_be_written_is_an_error() {
     fs::write(bench.path("drawn/figures"), "").unwrap();
     bench.identify(&["--out", "drawn"]).code(2);
     assert_eq!(fs::read_dir(bench.path("drawn")).unwrap().count(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let bench = Bench::new();
+    let mode = |name: &str| fs::metadata(bench.path(name)).unwrap().permissions().mode() & 0o777;
+    fs::write(bench.path("made"), "").unwrap();
+    bench.identify(&["--quiet", "--out", "out"]).success();
+    assert_eq!(mode("out/estimate.json"), mode("made"), "new");
+    assert_eq!(mode("out/report.html"), mode("made"), "new");
+    fs::set_permissions(bench.path("out/estimate.json"), fs::Permissions::from_mode(0o640)).unwrap();
+    bench.identify(&["--quiet", "--out", "out"]).success();
+    assert_eq!((mode("out/estimate.json"), mode("out/report.html")), (0o640, mode("made")), "older");
 }
 
 #[test]

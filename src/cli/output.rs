@@ -4,6 +4,7 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use flexcal::files;
 use flexcal::report::{Report, is_figure};
 
 /// A result that could not be written.
@@ -43,8 +44,8 @@ pub fn write_report(folder: &Path, texts: &[(&str, &str)], report: &Report) -> R
 }
 
 /// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its place.
-fn keep(files: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
-    for (path, _) in &files {
+fn keep(texts: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
+    for (path, _) in &texts {
         let above = path.ancestors().skip(1).find(|above| above.exists());
         let source = match above {
             _ if path.is_dir() => "a folder of that name is in the way",
@@ -53,9 +54,9 @@ fn keep(files: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
         };
         return Err(WriteError { path: path.clone(), source: io::Error::other(source) });
     }
-    let mut ready = Vec::with_capacity(files.len());
-    for (path, text) in files {
-        match prepared(&path, text) {
+    let mut ready = Vec::with_capacity(texts.len());
+    for (path, text) in texts {
+        match files::prepared(&path, text) {
             Ok(file) => ready.push((file, path)),
             Err(source) => return Err(WriteError { path, source }),
         }
@@ -64,16 +65,6 @@ fn keep(files: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
         file.persist(&path).map_err(|error| WriteError { path, source: error.error })?;
     }
     Ok(())
-}
-
-/// A temporary file with the text in the folder of `path`, which is made if it is not there.
-fn prepared(path: &Path, text: &str) -> io::Result<tempfile::NamedTempFile> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(text.as_bytes())?;
-    file.flush()?;
-    Ok(file)
 }
 
 /// Removes figures from a folder that are not on the page; files that are no figures of flexcal stay.

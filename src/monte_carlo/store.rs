@@ -1,6 +1,6 @@
 //! Finished parts on disk: one small file each, written whole or not at all.
 
-use std::io::{self, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::{fs, mem};
 
@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::part::Part;
 use super::plan::Campaign;
 use super::tally::Tally;
+use crate::files::prepared;
 
 /// Digits of the key that name a part's file.
 const NAME: usize = 16;
@@ -77,10 +78,7 @@ impl Store {
     pub(super) fn keep(&self, kept: &Kept) -> Result<(), StoreError> {
         let path = self.path(&kept.key);
         let write = || {
-            fs::create_dir_all(&self.folder)?;
-            let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
-            file.write_all(serde_json::to_string_pretty(kept)?.as_bytes())?;
-            file.flush()?;
+            let file = prepared(&path, &serde_json::to_string_pretty(kept)?)?;
             file.persist(&path).map(mem::drop).map_err(|error| error.error)
         };
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })

@@ -20,6 +20,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("quantity", &[]),
     ("spatial", &[&["scalar"]]),
     ("error", &[]),
+    // Files written whole or not at all.
+    ("files", &[]),
     ("problem", &[&["quantity", "error", "spatial"]]),
     ("measurement", &[&["quantity", "error", "problem"]]),
     // Least squares knows no arms.
@@ -35,9 +37,12 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // Which poses to measure, and what they will tell.
     ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),
     // Many fits to what model or rig measure.
-    ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate"]]),
+    ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate", "files"]]),
     ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo"]]),
-    ("cli", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate"]]),
+    (
+        "cli",
+        &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "files"]],
+    ),
     (
         "main",
         &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "cli"]],
