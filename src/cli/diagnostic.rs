@@ -26,9 +26,27 @@ pub fn print(error: &(dyn Error + 'static)) {
             Some(DesignError::Input(input)) => Some(input),
             _ => None,
         });
-    match input {
-        Some(input) => show(Level::ERROR, &input.to_string(), Some(&input.location)),
-        None => show(Level::ERROR, &with_causes(error), None),
+    if let Some(input) = input {
+        show(Level::ERROR, &input.to_string(), Some(&input.location));
+    } else {
+        let flagged = error.downcast_ref().and_then(by_arguments);
+        show(Level::ERROR, &flagged.unwrap_or_else(|| with_causes(error)), None);
+    }
+}
+
+/// An error of a design in terms of the arguments that bring it about, where it is about one.
+fn by_arguments(error: &DesignError) -> Option<String> {
+    match error {
+        DesignError::NoRange { .. } => Some(format!(
+            "{error}, or name a TRUTH.toml with --truth whose [poses] say where to draw, or a table of poses with --candidates"
+        )),
+        DesignError::TooFewCandidates { poses, candidates } => {
+            Some(format!("--poses {poses}: there are only {candidates} candidates"))
+        }
+        DesignError::SameEffect { .. } | DesignError::DeclaredEffect { .. } | DesignError::FollowsTime { .. } => {
+            Some(format!("--separate: {error}"))
+        }
+        _ => None,
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::error::Error;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::identify::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, PlotData};
 
@@ -20,63 +21,23 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Which parameters are fitted together
-    #[arg(long, value_enum, default_value_t = StrategyArgument::Joint)]
-    strategy: StrategyArgument,
+    #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = words(Strategy::EACH, Strategy::as_str, Strategy::summary))]
+    strategy: Strategy,
     /// By which solver; auto keeps bounds and constraints where there are any
-    #[arg(long, value_enum, default_value_t = SolverArgument::Auto)]
-    solver: SolverArgument,
+    #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
+    solver: SolverChoice,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum StrategyArgument {
-    /// Everything at once
-    Joint,
-    /// Stiffness, then geometry, repeated until it settles
-    Sequential,
-    /// Stiffness, then geometry, once: the paper's order
-    SequentialOneSweep,
-    /// Geometry; stiffnesses stay nominal
-    GeometryOnly,
-    /// Stiffnesses; geometry stays nominal
-    StiffnessOnly,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SolverArgument {
-    /// Bounded where there are bounds or constraints, else levenberg-marquardt
-    Auto,
-    /// Levenberg-Marquardt without bounds
-    LevenbergMarquardt,
-    /// Gauss-Newton: undamped steps
-    GaussNewton,
-    /// Undamped steps by a truncated pseudo-inverse, as in the paper
-    PseudoInverse,
-    /// Levenberg-Marquardt within the bounds of [parameters] and every [[constraint]]
-    Bounded,
-}
-
-impl From<StrategyArgument> for Strategy {
-    fn from(argument: StrategyArgument) -> Self {
-        match argument {
-            StrategyArgument::Joint => Self::Joint,
-            StrategyArgument::Sequential => Self::Sequential,
-            StrategyArgument::SequentialOneSweep => Self::OneSweep,
-            StrategyArgument::GeometryOnly => Self::GeometryOnly,
-            StrategyArgument::StiffnessOnly => Self::StiffnessOnly,
-        }
-    }
-}
-
-impl From<SolverArgument> for SolverChoice {
-    fn from(argument: SolverArgument) -> Self {
-        match argument {
-            SolverArgument::Auto => Self::Auto,
-            SolverArgument::LevenbergMarquardt => Self::LevenbergMarquardt,
-            SolverArgument::GaussNewton => Self::GaussNewton,
-            SolverArgument::PseudoInverse => Self::PseudoInverse,
-            SolverArgument::Bounded => Self::Bounded,
-        }
-    }
+/// Words of an argument, each with what it stands for.
+fn words<T: Copy + Send + Sync + 'static, const N: usize>(
+    each: [T; N],
+    name: fn(T) -> &'static str,
+    summary: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    let values = each.map(|value| PossibleValue::new(name(value)).help(summary(value)));
+    PossibleValuesParser::new(values).try_map(move |word| {
+        each.into_iter().find(|&value| name(value) == word).ok_or_else(|| format!("{word} stands for nothing"))
+    })
 }
 
 /// Identifies, writes `estimate.json`, `report.md` and `report.html`, and prints the table.
@@ -85,8 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Input { problem, data } = common.read()?;
     let line = common.talks().then(Line::new);
     let options = Options::default()
-        .with_strategy(arguments.strategy.into())
-        .with_solver(arguments.solver.into())
+        .with_strategy(arguments.strategy)
+        .with_solver(arguments.solver)
         .with_progress(line.as_ref().map(Line::sink));
     let result = identify::identify(&problem, &data, &options);
     if let Some(line) = line {

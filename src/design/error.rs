@@ -6,15 +6,13 @@ use crate::error::{InputError, Location};
 
 /// Why there is no plan and no forecast.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DesignError {
     /// Problem and poses do not fit each other.
     #[error(transparent)]
     Input(#[from] InputError),
     /// A joint may go anywhere.
-    #[error(
-        "{location}.{end}_{unit}: missing; write min_{unit} and max_{unit} of every moving joint, or name a TRUTH.toml \
-         with --truth whose [poses] say where to draw, or a table of poses with --candidates"
-    )]
+    #[error("{location}.{end}_{unit}: missing; write min_{unit} and max_{unit} of every moving joint")]
     NoRange {
         /// The joint in the problem file.
         location: Box<Location>,
@@ -42,7 +40,7 @@ pub enum DesignError {
     #[error("no pose to plan or to judge")]
     NoPoses,
     /// Fewer candidates than poses.
-    #[error("--poses {poses}: there are only {candidates} candidates")]
+    #[error("{poses} poses: there are only {candidates} candidates")]
     TooFewCandidates {
         /// Poses asked for.
         poses: usize,
@@ -50,19 +48,19 @@ pub enum DesignError {
         candidates: usize,
     },
     /// Two effects that are one.
-    #[error("--separate: both effects are the same: {effect}")]
+    #[error("both effects are the same: {effect}")]
     SameEffect {
         /// In words.
         effect: String,
     },
     /// An effect that the problem has.
-    #[error("--separate: the problem declares this effect already: {effect}")]
+    #[error("the problem declares this effect already: {effect}")]
     DeclaredEffect {
         /// In words.
         effect: String,
     },
     /// An effect that no choice of poses shows.
-    #[error("--separate: an effect of time is told by when poses are measured, not by which: {effect}")]
+    #[error("an effect of time is told by when poses are measured, not by which: {effect}")]
     FollowsTime {
         /// In words.
         effect: String,

@@ -40,15 +40,36 @@ impl Strategy {
     pub const EACH: [Self; 5] =
         [Self::Joint, Self::Sequential, Self::OneSweep, Self::GeometryOnly, Self::StiffnessOnly];
 
-    /// Name on the command line and in results.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Joint => "joint",
-            Self::Sequential => "sequential",
-            Self::OneSweep => "sequential-one-sweep",
-            Self::GeometryOnly => "geometry-only",
-            Self::StiffnessOnly => "stiffness-only",
+    /// Their names.
+    pub const NAMES: [&str; Self::EACH.len()] = {
+        let mut names = [""; Self::EACH.len()];
+        let mut k = 0;
+        while k < names.len() {
+            names[k] = Self::EACH[k].as_str();
+            k += 1;
         }
+        names
+    };
+
+    /// Name in results, files and arguments, and what it does in a few words.
+    const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Joint => ("joint", "Everything at once"),
+            Self::Sequential => ("sequential", "Stiffness, then geometry, repeated until it settles"),
+            Self::OneSweep => ("sequential-one-sweep", "Stiffness, then geometry, once: the paper's order"),
+            Self::GeometryOnly => ("geometry-only", "Geometry; stiffnesses stay nominal"),
+            Self::StiffnessOnly => ("stiffness-only", "Stiffnesses; geometry stays nominal"),
+        }
+    }
+
+    /// Name in results, files and arguments.
+    pub const fn as_str(self) -> &'static str {
+        self.words().0
+    }
+
+    /// What it does, in a few words.
+    pub const fn summary(self) -> &'static str {
+        self.words().1
     }
 
     /// The stages of one sweep, each as a choice of parameters; bases and targets take part in every stage.
@@ -68,16 +89,42 @@ impl Strategy {
 impl SolverChoice {
     /// Every solver.
     pub const EACH: [Self; 4] = [Self::LevenbergMarquardt, Self::GaussNewton, Self::PseudoInverse, Self::Bounded];
+    /// Every choice: a solver, or what fits the problem.
+    pub const CHOICES: [Self; 5] =
+        [Self::Auto, Self::LevenbergMarquardt, Self::GaussNewton, Self::PseudoInverse, Self::Bounded];
 
-    /// Name on the command line and in results.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::LevenbergMarquardt => "levenberg-marquardt",
-            Self::GaussNewton => "gauss-newton",
-            Self::PseudoInverse => "pseudo-inverse",
-            Self::Bounded => "bounded",
+    /// Their names.
+    pub const NAMES: [&str; Self::CHOICES.len()] = {
+        let mut names = [""; Self::CHOICES.len()];
+        let mut k = 0;
+        while k < names.len() {
+            names[k] = Self::CHOICES[k].as_str();
+            k += 1;
         }
+        names
+    };
+
+    /// Name in results, files and arguments, and what it does in a few words.
+    const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Auto => ("auto", "Bounded where there are bounds or constraints, else levenberg-marquardt"),
+            Self::LevenbergMarquardt => ("levenberg-marquardt", "Levenberg-Marquardt without bounds"),
+            Self::GaussNewton => ("gauss-newton", "Gauss-Newton: undamped steps"),
+            Self::PseudoInverse => ("pseudo-inverse", "Undamped steps by a truncated pseudo-inverse, as in the paper"),
+            Self::Bounded => {
+                ("bounded", "Levenberg-Marquardt within the bounds of [parameters] and every [[constraint]]")
+            }
+        }
+    }
+
+    /// Name in results, files and arguments.
+    pub const fn as_str(self) -> &'static str {
+        self.words().0
+    }
+
+    /// What it does, in a few words.
+    pub const fn summary(self) -> &'static str {
+        self.words().1
     }
 
     /// The solver that `auto` stands for with this model.

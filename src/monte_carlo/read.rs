@@ -13,11 +13,6 @@ use crate::problem::{Freedom, ParameterRule, Problem};
 use crate::quantity::Unit;
 use crate::simulate::{HeldOutRows, RandomRule, Truth};
 
-const STRATEGIES: [&str; Strategy::EACH.len()] =
-    ["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only"];
-const SOLVERS: [&str; SolverChoice::EACH.len() + 1] =
-    ["levenberg-marquardt", "gauss-newton", "pseudo-inverse", "bounded", "auto"];
-
 /// Poses held out where the file says nothing.
 const HELD_OUT: usize = 50;
 /// Most poses, held-out ones, repetitions.
@@ -136,7 +131,7 @@ fn count(item: &Item<'_, '_>) -> Result<usize, InputError> {
 }
 
 fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> {
-    let strategy = word(item, &STRATEGIES, &Strategy::EACH)?;
+    let strategy = word(item, &Strategy::NAMES, &Strategy::EACH)?;
     let varies = |choose: &fn(&_) -> bool| model.parameters.iter().any(|p| !p.slot.is_placement() && choose(p));
     if strategy == Strategy::Joint || strategy.stages().iter().any(varies) {
         Ok(strategy)
@@ -146,8 +141,7 @@ fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> 
 }
 
 fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
-    let [a, b, c, d] = SolverChoice::EACH;
-    let solver = word(item, &SOLVERS, &[a, b, c, d, SolverChoice::Auto])?.decide(model);
+    let solver = word(item, &SolverChoice::NAMES, &SolverChoice::CHOICES)?.decide(model);
     if solver != SolverChoice::Bounded && model.is_bounded() {
         return Err(item.error(InputErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
     }

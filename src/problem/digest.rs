@@ -11,6 +11,16 @@ impl Problem {
     /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same on every machine, and
     /// for the same value in another unit.
     ///
+    /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
+    /// (`5.00000000000e-1`):
+    /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
+    ///   and rotation of the base; mass of the payload;
+    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
+    ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
+    ///   and with a hoist `hoist`, force, hook and direction;
+    /// - for each effect, in the order of the alphabet, a new line with its declaration as in a problem file;
+    /// - T₀, where an effect follows the temperature.
+    ///
     /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not enter.
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, base, effects, data, .. } = self;
@@ -28,7 +38,7 @@ impl Problem {
             joint(&mut text, own);
         }
         // The order in which effects are declared changes nothing.
-        let mut declared: Vec<String> = effects.iter().map(|own| format!("\n{:?}", own.effect)).collect();
+        let mut declared: Vec<String> = effects.iter().map(|own| format!("\n{}", own.effect.declaration())).collect();
         declared.sort_unstable();
         text.extend(declared);
         if let (true, Some(reference)) =
@@ -70,7 +80,7 @@ fn joint(text: &mut String, joint: &Joint) {
 fn beam(text: &mut String, beam: &Beam) {
     // Its parameters and effects go by its name.
     let Beam { name, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
-    let _ = write!(text, " beam {name:?}");
+    let _ = write!(text, " beam {}", quoted(name));
     number(text, *mass);
     for rigidity in [ea, ei_y, ei_z, gj] {
         optional(text, *rigidity);
@@ -97,6 +107,11 @@ fn vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
     }
 }
 
+/// A name in quotes, quotes and backslashes in it with a backslash before them.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
 fn optional(text: &mut String, value: Option<f64>) {
     match value {
         Some(value) => number(text, value),
@@ -107,4 +122,27 @@ fn optional(text: &mut String, value: Option<f64>) {
 /// Twelve digits: what a change of unit leaves of a number. Zero has no sign.
 fn number(text: &mut String, value: f64) {
     let _ = write!(text, " {:.11e}", value + 0.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn effects_enter_as_they_are_declared() {
+        let text = "name = 'arm'\ngravity_m_s2 = [0, 0, -9.8]\n[statics]\nequilibrium = 'undeflected'\nbeam_elements = 1\n\
+                    [[joint]]\na_m = 0.5\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 4] }\n";
+        let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
+        let zero = " 0.00000000000e0";
+        let canonical = format!(
+            "undeflected 1{zero}{zero} -9.80000000000e0{}{zero}\nrevolute{zero} 5.00000000000e-1{zero}{zero}{zero} rigid\n\
+             joint-harmonic = {{ joint = 1, orders = [1, 4] }}",
+            zero.repeat(12)
+        );
+        assert_eq!(problem.digest(), hexadecimal(&canonical));
+        assert_eq!(problem.digest(), "3027950590543685817207b2ac35d00da78b76ec6770419be953cf72bc81fabe");
+        assert_eq!(quoted("a \"b\" \\"), "\"a \\\"b\\\" \\\\\"");
+    }
 }
