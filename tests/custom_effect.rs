@@ -104,7 +104,7 @@ fn crept(rate: f64, sag: f64) -> (Problem, Dataset) {
     let truth = model.vector_of(values).unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = Placement::of(&rows).poses(&rows, &all, 1.0);
-    let errors = PoseResiduals::new(&model, poses, Vec::new(), truth).position_errors(&DVector::zeros(0));
+    let errors = model.residuals(poses, &truth);
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for (position, error) in rows.positions.iter_mut().zip(errors) {
         *position += Vector3::from_fn(|_, _| 2e-5 * normal(&mut rng)) - error;

@@ -7,7 +7,7 @@ use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
 use super::smooth_term::SmoothTerm;
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
 use crate::model::parameter::Slot;
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in the choice of effects.
@@ -84,8 +84,7 @@ impl Fitted {
 
     /// Residuals of some rows, measuring frame [m].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
-        let residuals = PoseResiduals::new(&self.model, self.poses(data, rows), Vec::new(), self.found.x.clone());
-        residuals.position_errors(&DVector::zeros(0))
+        self.model.residuals(self.poses(data, rows), &self.found.x)
     }
 
     /// The model about the fit at the identification rows, with every place where `effects` and `smooth_terms` enter.

@@ -69,7 +69,7 @@ pub fn compensate(
         let n = moving.len();
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
-            PoseResiduals::new(&arm, vec![pose], Vec::new(), DVector::zeros(n)).position_errors(&DVector::zeros(0))[0]
+            arm.residuals(vec![pose], &DVector::zeros(n))[0]
         };
         let mut configuration = seed.to_vec();
         for _ in 0..MAX_PASSES {

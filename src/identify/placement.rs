@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3};
 
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{Model, Pose};
 use crate::problem::PoseView;
 use crate::problem::Problem;
 
@@ -85,8 +85,7 @@ impl Placement {
         measurements: &Measurements,
         rows: &[usize],
     ) -> Vec<Vector3<f64>> {
-        let poses = self.poses(measurements, rows, 1.0);
-        PoseResiduals::new(model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
+        model.residuals(self.poses(measurements, rows, 1.0), x)
     }
 
     /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.

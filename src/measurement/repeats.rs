@@ -70,10 +70,10 @@ struct Column {
     step: f64,
 }
 
-/// The kind of each row, numbered in order of appearance, and how many there are.
+/// The group of each row, numbered in order of appearance, and how many groups there are.
 ///
-/// A row is of an earlier one's kind when every column agrees with it within its step. The rows to compare with are
-/// found along one weighted sum of all columns, which differs by no more than one bin then.
+/// A row belongs to the group of an earlier row if every column differs by at most its step. Only rows are compared whose
+/// weighted sums Σ wⱼ vⱼ/stepⱼ, in bins of Σ wⱼ, fall in the same or neighbouring bins: rows that agree always do.
 fn numbered(columns: &[Column], rows: usize) -> (Vec<usize>, usize) {
     // Weights without a common measure, so that unlike rows seldom share a bin.
     let weights: Vec<f64> = (1..=columns.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();

@@ -19,8 +19,9 @@ pub(super) enum Bend<'a, S> {
     Rigid,
     /// By these moments, on the bent arm; records events.
     Bent(&'a [S]),
-    /// The same segment by segment: each begins at a frame without derivatives, which elements first turn by a rotation
-    /// vector of size zero, if there is one.
+    /// The same segment by segment. Each segment begins at a frame without derivatives, so that its end tells what its own
+    /// numbers do. With a rotation vector, whose value is zero, beam elements first turn by it: their end then tells what
+    /// turning their root does.
     Apart(&'a [S], Option<&'a Vector3<S>>),
     /// By these moments, with forces resolved in the frames of the last rigid walk; records nothing.
     FirstOrder(&'a [S]),

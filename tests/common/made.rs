@@ -4,7 +4,7 @@
 
 use flexcal::identify::Placement;
 use flexcal::measurement::{Dataset, Labels, Measurements, Split};
-use flexcal::model::{Model, PoseResiduals};
+use flexcal::model::Model;
 use flexcal::problem::{JointKind, Problem};
 use flexcal::quantity::Unit;
 use nalgebra::{DVector, Vector3};
@@ -48,8 +48,7 @@ pub fn predicted(problem: &Problem, measurements: &Measurements, x: &DVector<f64
     let model = model_of(problem, measurements);
     let rows: Vec<usize> = (0..measurements.len()).collect();
     let poses = Placement::of(measurements).poses(measurements, &rows, 1.0);
-    let errors = PoseResiduals::new(&model, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0));
-    measurements.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect()
+    model.predict(poses, x)
 }
 
 /// Measures every row on the arm at `x`, with noise of 1 σ = `sigma` [m] on each coordinate.

@@ -138,3 +138,15 @@ impl Effect {
         custom(self).and_then(|own| own.untestable(problem, data))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::effect::NAMES;
+
+    #[test]
+    fn every_effect_of_the_table_has_its_family() {
+        let families: Vec<&str> = FAMILIES.iter().map(|family| family.name).collect();
+        assert_eq!(families, NAMES);
+    }
+}
