@@ -1,6 +1,6 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::data::Data;
 use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
