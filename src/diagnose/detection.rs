@@ -102,8 +102,7 @@ pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates 
     Candidates::of(problem, &Data::new(&Dataset::new(poses.clone(), split), RULES))
 }
 
-/// What `with` makes of the nominal arm in these poses, and of a fit of everything free before anything was measured there:
-/// priors hold, the residual says nothing.
+/// Gives `with` the nominal arm linearised at these poses, and its neighbourhood with all parameters fitted and no residual.
 pub(super) fn with_linear<T>(
     problem: &Problem,
     poses: &Measurements,

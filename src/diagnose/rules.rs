@@ -19,8 +19,8 @@ pub struct SelectionRules {
     pub rival: f64,
     /// Corrected p below which an effect whose rivals are of its own family needs no fit before the next is looked for.
     pub overwhelming: f64,
-    /// Part of what an effect explains from which on another explains as much, where structure is left: then residuals are no
-    /// independent noise, and small differences are no evidence.
+    /// Where structure is left, another effect that explains this part of the squares of a named one is stated as an
+    /// alternative: residuals are then no independent noise, and small differences of a criterion no evidence.
     pub as_much: f64,
     /// Standard errors below zero from which on what is never negative is impossible: one in 700 for normal errors.
     pub impossible: f64,

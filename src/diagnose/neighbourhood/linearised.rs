@@ -1,4 +1,4 @@
-//! Columns of every effect that may be at work, without a fit: derivatives at the places, times drivers.
+//! Columns of every effect without a fit of it: the derivative at the place where it enters, times what it is multiplied by.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

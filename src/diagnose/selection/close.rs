@@ -38,8 +38,8 @@ pub struct Found {
     pub estimates: Vec<Estimate>,
     /// Candidates that these data cannot tell from it, best first.
     pub alternatives: Vec<Effect>,
-    /// Error on held-out poses after the first round that had it in the model, and none of what was dropped later; at the
-    /// end, if there is no such round.
+    /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
+    /// fit where no round is such.
     pub held_out_after: ErrorSummary,
 }
 

@@ -78,8 +78,8 @@ fn all_orders(effect: Effect, declared: &[Effect], several: usize) -> Effect {
         Effect::JointHarmonic { joint, orders } if orders.len() >= several => {
             let highest = orders.into_iter().max().unwrap_or(1);
             let is_known = |&order: &u32| {
-                let wave = Effect::JointHarmonic { joint, orders: vec![order] };
-                declared.iter().any(|known| known.covers(&wave))
+                let one = Effect::JointHarmonic { joint, orders: vec![order] };
+                declared.iter().any(|known| known.covers(&one))
             };
             Effect::JointHarmonic { joint, orders: (1..=highest).filter(|order| !is_known(order)).collect() }
         }
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rule_of_their_own_or_a_slide_keeps_waves_from_the_common_prior() {
+    fn a_rule_of_their_own_or_a_slide_keeps_harmonics_from_the_common_prior() {
         let takes = |kind: &str, rule: &str| {
             let text = format!(
                 "name = 'arm'\n[[joint]]\n[[joint]]\nkind = '{kind}'\n[[effect]]\njoint-harmonic = {{ joint = 1, orders = [1, 2] }}\n\
