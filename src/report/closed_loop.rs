@@ -277,7 +277,7 @@ fn errors(closure: &ClosedLoop) -> Table {
     if closure.effects.is_empty() {
         rows.retain(|row| row[1] != "with what was found");
     }
-    Table::new(&["error, mm", "", "mean", "rms", "max", "χ²/ν"], rows, &[0, 1])
+    Table { minor: vec![3, 4], ..Table::new(&["error, mm", "", "mean", "rms", "max", "χ²/ν"], rows, &[0, 1]) }
 }
 
 /// How the figures are to be read, with the gain and how sure it is.

@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use super::document::Block;
 use super::json::{object, to_text};
-use super::quantity::{fixed, mm, quoted};
+use super::quantity::{fixed, mm};
 use super::render::text;
+use super::table;
 use crate::identify::Command;
-use crate::measurement::{Labels, Measurements};
-use crate::problem::{JointKind, Problem};
+use crate::measurement::Measurements;
+use crate::problem::Problem;
 
 object! {
     Document<'a>(problem: &'a Problem, commands: &[Command], reached: &[&Command]) {
@@ -60,46 +61,26 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
 /// Commands as CSV: q of every moving joint (empty where the target is out of reach), the desired position with what was
 /// set, and how far from it the model expects the arm.
 pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
-    let joints: Vec<(usize, &str, f64)> = problem
-        .joints
-        .iter()
-        .enumerate()
-        .filter_map(|(j, joint)| match joint.kind {
-            JointKind::Revolute => Some((j, "deg", 180.0 / std::f64::consts::PI)),
-            JointKind::Prismatic => Some((j, "mm", 1e3)),
-            JointKind::Fixed => None,
-        })
-        .collect();
-    let mut lines: Vec<String> = Vec::with_capacity(commands.len() + 1);
-    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| fixed(values[row], 4));
-    let word = |labels: &Labels, row: usize| quoted(&labels.names[labels.of_row[row]]);
-    let has_sessions = targets.session.names.iter().any(|name| !name.is_empty());
-    let mut header: Vec<String> = joints.iter().map(|(j, unit, _)| format!("q{}_{unit}", j + 1)).collect();
-    let optional = [
-        ("session", has_sessions),
-        ("target", targets.target.is_some()),
-        ("payload_kg", targets.payload.is_some()),
-        ("hoist_N", targets.hoist.is_some()),
-    ];
-    header.extend(["x_mm", "y_mm", "z_mm"].map(str::to_owned));
-    header.extend(optional.iter().filter(|(_, there)| *there).map(|(name, _)| (*name).to_owned()));
-    header.extend(["miss_mm", "miss_before_mm", "reached"].map(str::to_owned));
-    lines.push(header.join(","));
-    for command in commands {
+    let (joints, session) = (table::commands(problem), table::sessions(targets));
+    let mut header: Vec<String> = joints.iter().map(|(_, name, _)| name.clone()).collect();
+    header.extend(table::names("x_mm,y_mm,z_mm"));
+    header.extend(session.map(|_| "session".to_owned()));
+    header.extend(targets.target.as_ref().map(|_| "target".to_owned()));
+    header.extend(targets.payload.as_ref().map(|_| "payload_kg".to_owned()));
+    header.extend(targets.hoist.as_ref().map(|_| "hoist_N".to_owned()));
+    header.extend(table::names("miss_mm,miss_before_mm,reached"));
+    let line = |command: &Command| {
         let row = command.row;
         // A controller must not be given a command that does not lead there.
         let show = |value: String| if command.is_reached() { value } else { String::new() };
         let mut cells: Vec<String> =
             joints.iter().map(|&(j, _, factor)| show(fixed(command.configuration[j] * factor, 7))).collect();
         cells.extend(targets.positions[row].iter().map(|x| fixed(x * 1e3, 4)));
-        cells.extend(has_sessions.then(|| word(&targets.session, row)));
-        cells.extend(targets.target.as_ref().map(|labels| word(labels, row)));
-        cells.extend(value(&targets.payload, row));
-        cells.extend(value(&targets.hoist, row));
-        cells.push(fixed(command.miss.norm() * 1e3, 4));
-        cells.push(fixed(command.seed_miss * 1e3, 4));
+        cells.extend([session, targets.target.as_ref()].into_iter().flatten().map(|labels| table::word(labels, row)));
+        cells.extend([&targets.payload, &targets.hoist].into_iter().flatten().map(|values| fixed(values[row], 4)));
+        cells.extend([command.miss.norm(), command.seed_miss].map(|miss| fixed(miss * 1e3, 4)));
         cells.push(command.is_reached().to_string());
-        lines.push(cells.join(","));
-    }
-    lines.join("\n") + "\n"
+        cells
+    };
+    table::csv(header, commands.iter().map(line))
 }

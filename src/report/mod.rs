@@ -24,6 +24,7 @@ mod quantity;
 mod render;
 mod separation;
 mod study;
+mod table;
 mod trace;
 
 pub use check::{check_json, check_text, why_not_sufficient};

@@ -1,61 +1,46 @@
 //! Poses to measure, as a table.
 
-use super::quantity::{fixed, quoted};
-use crate::measurement::{Labels, Measurements};
-use crate::problem::{HeldOut, JointKind, Problem};
+use super::quantity::fixed;
+use super::table::{commands, csv, sessions, word};
+use crate::measurement::Measurements;
+use crate::problem::{HeldOut, Problem};
 
 /// Poses as CSV: the columns of measurements but for the positions; ready to be measured and completed.
 ///
 /// Where the problem names a column that marks held-out rows, every pose is one to identify with.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
-    let moving: Vec<(usize, JointKind)> = problem.joints.iter().map(|joint| joint.kind).enumerate().collect();
-    let moving: Vec<(usize, JointKind)> = moving.into_iter().filter(|(_, kind)| *kind != JointKind::Fixed).collect();
+    let (joints, session) = (commands(problem), sessions(poses));
     let split = match &problem.data.held_out {
-        Some(HeldOut::Column(name)) => Some(quoted(name)),
+        Some(HeldOut::Column(name)) => Some(name.clone()),
         _ => None,
     };
-    let sessions = poses.session.names.iter().any(|name| !name.is_empty());
-    let mut header = vec!["pose".to_owned()];
-    header.extend(split.clone());
-    let unit = |kind| if kind == JointKind::Prismatic { "mm" } else { "deg" };
-    header.extend(moving.iter().map(|&(joint, kind)| format!("q{}_{}", joint + 1, unit(kind))));
+    let values = |values: &Option<Vec<f64>>, factor: f64| {
+        values.as_ref().map(|values| values.iter().map(|value| plain(value * factor)).collect::<Vec<String>>())
+    };
+    let words = |labels| (0..poses.len()).map(|row| word(labels, row)).collect::<Vec<String>>();
+    let mut columns = vec![("pose".to_owned(), (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>())];
+    columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
+    columns.extend(joints.iter().map(|(joint, name, factor)| {
+        (name.clone(), (0..poses.len()).map(|row| plain(poses.configuration(row)[*joint] * factor)).collect())
+    }));
     let optional = [
-        ("session", sessions),
-        ("target", poses.target.is_some()),
-        ("payload_kg", poses.payload.is_some()),
-        ("hoist_N", poses.hoist.is_some()),
-        ("temperature_C", poses.temperature.is_some()),
-        ("time_s", poses.time_measured),
-        ("sigma_mm", poses.sigma.is_some()),
+        ("session", session.map(words)),
+        ("target", poses.target.as_ref().map(words)),
+        ("payload_kg", values(&poses.payload, 1.0)),
+        ("hoist_N", values(&poses.hoist, 1.0)),
+        ("temperature_C", values(&poses.temperature, 1.0)),
+        ("time_s", poses.time_measured.then(|| poses.time.iter().map(|&time| plain(time)).collect())),
+        ("sigma_mm", values(&poses.sigma, 1e3)),
     ];
-    header.extend(optional.iter().filter(|(_, there)| *there).map(|(name, _)| (*name).to_owned()));
-    if poses.approach.is_some() {
-        header.extend(moving.iter().map(|(joint, _)| format!("approach{}", joint + 1)));
-    }
-    let mut lines = vec![header.join(",")];
-    for row in 0..poses.len() {
-        let value = |column: &Option<Vec<f64>>, factor: f64| column.as_ref().map(|values| plain(values[row] * factor));
-        let word = |labels: &Labels| quoted(&labels.names[labels.of_row[row]]);
-        let q = poses.configuration(row);
-        let mut cells = vec![(row + 1).to_string()];
-        cells.extend(split.as_ref().map(|_| "identification".to_owned()));
-        cells.extend(moving.iter().map(|&(joint, kind)| match kind {
-            JointKind::Prismatic => plain(q[joint] * 1e3),
-            _ => plain(q[joint].to_degrees()),
+    columns.extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
+    if let Some(approach) = &poses.approach {
+        columns.extend(joints.iter().map(|(joint, ..)| {
+            let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));
+            (format!("approach{}", joint + 1), sides.collect())
         }));
-        cells.extend(sessions.then(|| word(&poses.session)));
-        cells.extend(poses.target.as_ref().map(word));
-        cells.extend(value(&poses.payload, 1.0));
-        cells.extend(value(&poses.hoist, 1.0));
-        cells.extend(value(&poses.temperature, 1.0));
-        cells.extend(poses.time_measured.then(|| plain(poses.time[row])));
-        cells.extend(value(&poses.sigma, 1e3));
-        if let Some(approach) = &poses.approach {
-            cells.extend(moving.iter().map(|(joint, _)| plain(approach[row * poses.joints + joint])));
-        }
-        lines.push(cells.join(","));
     }
-    lines.join("\n") + "\n"
+    let lines = (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
+    csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
 }
 
 /// Six decimals, without zeros at the end.

@@ -53,11 +53,6 @@ pub(super) fn p_value(p: f64) -> String {
     }
 }
 
-/// A word as a cell of CSV: in quotes where it holds a comma, a quote or the end of a line.
-pub(super) fn quoted(word: &str) -> String {
-    if word.contains([',', '"', '\n', '\r']) { format!("\"{}\"", word.replace('"', "\"\"")) } else { word.to_owned() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

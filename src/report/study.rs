@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::document::{Block, Table};
 use super::json::{object, to_text};
-use super::quantity::{number, or_dash, quoted};
+use super::quantity::{number, or_dash};
 use super::render::text;
+use super::table;
 use crate::monte_carlo::{Campaign, CellResult, ParameterResult, Results, Source, Tally};
 
 /// First columns of every table.
@@ -117,11 +118,11 @@ pub fn study_text(campaign: &Campaign, results: &Results) -> String {
         "ms",
     ];
     let rows = results.cells.iter().map(|cell| line(campaign, cell)).collect();
-    let table = Table::new(&header, rows, &[2, 3, 10]).noted(&[
+    let shown = Table::new(&header, rows, &[2, 3, 10]).noted(&[
         "held out: measured − predicted, noise included; covered: by ± 1.96 standard errors, 95 % if those are right;",
         "largest bias: of all parameters, over its spread; ms: middle fit",
     ]);
-    text(&[Block::lines(head), Block::Table(table)])
+    text(&[Block::lines(head), Block::Table(shown)])
 }
 
 fn line(campaign: &Campaign, result: &CellResult) -> Vec<String> {
@@ -155,8 +156,7 @@ pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
         let tally = &cell.tally;
         let bias = cell.largest_bias(campaign);
         let length = |metres: Option<f64>| plain(in_mm(metres));
-        let cells = [
-            leading(index, cell),
+        let cells = vec![
             tally.fits.to_string(),
             tally.failed().to_string(),
             cell.failure_rate().to_string(),
@@ -167,11 +167,11 @@ pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
             plain(tally.reduced_chi2.mean()),
             plain(cell.coverage()),
             plain(bias.map(|(_, ratio)| ratio)),
-            bias.map(|(parameter, _)| quoted(&parameter.name)).unwrap_or_default(),
+            bias.map(|(parameter, _)| parameter.name.clone()).unwrap_or_default(),
             plain(tally.iterations.mean()),
             plain(tally.iterations.largest()),
         ];
-        cells.join(",")
+        [leading(index, cell), cells].concat()
     };
     csv(header, results.cells.iter().enumerate().map(line))
 }
@@ -181,9 +181,8 @@ pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
     let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
     let lines = results.cells.iter().enumerate().flat_map(|(index, cell)| {
         cell.parameters(campaign).map(move |result| {
-            let cells = [
-                leading(index, cell),
-                quoted(&result.parameter.name),
+            let cells = vec![
+                result.parameter.name.clone(),
                 result.unit().to_owned(),
                 result.fits.to_string(),
                 plain(result.bias),
@@ -193,7 +192,7 @@ pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
                 plain(result.std_error),
                 plain(result.coverage),
             ];
-            cells.join(",")
+            [leading(index, cell), cells].concat()
         })
     });
     csv(header, lines)
@@ -203,17 +202,19 @@ pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
 pub fn study_timing_csv(results: &Results) -> String {
     let line = |(index, cell): (usize, &CellResult)| {
         let timing = cell.timing();
-        let milliseconds = [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
-        format!("{},{},{},{:.3}", leading(index, cell), cell.seconds.len(), milliseconds.join(","), timing.total)
+        let [median, slowest] = [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
+        let cells = vec![cell.seconds.len().to_string(), median, slowest, format!("{:.3}", timing.total)];
+        [leading(index, cell), cells].concat()
     };
     csv("fits,median_ms,slowest_ms,total_s", results.cells.iter().enumerate().map(line))
 }
 
 /// Which cell, counted from 1.
-fn leading(index: usize, result: &CellResult) -> String {
+fn leading(index: usize, result: &CellResult) -> Vec<String> {
     let cell = &result.cell;
-    let (strategy, solver) = (cell.strategy.as_str(), cell.solver.as_str());
-    format!("{},{},{},{strategy},{solver}", index + 1, millimetres(cell.sigma), cell.poses)
+    let sigma = millimetres(cell.sigma).to_string();
+    let words = [cell.strategy.as_str(), cell.solver.as_str()].map(str::to_owned);
+    [vec![(index + 1).to_string(), sigma, cell.poses.to_string()], words.to_vec()].concat()
 }
 
 /// The shortest text that is read back as the same number; empty where there is none.
@@ -221,6 +222,6 @@ fn plain(value: Option<f64>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }
 
-fn csv(header: &str, lines: impl Iterator<Item = String>) -> String {
-    std::iter::once(format!("{CELL},{header}")).chain(lines).flat_map(|line| [line, "\n".to_owned()]).collect()
+fn csv(header: &str, lines: impl Iterator<Item = Vec<String>>) -> String {
+    table::csv(table::names(&format!("{CELL},{header}")), lines)
 }

@@ -155,10 +155,10 @@ fn headline(own: &Headline) -> Markup {
 
 fn table(table: &Table) -> Markup {
     let class = |k: usize| match (table.left.contains(&k), table.minor.contains(&k)) {
-        (true, true) => "l o",
-        (true, false) => "l",
-        (false, true) => "o",
-        (false, false) => "",
+        (true, true) => Some("l o"),
+        (true, false) => Some("l"),
+        (false, true) => Some("o"),
+        (false, false) => None,
     };
     // A minus is wider than a hyphen, and names keep their hyphens.
     let cell = |k: usize, text: &str| if table.left.contains(&k) { text.to_owned() } else { text.replace('-', "−") };
@@ -171,12 +171,12 @@ fn table(table: &Table) -> Markup {
         }
         div.scroll { table {
             thead { tr {
-                @for (k, text) in table.header.iter().enumerate() { th class=(class(k)) { (text) } }
+                @for (k, text) in table.header.iter().enumerate() { th class=[class(k)] { (text) } }
                 @if let Some((title, _)) = bars { th.l.o { (title) } }
             } }
             tbody {
                 @for (index, row) in table.rows.iter().enumerate() { tr {
-                    @for (k, text) in row.iter().enumerate() { td class=(class(k)) { (words(&cell(k, text))) } }
+                    @for (k, text) in row.iter().enumerate() { td class=[class(k)] { (words(&cell(k, text))) } }
                     @if let Some((_, bars)) = bars { td.l.o { (bar(&bars[index])) } }
                 } }
             }

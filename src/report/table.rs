@@ -1,0 +1,41 @@
+//! Tables for other programs.
+
+use std::f64::consts::PI;
+
+use crate::measurement::{Labels, Measurements};
+use crate::problem::{JointKind, Problem};
+
+/// Lines of cells as CSV, the names of the columns first; every line has as many cells.
+pub(super) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in std::iter::once(header).chain(lines) {
+        // Memory takes whatever is written to it.
+        let _ = writer.write_record(line);
+    }
+    writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
+}
+
+/// Names of columns.
+pub(super) fn names(names: &str) -> Vec<String> {
+    names.split(',').map(str::to_owned).collect()
+}
+
+/// Joints that take a command: index, name of the column, factor from SI.
+pub(super) fn commands(problem: &Problem) -> Vec<(usize, String, f64)> {
+    let column = |(index, kind)| match kind {
+        JointKind::Revolute => Some((index, format!("q{}_deg", index + 1), 180.0 / PI)),
+        JointKind::Prismatic => Some((index, format!("q{}_mm", index + 1), 1e3)),
+        JointKind::Fixed => None,
+    };
+    problem.joints.iter().map(|joint| joint.kind).enumerate().filter_map(column).collect()
+}
+
+/// Sessions of some rows, where any has a name.
+pub(super) fn sessions(rows: &Measurements) -> Option<&Labels> {
+    Some(&rows.session).filter(|session| session.names.iter().any(|name| !name.is_empty()))
+}
+
+/// The word of a row.
+pub(super) fn word(labels: &Labels, row: usize) -> String {
+    labels.names[labels.of_row[row]].clone()
+}
