@@ -131,6 +131,13 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
+    // A title can switch nothing off.
+    let titled = Problem { title: "A ` <b> & *\u{1}\u{1b}[31m".to_owned(), ..problem };
+    let report = report::identification_report(&titled, &found, &shown);
+    check(&report);
+    assert!(report.markdown.starts_with("# A \\` \\<b> & \\*[31m\n"), "{}", report.markdown);
+    let all = report::estimate_text(&titled, &found) + &report.markdown + &report.html;
+    assert!(!all.contains(['\u{1}', '\u{1b}']));
 }
 
 #[test]

@@ -88,8 +88,8 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
     let mut notes: Vec<String> = (count > 0).then(|| format!("lower harmonics: in {file}")).into_iter().collect();
     if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         notes.push(
-            "–: no standard error: the data do not identify it, or only in a combination with others, a bound holds it, or it was not \
-             fitted"
+            "–: no standard error: the data do not identify it, or only in a combination with others, a bound holds it, or \
+             it was not fitted"
                 .to_owned(),
         );
     }

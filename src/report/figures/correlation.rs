@@ -69,13 +69,9 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     let left_out = all - shown.len();
     let part =
         if left_out > 0 { format!(" Of {all} parameters the {MOST} that go together most.") } else { String::new() };
-    Some(Drawing {
-        name: "correlations".to_owned(),
-        title: "Which estimates go together".to_owned(),
-        caption: format!(
-            "Correlation of every pair of estimates, columns in the order of the rows. Deep colours off the diagonal: only the \
+    let caption = format!(
+        "Correlation of every pair of estimates, columns in the order of the rows. Deep colours off the diagonal: only the \
              sum (orange) or the difference (blue) of two parameters is well known, so do not read much into either alone.{part}"
-        ),
-        svg,
-    })
+    );
+    Some(Drawing::new("correlations", "Which estimates go together", caption, svg))
 }

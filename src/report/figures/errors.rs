@@ -76,18 +76,14 @@ pub fn errors(data: &PlotData) -> Drawing {
     let lost = |k: &usize| states.iter().any(|state| !state.errors[*k].norm().is_finite());
     let without = (0..count).filter(lost).count();
     let floor = number(10.0_f64.powf(floor), 4);
-    Drawing {
-        name: "held-out-errors".to_owned(),
-        title: "Error of each held-out pose".to_owned(),
-        caption: format!(
-            "Absolute error in x, y, z of the measuring frame and its norm, on a logarithmic scale: one division of ten down \
+    let caption = format!(
+        "Absolute error in x, y, z of the measuring frame and its norm, on a logarithmic scale: one division of ten down \
              is ten times better. None of these poses took part in fitting. Values below {floor} mm are drawn at the lower \
              edge.{}{}",
-            left_out(without),
-            thinned(step)
-        ),
-        svg,
-    }
+        left_out(without),
+        thinned(step)
+    );
+    Drawing::new("held-out-errors", "Error of each held-out pose", caption, svg)
 }
 
 fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[StageErrors], (axis, step): (usize, usize)) -> Result<(), Failure> {

@@ -49,6 +49,12 @@ pub struct Drawing {
     pub svg: String,
 }
 
+impl Drawing {
+    pub fn new(name: &str, title: &str, caption: impl Into<String>, svg: String) -> Self {
+        Self { name: name.to_owned(), title: title.to_owned(), caption: caption.into(), svg }
+    }
+}
+
 /// A part of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Why drawing failed; writing to memory never does.

@@ -51,13 +51,9 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     } else {
         String::new()
     };
-    Some(Drawing {
-        name: "residual-histogram".to_owned(),
-        title: "How the residuals scatter".to_owned(),
-        caption: format!(
-            "Residual coordinates of the fitted poses against the σ of the measurement. Noise alone would follow the line; a \
+    let caption = format!(
+        "Residual coordinates of the fitted poses against the σ of the measurement. Noise alone would follow the line; a \
              fit takes a little off it, the more parameters the more.{outside}"
-        ),
-        svg,
-    })
+    );
+    Some(Drawing::new("residual-histogram", "How the residuals scatter", caption, svg))
 }

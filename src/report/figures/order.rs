@@ -50,15 +50,11 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         }
         Ok(())
     });
-    Some(Drawing {
-        name: "residual-order".to_owned(),
-        title: "The residuals one after another".to_owned(),
-        caption: format!(
-            "PoseErrors measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
+    let caption = format!(
+        "PoseErrors measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
              should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}",
-            left_out(without),
-            thinned(step)
-        ),
-        svg,
-    })
+        left_out(without),
+        thinned(step)
+    );
+    Some(Drawing::new("residual-order", "The residuals one after another", caption, svg))
 }

@@ -80,15 +80,11 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         area.draw(&PathElement::new(vec![(level, px(top - 4)), (level, px(bottom))], line(INK, 1.0)))?;
         write(area, "evidence, −log₁₀ p [1]", (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28), INK, HPos::Center)
     });
-    Some(Drawing {
-        name: "ranking".to_owned(),
-        title: "Which effects the residual points to".to_owned(),
-        caption: format!(
-            "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
+    let caption = format!(
+        "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
              could do as much; left of the black line (p = {}) nothing stands out. Behind each bar: how much the effect would \
              take off the root mean square error. Pale blue: hard to tell from the first with these poses.",
-            trace.tried, trace.level
-        ),
-        svg,
-    })
+        trace.tried, trace.level
+    );
+    Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg))
 }

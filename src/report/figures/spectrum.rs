@@ -36,16 +36,12 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         1 => "one combination is not identifiable: it can change and no predicted position moves".to_owned(),
         n => format!("{n} combinations are not identifiable: they can change and no predicted position moves"),
     };
-    Some(Drawing {
-        name: "singular-values".to_owned(),
-        title: "What the poses can tell".to_owned(),
-        caption: format!(
-            "Singular values of the Jacobian with columns of unit length, at the nominal arm; {tells}. Rank {} of {}, condition \
+    let caption = format!(
+        "Singular values of the Jacobian with columns of unit length, at the nominal arm; {tells}. Rank {} of {}, condition \
              number {:.0}.",
-            found.rank,
-            found.singular_values.len(),
-            found.condition_number()
-        ),
-        svg,
-    })
+        found.rank,
+        found.singular_values.len(),
+        found.condition_number()
+    );
+    Some(Drawing::new("singular-values", "What the poses can tell", caption, svg))
 }

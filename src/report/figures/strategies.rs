@@ -16,8 +16,11 @@ const TOP: i32 = 26;
 /// Decades in which 2 and 5 have room for their numbers, too.
 const CLOSE: f64 = 2.2;
 
-struct Entry {
+struct Entry<'a> {
+    strategy: &'a str,
     name: String,
+    /// How many solvers it stands for.
+    solvers: usize,
     errors: Errors,
 }
 
@@ -26,50 +29,39 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
     let mut entries: Vec<Entry> = Vec::new();
     for found in &comparison.strategies {
         // Solvers that end in the same place stand in one row.
-        let strategy = found.strategy.as_str();
+        let (strategy, errors) = (found.strategy.as_str(), found.fitted);
         let same = |entry: &&mut Entry| {
-            let ratio = entry.errors.held_out.mean.norm / found.fitted.held_out.mean.norm;
-            entry.name.starts_with(strategy)
-                && entry.name[strategy.len()..].starts_with([' ', ','])
-                && (ratio - 1.0).abs() < 1e-3
+            let ratio = entry.errors.held_out.mean.norm / errors.held_out.mean.norm;
+            entry.strategy == strategy && (ratio - 1.0).abs() < 1e-3
         };
-        match entries.iter_mut().find(same) {
-            Some(entry) => entry.name = format!("{strategy}, {} solvers", solvers(&entry.name) + 1),
-            None => entries.push(Entry { name: format!("{strategy} {}", found.solver.as_str()), errors: found.fitted }),
+        if let Some(entry) = entries.iter_mut().find(same) {
+            entry.solvers += 1;
+            entry.name = format!("{strategy}, {} solvers", entry.solvers);
+        } else {
+            let name = format!("{strategy} {}", found.solver.as_str());
+            entries.push(Entry { strategy, name, solvers: 1, errors });
         }
     }
-    entries.extend(comparison.paper.iter().map(|own| Entry { name: own.strategy().to_owned(), errors: own.errors }));
-    Drawing {
-        name: "strategies".to_owned(),
-        title: "Strategies side by side".to_owned(),
-        caption: "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
-                  wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
-                  share a row."
-            .to_owned(),
-        svg: rows(&entries, "Error of every strategy"),
-    }
+    entries.extend(comparison.paper.iter().map(|own| entry(own.strategy(), own.errors)));
+    let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
+                   wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
+                   share a row.";
+    Drawing::new("strategies", "Strategies side by side", caption, rows(&entries, "Error of every strategy"))
 }
 
-/// How many solvers a row stands for.
-fn solvers(name: &str) -> usize {
-    name.rsplit_once(", ").and_then(|(_, tail)| tail.split(' ').next()?.parse().ok()).unwrap_or(1)
+fn entry(strategy: &str, errors: Errors) -> Entry<'_> {
+    Entry { strategy, name: strategy.to_owned(), solvers: 1, errors }
 }
 
 /// The same for every part of the elasticity that is kept; nothing for an arm without any.
 pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
-    let entry = |(part, found): &(crate::model::Ablation, crate::identify::Identification)| Entry {
-        name: part.as_str().to_owned(),
-        errors: found.fitted,
-    };
-    let entries: Vec<Entry> = comparison.ablations.iter().map(entry).collect();
-    (entries.len() > 1).then(|| Drawing {
-        name: "ablations".to_owned(),
-        title: "What each part of the elasticity is worth".to_owned(),
-        caption: "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
-                  rigid to complete, on a logarithmic scale."
-            .to_owned(),
-        svg: rows(&entries, "Error with parts of the elasticity"),
-    })
+    let entries: Vec<Entry> =
+        comparison.ablations.iter().map(|(part, found)| entry(part.as_str(), found.fitted)).collect();
+    let caption = "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
+                   rigid to complete, on a logarithmic scale.";
+    let title = "What each part of the elasticity is worth";
+    (entries.len() > 1)
+        .then(|| Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity")))
 }
 
 fn rows(entries: &[Entry], label: &str) -> String {

@@ -54,19 +54,15 @@ pub fn vectors(data: &PlotData) -> Drawing {
         }
         Ok(())
     });
-    Drawing {
-        name: "residual-vectors".to_owned(),
-        title: "What is left, over the workspace".to_owned(),
-        caption: format!(
-            "Each stroke starts at a measured position (dot) and shows the residual measured − predicted there, drawn {} times \
+    let caption = format!(
+        "Each stroke starts at a measured position (dot) and shows the residual measured − predicted there, drawn {} times \
              too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
              structure; a tangle is noise.{}{}",
-            short(larger),
-            left_out(data.residuals.len() - count),
-            thinned(step)
-        ),
-        svg,
-    }
+        short(larger),
+        left_out(data.residuals.len() - count),
+        thinned(step)
+    );
+    Drawing::new("residual-vectors", "What is left, over the workspace", caption, svg)
 }
 
 /// 1, 2 or 5 times the power of ten below.
