@@ -57,7 +57,8 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
         }
     };
     let files = figures.iter().map(|own: &Drawing| (format!("{}.svg", own.name), style::alone(&own.svg)));
-    Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html: page.into_string() }
+    let html = printable(&page.into_string());
+    Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
 
 /// What stands before the first heading, then a section for each heading.
@@ -114,7 +115,7 @@ fn words(text: &str) -> Markup {
     let mut parts = Vec::new();
     for (k, part) in text.split(CODE.0).enumerate() {
         let (code, plain) = if k == 0 { ("", part) } else { part.split_once(CODE.1).unwrap_or((part, "")) };
-        parts.push([code, plain].map(printable));
+        parts.push([code, plain]);
     }
     html! {
         @for [code, plain] in &parts { @if !code.is_empty() { code { (code) } } (plain) }
