@@ -1,7 +1,5 @@
 //! Score screening: a candidate whose derivative is not a number is named as such, and the others are judged without it.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
-
 use std::path::Path;
 
 use flexcal::diagnose::{NOT_FINITE, trace};
