@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use assert_cmd::Command;
-use flexcal::monte_carlo::{Campaign, Results, Shard, Store, collect, pending, run};
+use flexcal::monte_carlo::{Results, Shard, Store, Study, collect, pending, run};
 use flexcal::report;
 use serde_json::Value;
 
@@ -80,8 +80,8 @@ impl Bench {
         fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
     }
 
-    fn campaign(&self) -> Campaign {
-        Campaign::read(&self.path("STUDY.toml")).unwrap()
+    fn study(&self) -> Study {
+        Study::read(&self.path("STUDY.toml")).unwrap()
     }
 
     /// The texts of the results in a folder.
@@ -102,17 +102,17 @@ impl Bench {
 }
 
 /// Does what is open of a share, on so many threads.
-fn run_on(threads: usize, campaign: &Campaign, store: &Store, shard: Shard) {
+fn run_on(threads: usize, study: &Study, store: &Store, shard: Shard) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let open = pending(campaign, store, shard).unwrap();
-    pool.install(|| run(campaign, store, &open, || ())).unwrap();
+    let open = pending(study, store, shard).unwrap();
+    pool.install(|| run(study, store, &open, || ())).unwrap();
 }
 
-fn texts(campaign: &Campaign, results: &Results) -> [String; 3] {
+fn texts(study: &Study, results: &Results) -> [String; 3] {
     [
-        report::study_csv(campaign, results),
-        report::study_json(campaign, results),
-        report::study_parameters_csv(campaign, results),
+        report::study_csv(study, results),
+        report::study_json(study, results),
+        report::study_parameters_csv(study, results),
     ]
 }
 
@@ -137,23 +137,23 @@ fn names_with_a_comma_stay_one_cell() {
 #[test]
 fn threads_shares_and_order_change_nothing() {
     let bench = Bench::new();
-    let campaign = bench.campaign();
-    assert_eq!((campaign.cells.len(), campaign.parts().len()), (CELLS, PARTS));
+    let study = bench.study();
+    assert_eq!((study.cells.len(), study.parts().len()), (CELLS, PARTS));
     let whole = Store::new(&bench.path("whole"));
-    run_on(1, &campaign, &whole, Shard::WHOLE);
-    let expected = texts(&campaign, &collect(&campaign, std::slice::from_ref(&whole)).unwrap());
+    run_on(1, &study, &whole, Shard::WHOLE);
+    let expected = texts(&study, &collect(&study, std::slice::from_ref(&whole)).unwrap());
     assert_eq!(expected[0].lines().count(), 1 + CELLS);
-    assert_eq!(expected[2].lines().count(), 1 + CELLS * campaign.parameters.len());
+    assert_eq!(expected[2].lines().count(), 1 + CELLS * study.parameters.len());
     for (threads, shares) in [(2, 1), (3, 3), (2, 5), (1, 20)] {
         let folder = |i: usize| bench.path(&format!("{shares}-{i}"));
         let stores: Vec<Store> = (1..=shares).map(|i| Store::new(&folder(i))).collect();
         for i in (1..=shares).rev() {
-            run_on(threads, &campaign, &stores[i - 1], Shard::new(i, shares).unwrap());
+            run_on(threads, &study, &stores[i - 1], Shard::new(i, shares).unwrap());
         }
-        let found = texts(&campaign, &collect(&campaign, &stores).unwrap());
+        let found = texts(&study, &collect(&study, &stores).unwrap());
         assert_eq!(found, expected, "{threads} threads, {shares} shares");
         if shares > 1 {
-            let message = collect(&campaign, &stores[1..]).unwrap_err().to_string();
+            let message = collect(&study, &stores[1..]).unwrap_err().to_string();
             assert!(message.contains("of 12 parts of the study are missing"), "{message}");
         }
     }
@@ -163,22 +163,22 @@ fn threads_shares_and_order_change_nothing() {
 fn finished_parts_are_kept_and_no_others_used() {
     let bench = Bench::new();
     let store = Store::new(&bench.path("out"));
-    let fits = |campaign: &Campaign| {
+    let fits = |study: &Study| {
         let count = AtomicUsize::new(0);
-        let open = pending(campaign, &store, Shard::WHOLE).unwrap();
-        run(campaign, &store, &open, || _ = count.fetch_add(1, Ordering::Relaxed)).unwrap();
+        let open = pending(study, &store, Shard::WHOLE).unwrap();
+        run(study, &store, &open, || _ = count.fetch_add(1, Ordering::Relaxed)).unwrap();
         count.into_inner()
     };
-    let campaign = bench.campaign();
-    assert_eq!(fits(&campaign), CELLS * 120);
-    let first = texts(&campaign, &collect(&campaign, std::slice::from_ref(&store)).unwrap());
-    assert_eq!(fits(&campaign), 0, "everything is there");
+    let study = bench.study();
+    assert_eq!(fits(&study), CELLS * 120);
+    let first = texts(&study, &collect(&study, std::slice::from_ref(&store)).unwrap());
+    assert_eq!(fits(&study), 0, "everything is there");
     // One more noise level: the others' fits are still theirs.
     bench.edit("STUDY.toml", "[0.05, 0.2]", "[0.1, 0.05, 0.2]");
-    assert_eq!(fits(&bench.campaign()), 2 * 120);
+    assert_eq!(fits(&bench.study()), 2 * 120);
     // More repetitions: full parts stay, the last one of 20 is done again within one of 50.
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 150");
-    assert_eq!(fits(&bench.campaign()), 6 * 50);
+    assert_eq!(fits(&bench.study()), 6 * 50);
     // Other arms, poses, noise: nothing is.
     for (file, from, to) in [
         ("STUDY.toml", "seed = 7", "seed = 8"),
@@ -187,31 +187,31 @@ fn finished_parts_are_kept_and_no_others_used() {
         ("problem.toml", "0.5 }", "0.4 }"),
     ] {
         bench.edit(file, from, to);
-        assert_eq!(fits(&bench.campaign()), 6 * 150, "{to}");
+        assert_eq!(fits(&bench.study()), 6 * 150, "{to}");
     }
     // And back.
     fs::write(bench.path("STUDY.toml"), STUDY).unwrap();
     fs::write(bench.path("problem.toml"), ARM).unwrap();
-    assert_eq!(fits(&bench.campaign()), 0);
-    assert_eq!(texts(&campaign, &collect(&campaign, std::slice::from_ref(&store)).unwrap()), first);
+    assert_eq!(fits(&bench.study()), 0);
+    assert_eq!(texts(&study, &collect(&study, std::slice::from_ref(&store)).unwrap()), first);
 }
 
 #[test]
 fn damaged_and_foreign_parts_are_not_used() {
     let bench = Bench::new();
-    let campaign = bench.campaign();
+    let study = bench.study();
     let store = Store::new(&bench.path("out"));
-    run_on(2, &campaign, &store, Shard::WHOLE);
+    run_on(2, &study, &store, Shard::WHOLE);
     let mut files = fs::read_dir(store.folder()).unwrap().map(|entry| entry.unwrap().path());
     let (one, other) = (files.next().unwrap(), files.next().unwrap());
     fs::copy(&other, &one).unwrap();
-    let message = pending(&campaign, &store, Shard::WHOLE).unwrap_err().to_string();
+    let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
     assert!(message.contains("belongs to other inputs") && message.contains(&one.display().to_string()), "{message}");
     fs::write(&one, "{").unwrap();
     let assert = bench.flexcal(&["study", "STUDY.toml", "--out", "out"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("damaged"));
     fs::remove_file(&one).unwrap();
-    assert_eq!(pending(&campaign, &store, Shard::WHOLE).unwrap().len(), 1);
+    assert_eq!(pending(&study, &store, Shard::WHOLE).unwrap().len(), 1);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::monte_carlo::{self, Campaign, CellResult, Shard, Store};
+use flexcal::monte_carlo::{self, CellResult, Shard, Store, Study};
 use flexcal::report;
 
 use super::progress::FitBar;
@@ -58,8 +58,8 @@ struct Common {
 }
 
 impl Common {
-    fn folder(&self, campaign: &Campaign) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| Path::new("out").join(&campaign.name))
+    fn folder(&self, study: &Study) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(&study.name))
     }
 
     /// Whether people read along.
@@ -72,53 +72,53 @@ impl Common {
 /// and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
-        let campaign = Campaign::read(&common.study)?;
-        let folder = common.folder(&campaign);
+        let study = Study::read(&common.study)?;
+        let folder = common.folder(&study);
         let stores =
             if from.is_empty() { vec![Store::new(&folder)] } else { from.iter().map(|f| Store::new(f)).collect() };
-        return finish(common, &campaign, &folder, &stores);
+        return finish(common, &study, &folder, &stores);
     }
     // Without a subcommand clap asks for these.
     let Some(common) = &arguments.common else { return Ok(Outcome::Done) };
-    let campaign = Campaign::read(&common.study)?;
-    let folder = common.folder(&campaign);
+    let study = Study::read(&common.study)?;
+    let folder = common.folder(&study);
     let store = Store::new(&folder);
-    fit(common, &campaign, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
+    fit(common, &study, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
     if arguments.shard.is_none() {
-        return finish(common, &campaign, &folder, &[store]);
+        return finish(common, &study, &folder, &[store]);
     }
     if common.talks() {
-        let (study, folder) = (common.study.display(), folder.display());
-        output::print(&format!("Share done. After the last: flexcal study merge {study} --out {folder}\n"))?;
+        let (file, folder) = (common.study.display(), folder.display());
+        output::print(&format!("Share done. After the last: flexcal study merge {file} --out {folder}\n"))?;
     }
     Ok(Outcome::Done)
 }
 
-fn fit(common: &Common, campaign: &Campaign, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
-    let parts = monte_carlo::pending(campaign, store, shard)?;
-    let own = campaign.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
+fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
+    let parts = monte_carlo::pending(study, store, shard)?;
+    let own = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = own.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
     let bar = common.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
-    let done = monte_carlo::run(campaign, store, &parts, || bar.iter().for_each(FitBar::advance));
+    let done = monte_carlo::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     Ok(done?)
 }
 
-fn finish(common: &Common, campaign: &Campaign, folder: &Path, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
-    let results = monte_carlo::collect(campaign, stores)?;
-    let json = report::study_json(campaign, &results);
+fn finish(common: &Common, study: &Study, folder: &Path, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
+    let results = monte_carlo::collect(study, stores)?;
+    let json = report::study_json(study, &results);
     let texts = [
         ("study.json", json.as_str()),
-        ("parameters.csv", &report::study_parameters_csv(campaign, &results)),
+        ("parameters.csv", &report::study_parameters_csv(study, &results)),
         ("timing.csv", &report::study_timing_csv(&results)),
-        ("study.csv", &report::study_csv(campaign, &results)),
+        ("study.csv", &report::study_csv(study, &results)),
     ];
     output::write_all(folder, &texts)?;
     if common.json {
         output::print(&json)?;
     } else if common.talks() {
-        output::print(&report::study_text(campaign, &results))?;
+        output::print(&report::study_text(study, &results))?;
         output::print(&format!(
             "\nWritten to {}, each parameter to parameters.csv beside it\n",
             folder.join("study.csv").display()

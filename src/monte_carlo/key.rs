@@ -2,31 +2,28 @@
 
 use std::fmt::Write as _;
 
-use super::part::Part;
-use super::plan::{Campaign, Cell};
+use super::study::{Cell, Part, Study};
 use crate::problem::PoseRanges;
 use crate::problem::digest::hexadecimal;
 use crate::simulate::{Cause, HeldOutRows, Shape, Truth};
 
-impl Campaign {
-    /// A digest of everything that the fits of a part depend on, 64 hexadecimal digits: the version of flexcal, the
-    /// text of the problem file, the truth, and the numbers of the study that concern these fits.
-    ///
-    /// It is the SHA-256 of lines of words and numbers, numbers in SI as short as they can be read back exactly: version,
-    /// source, seed, held-out poses; σ, poses, strategy, solver, first repetition and the one after the last; the truth; the
-    /// text of the problem file. Numbers that do not concern these fits do not enter: a study with one more noise level keeps
-    /// the others' parts.
-    pub(super) fn key(&self, part: &Part) -> String {
-        let Self { problem_text, source, seed, held_out, .. } = self;
-        let Cell { sigma, poses, strategy, solver } = &self.cells[part.cell];
-        let (version, source) = (env!("CARGO_PKG_VERSION"), source.as_str());
-        let (strategy, solver) = (strategy.as_str(), solver.as_str());
-        let (first, end) = (part.repetitions.start, part.repetitions.end);
-        let truth = canonical(&self.truth);
-        hexadecimal(&format!(
-            "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}\n{problem_text}"
-        ))
-    }
+/// A digest of everything that the fits of a part depend on, 64 hexadecimal digits: the version of flexcal, the
+/// text of the problem file, the truth, and the numbers of the study that concern these fits.
+///
+/// It is the SHA-256 of lines of words and numbers, numbers in SI as short as they can be read back exactly: version,
+/// source, seed, held-out poses; σ, poses, strategy, solver, first repetition and the one after the last; the truth; the
+/// text of the problem file. Numbers that do not concern these fits do not enter: a study with one more noise level keeps
+/// the others' parts.
+pub(super) fn key(study: &Study, part: &Part) -> String {
+    let Study { problem_text, source, seed, held_out, .. } = study;
+    let Cell { sigma, poses, strategy, solver } = &study.cells[part.cell];
+    let (version, source) = (env!("CARGO_PKG_VERSION"), source.as_str());
+    let (strategy, solver) = (strategy.as_str(), solver.as_str());
+    let (first, end) = (part.repetitions.start, part.repetitions.end);
+    let truth = canonical(&study.truth);
+    hexadecimal(&format!(
+        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}\n{problem_text}"
+    ))
 }
 
 /// A truth in lines: `parameter`, name, value; `random`, pattern, spreads of angles, lengths and the relative one or `-`;

@@ -1,8 +1,8 @@
-//! From the text of `STUDY.toml` to a [`Campaign`].
+//! From the text of `STUDY.toml` to a [`Study`].
 
 use std::path::{Path, PathBuf};
 
-use super::plan::{Campaign, Cell, Source};
+use super::study::{Cell, Source, Study};
 use crate::error::{InputError, InputErrorKind};
 use crate::identify::{SolverChoice, Strategy};
 use crate::model::Model;
@@ -18,14 +18,20 @@ const HELD_OUT: usize = 50;
 /// Most poses, held-out ones, repetitions.
 const MOST: u64 = 1_000_000;
 
-pub(super) fn file(path: &Path) -> Result<Campaign, InputError> {
-    let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
-    let document = Document::read(&file, InputErrorKind::StudyMissing)?;
-    let table = document.table()?;
-    campaign(Section::new(&document, String::new(), 0..0, table.get_ref()), &file)
+impl Study {
+    /// Reads a study; `path` is its file, or the folder that holds a `STUDY.toml`.
+    ///
+    /// # Errors
+    /// The first mistake found, in it or in the files that it names; a file that cannot be read among them.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
+        let document = Document::read(&file, InputErrorKind::StudyMissing)?;
+        let table = document.table()?;
+        study(Section::new(&document, String::new(), 0..0, table.get_ref()), &file)
+    }
 }
 
-fn campaign(mut root: Section<'_, '_>, file: &Path) -> Result<Campaign, InputError> {
+fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let name = name(&mut root)?;
     let title = root.text("title")?.unwrap_or(&name).to_owned();
@@ -60,7 +66,7 @@ fn campaign(mut root: Section<'_, '_>, file: &Path) -> Result<Campaign, InputErr
         }
     }
     let parameters = model.parameters;
-    Ok(Campaign { name, title, problem, parameters, truth, source, seed, repetitions, held_out, cells, problem_text })
+    Ok(Study { name, title, problem, parameters, truth, source, seed, repetitions, held_out, cells, problem_text })
 }
 
 fn problem(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem, String), InputError> {

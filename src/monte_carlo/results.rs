@@ -1,6 +1,6 @@
 //! What a study found: each cell, and each parameter in it.
 
-use super::plan::{Campaign, Cell};
+use super::study::{Cell, Study};
 use super::tally::{ParameterTally, Tally};
 use crate::model::parameter::Parameter;
 
@@ -69,8 +69,8 @@ impl CellResult {
     }
 
     /// Every free parameter.
-    pub fn parameters<'a>(&'a self, campaign: &'a Campaign) -> impl Iterator<Item = ParameterResult<'a>> {
-        campaign.parameters.iter().zip(&self.tally.parameters).map(|(parameter, tally)| {
+    pub fn parameters<'a>(&'a self, study: &'a Study) -> impl Iterator<Item = ParameterResult<'a>> {
+        study.parameters.iter().zip(&self.tally.parameters).map(|(parameter, tally)| {
             let ParameterTally { error, std_error, covered } = tally;
             ParameterResult {
                 parameter,
@@ -92,12 +92,12 @@ impl CellResult {
     }
 
     /// The parameter whose bias is largest against its spread, and that ratio, with the sign of the bias.
-    pub fn largest_bias<'a>(&'a self, campaign: &'a Campaign) -> Option<(&'a Parameter, f64)> {
+    pub fn largest_bias<'a>(&'a self, study: &'a Study) -> Option<(&'a Parameter, f64)> {
         let ratio = |result: ParameterResult<'a>| {
             let spread = result.spread.filter(|spread| *spread > 0.0)?;
             Some((result.parameter, result.bias? / spread))
         };
-        self.parameters(campaign).filter_map(ratio).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+        self.parameters(study).filter_map(ratio).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
     /// How long the fits took.

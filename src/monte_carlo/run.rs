@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::part::{Part, Shard};
-use super::plan::Campaign;
+use super::repetition::{fit, problem_of};
 use super::results::{CellResult, Results};
 use super::store::{Kept, Store, StoreError};
+use super::study::{Part, Shard, Study};
 use super::tally::Tally;
 
 /// Why a study has no results.
@@ -27,10 +27,10 @@ pub enum RunError {
 ///
 /// # Errors
 /// A kept part cannot be read.
-pub fn pending(campaign: &Campaign, store: &Store, shard: Shard) -> Result<Vec<Part>, StoreError> {
+pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, StoreError> {
     let mut pending = Vec::new();
-    for (_, part) in campaign.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index)) {
-        if store.find(campaign, &part)?.is_none() {
+    for (_, part) in study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index)) {
+        if store.find(study, &part)?.is_none() {
             pending.push(part);
         }
     }
@@ -42,23 +42,23 @@ pub fn pending(campaign: &Campaign, store: &Store, shard: Shard) -> Result<Vec<P
 ///
 /// # Errors
 /// A part cannot be kept.
-pub fn run(campaign: &Campaign, store: &Store, parts: &[Part], fitted: impl Fn() + Sync) -> Result<(), StoreError> {
+pub fn run(study: &Study, store: &Store, parts: &[Part], fitted: impl Fn() + Sync) -> Result<(), StoreError> {
     let run_part = |part: &Part| {
-        let cell = &campaign.cells[part.cell];
-        let problem = campaign.problem_of(cell);
-        let fit = |repetition| {
-            let score = campaign.fit(&problem, cell, repetition);
+        let cell = &study.cells[part.cell];
+        let problem = problem_of(study, cell);
+        let score = |repetition| {
+            let score = fit(study, &problem, cell, repetition);
             fitted();
             score
         };
-        let fits: Vec<_> = part.repetitions.clone().into_par_iter().map(fit).collect();
-        let mut tally = Tally::new(campaign.parameters.len());
+        let fits: Vec<_> = part.repetitions.clone().into_par_iter().map(score).collect();
+        let mut tally = Tally::new(study.parameters.len());
         let mut seconds = Vec::with_capacity(fits.len());
         for (score, time) in fits {
             tally.push(score);
             seconds.push(time);
         }
-        store.keep(&Kept::new(campaign, part, tally, seconds))
+        store.keep(&Kept::new(study, part, tally, seconds))
     };
     parts.par_iter().try_for_each(run_part)
 }
@@ -67,16 +67,15 @@ pub fn run(campaign: &Campaign, store: &Store, parts: &[Part], fitted: impl Fn()
 ///
 /// # Errors
 /// A part is missing or cannot be read.
-pub fn collect(campaign: &Campaign, stores: &[Store]) -> Result<Results, RunError> {
-    let empty =
-        |cell: &_| CellResult { cell: *cell, tally: Tally::new(campaign.parameters.len()), seconds: Vec::new() };
-    let mut cells: Vec<CellResult> = campaign.cells.iter().map(empty).collect();
-    let parts = campaign.parts();
+pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
+    let empty = |cell: &_| CellResult { cell: *cell, tally: Tally::new(study.parameters.len()), seconds: Vec::new() };
+    let mut cells: Vec<CellResult> = study.cells.iter().map(empty).collect();
+    let parts = study.parts();
     let mut missing = 0;
     for part in &parts {
         let mut kept = None;
         for store in stores {
-            kept = kept.or(store.find(campaign, part)?);
+            kept = kept.or(store.find(study, part)?);
         }
         match kept {
             Some(kept) => {

@@ -6,8 +6,8 @@ use std::{fs, mem};
 
 use serde::{Deserialize, Serialize};
 
-use super::part::Part;
-use super::plan::Campaign;
+use super::key::key;
+use super::study::{Part, Study};
 use super::tally::Tally;
 use crate::files::prepared;
 
@@ -47,11 +47,11 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    pub fn new(campaign: &Campaign, part: &Part, tally: Tally, seconds: Vec<f64>) -> Self {
-        let cell = &campaign.cells[part.cell];
+    pub fn new(study: &Study, part: &Part, tally: Tally, seconds: Vec<f64>) -> Self {
+        let cell = &study.cells[part.cell];
         let what = format!(
             "{}: σ {} mm, {} poses, {}, {}, repetitions {} to {}",
-            campaign.name,
+            study.name,
             cell.sigma * 1e3,
             cell.poses,
             cell.strategy.as_str(),
@@ -59,7 +59,7 @@ impl Kept {
             part.repetitions.start + 1,
             part.repetitions.end
         );
-        Self { part: what, key: campaign.key(part), tally, seconds }
+        Self { part: what, key: key(study, part), tally, seconds }
     }
 }
 
@@ -85,8 +85,8 @@ impl Store {
     }
 
     /// A part, if it is finished.
-    pub(super) fn find(&self, campaign: &Campaign, part: &Part) -> Result<Option<Kept>, StoreError> {
-        let key = campaign.key(part);
+    pub(super) fn find(&self, study: &Study, part: &Part) -> Result<Option<Kept>, StoreError> {
+        let key = key(study, part);
         let path = self.path(&key);
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,

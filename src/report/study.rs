@@ -7,24 +7,24 @@ use super::json::{object, to_text};
 use super::quantity::{number, or_dash};
 use super::render::text;
 use super::table;
-use crate::monte_carlo::{Campaign, CellResult, ParameterResult, Results, Source, Tally};
+use crate::monte_carlo::{CellResult, ParameterResult, Results, Source, Study, Tally};
 
 /// First columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
 object! {
-    Document<'a>(campaign: &'a Campaign, results: &'a Results) {
-        study: &'a str = &campaign.name,
-        problem: &'a str = &campaign.problem.name,
-        data: &'a str = campaign.source.as_str(),
-        seed: u64 = campaign.seed,
-        repetitions: usize = campaign.repetitions,
-        held_out_poses: usize = campaign.held_out,
-        cells: Vec<Cell<'a>> = results.cells.iter().map(|cell| Cell::of(campaign, cell)).collect(),
+    Document<'a>(study: &'a Study, results: &'a Results) {
+        study: &'a str = &study.name,
+        problem: &'a str = &study.problem.name,
+        data: &'a str = study.source.as_str(),
+        seed: u64 = study.seed,
+        repetitions: usize = study.repetitions,
+        held_out_poses: usize = study.held_out,
+        cells: Vec<Cell<'a>> = results.cells.iter().map(|cell| Cell::of(study, cell)).collect(),
     }
 }
 object! {
-    Cell<'a>(campaign: &'a Campaign, result: &'a CellResult) {
+    Cell<'a>(study: &'a Study, result: &'a CellResult) {
         position_sigma_mm: f64 = millimetres(result.cell.sigma),
         identification_poses: usize = result.cell.poses,
         strategy: &'a str = result.cell.strategy.as_str(),
@@ -38,10 +38,10 @@ object! {
         reduced_chi2: Option<f64> = result.tally.reduced_chi2.mean(),
         coverage: Option<f64> = result.coverage(),
         largest_bias: Option<LargestBias<'a>> =
-            result.largest_bias(campaign).map(|(parameter, bias)| LargestBias::of(&parameter.name, bias)),
+            result.largest_bias(study).map(|(parameter, bias)| LargestBias::of(&parameter.name, bias)),
         iterations_mean: Option<f64> = result.tally.iterations.mean(),
         iterations_max: Option<f64> = result.tally.iterations.largest(),
-        parameters: Vec<Parameter<'a>> = result.parameters(campaign).map(|own| Parameter::of(&own)).collect(),
+        parameters: Vec<Parameter<'a>> = result.parameters(study).map(|own| Parameter::of(&own)).collect(),
     }
 }
 object! {
@@ -84,23 +84,23 @@ fn millimetres(metres: f64) -> f64 {
 }
 
 /// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and without times.
-pub fn study_json(campaign: &Campaign, results: &Results) -> String {
-    to_text(&Document::of(campaign, results))
+pub fn study_json(study: &Study, results: &Results) -> String {
+    to_text(&Document::of(study, results))
 }
 
 /// A study as text, ending in a line break.
-pub fn study_text(campaign: &Campaign, results: &Results) -> String {
-    let by = match campaign.source {
+pub fn study_text(study: &Study, results: &Results) -> String {
+    let by = match study.source {
         Source::Model => "the model itself",
         Source::Rig => "the virtual test rig",
     };
     let head = format!(
         "{}\n{} cells of {} fits, {} parameters, measured by {by}; {} poses held out in each",
-        campaign.title,
-        campaign.cells.len(),
-        campaign.repetitions,
-        campaign.parameters.len(),
-        campaign.held_out
+        study.title,
+        study.cells.len(),
+        study.repetitions,
+        study.parameters.len(),
+        study.held_out
     );
     let header = [
         "noise mm",
@@ -117,7 +117,7 @@ pub fn study_text(campaign: &Campaign, results: &Results) -> String {
         "steps",
         "ms",
     ];
-    let rows = results.cells.iter().map(|cell| line(campaign, cell)).collect();
+    let rows = results.cells.iter().map(|cell| line(study, cell)).collect();
     let shown = Table::new(&header, rows, &[2, 3, 10]).noted(&[
         "held out: measured − predicted, noise included; covered: by ± 1.96 standard errors, 95 % if those are right;",
         "largest bias: of all parameters, over its spread; ms: middle fit",
@@ -125,12 +125,12 @@ pub fn study_text(campaign: &Campaign, results: &Results) -> String {
     text(&[Block::lines(head), Block::Table(shown)])
 }
 
-fn line(campaign: &Campaign, result: &CellResult) -> Vec<String> {
+fn line(study: &Study, result: &CellResult) -> Vec<String> {
     let CellResult { cell, tally, .. } = result;
     let shown = |value: Option<f64>, decimals| or_dash(value, |value| number(value, decimals));
     let length = |metres: Option<f64>| shown(in_mm(metres), 4);
     let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.1} %", 100.0 * share));
-    let bias = result.largest_bias(campaign);
+    let bias = result.largest_bias(study);
     vec![
         millimetres(cell.sigma).to_string(),
         cell.poses.to_string(),
@@ -149,12 +149,12 @@ fn line(campaign: &Campaign, result: &CellResult) -> Vec<String> {
 }
 
 /// `study.csv`: one line a cell.
-pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
+pub fn study_csv(study: &Study, results: &Results) -> String {
     let header = "fits,failed,failure_rate,held_out_mean_mm,held_out_rms_mm,held_out_rms_sd_mm,held_out_rms_max_mm,\
                   reduced_chi2,coverage,largest_bias_sd,largest_bias_of,iterations_mean,iterations_max";
     let line = |(index, cell): (usize, &CellResult)| {
         let tally = &cell.tally;
-        let bias = cell.largest_bias(campaign);
+        let bias = cell.largest_bias(study);
         let length = |metres: Option<f64>| plain(in_mm(metres));
         let cells = vec![
             tally.fits.to_string(),
@@ -177,10 +177,10 @@ pub fn study_csv(campaign: &Campaign, results: &Results) -> String {
 }
 
 /// `parameters.csv`: one line a cell and parameter; relative: of ln(value).
-pub fn study_parameters_csv(campaign: &Campaign, results: &Results) -> String {
+pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
     let lines = results.cells.iter().enumerate().flat_map(|(index, cell)| {
-        cell.parameters(campaign).map(move |result| {
+        cell.parameters(study).map(move |result| {
             let cells = vec![
                 result.parameter.name.clone(),
                 result.unit().to_owned(),

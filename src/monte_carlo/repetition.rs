@@ -1,0 +1,145 @@
+//! One repetition of a study: measurements of an arm that was drawn, their fit, and how far it is from the truth.
+
+use std::path::PathBuf;
+
+use nalgebra::{DVector, Vector3};
+use rand::{Rng as _, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::study::{Cell, Source, Study};
+use super::tally::{Fitted, ParameterScore, Score};
+use crate::identify::{Distrust, Estimate, Identification, IdentifyError, Options, Placement, identify};
+use crate::measurement::{Dataset, Labels, Measurements, Split};
+use crate::model::Model;
+use crate::problem::Problem;
+use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
+
+/// Measurements whose truth is known.
+struct Data {
+    /// The held-out poses, then those to identify with.
+    dataset: Dataset,
+    /// True x of each free parameter; `None` where the truth does not say.
+    truth: Vec<Option<f64>>,
+}
+
+/// The problem as a cell declares it.
+pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
+    let mut problem = study.problem.clone();
+    problem.data.position_sigma = Some(cell.sigma);
+    problem
+}
+
+/// Fits a repetition, counted from 0; also the time that the fit took [s].
+pub(super) fn fit(study: &Study, problem: &Problem, cell: &Cell, repetition: usize) -> (Score, f64) {
+    let Some(data) = data(study, cell, repetition) else { return (Score::Failed("no-equilibrium"), 0.0) };
+    let options = Options { strategy: cell.strategy, solver: cell.solver, ..Options::default() };
+    match identify(problem, &data.dataset, &options) {
+        // The files fit each other: what is left is a nominal arm that does not stand in one of the poses.
+        Err(IdentifyError::Input(_)) => (Score::Failed("no-equilibrium"), 0.0),
+        Err(_) => (Score::Failed("cannot-be-fitted"), 0.0),
+        Ok(found) => (score(&data, &found), found.seconds),
+    }
+}
+
+/// The measurements of a repetition, counted from 0; `None` where the true arm does not come to rest in some pose.
+///
+/// Held-out poses come first, so that they are the same for every number of poses; noise of another σ is the same
+/// noise scaled.
+fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
+    let truth = Truth { noise_sigma: cell.sigma, ..study.truth.clone() };
+    let Draw { arm, parameters, mut rows } =
+        simulate::draw(&study.problem, &truth, study.held_out + cell.poses, seed_of(study, repetition));
+    let true_x = study.parameters.iter().map(|parameter| {
+        let known = |known: &&TrueParameter| known.name == parameter.name;
+        Some(parameter.deviation(parameters.iter().find(known)?.value))
+    });
+    let true_x = true_x.collect();
+    let seen = match study.source {
+        Source::Model => by_model(arm, &rows)?,
+        Source::Rig => by_rig(arm, &truth, &rows)?,
+    };
+    for (row, seen) in rows.iter_mut().zip(seen) {
+        row.position += seen;
+    }
+    let split =
+        Split { held_out: (0..study.held_out).collect(), identification: (study.held_out..rows.len()).collect() };
+    Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
+}
+
+/// A seed of its own for each repetition.
+fn seed_of(study: &Study, repetition: usize) -> u64 {
+    let mut random = ChaCha8Rng::seed_from_u64(study.seed);
+    random.set_stream(repetition as u64);
+    random.next_u64()
+}
+
+/// Positions that the model predicts for an arm as declared [m].
+fn by_model(mut arm: Problem, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+    (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
+    let model = Model::new(&arm, &[String::new()], &[String::new()]).ok()?;
+    let mut table = table(rows);
+    table.positions.fill(Vector3::zeros());
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let errors = Placement::of(&table).position_errors(&model, &DVector::zeros(0), &table, &all);
+    errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
+}
+
+/// Positions on the virtual test rig [m].
+fn by_rig(arm: Problem, truth: &Truth, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+    let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
+    rows.iter().map(|row| rig.position(&row.conditions).ok()).collect()
+}
+
+/// What the virtual test rig measured, as a table of measurements.
+pub fn table(rows: &[Row]) -> Measurements {
+    let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
+    let approach: Vec<f64> = rows.iter().flat_map(|row| row.conditions.approach.iter().flatten().copied()).collect();
+    Measurements {
+        files: vec![PathBuf::from("simulated")],
+        origin: (1_u32..).take(rows.len()).map(|line| (0, line)).collect(),
+        joints: rows.first().map_or(0, |row| row.conditions.configuration.len()),
+        configurations: rows.iter().flat_map(|row| row.conditions.configuration.iter().copied()).collect(),
+        positions: rows.iter().map(|row| row.position).collect(),
+        sigma: None,
+        payload: of(|row| row.conditions.payload),
+        hoist: of(|row| row.conditions.hoist),
+        temperature: of(|row| row.conditions.temperature),
+        time: rows.iter().map(|row| row.conditions.time).collect(),
+        time_measured: true,
+        approach: (!approach.is_empty()).then_some(approach),
+        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
+        target: None,
+        marked_held_out: None,
+    }
+}
+
+fn score(data: &Data, found: &Identification) -> Score {
+    match &found.distrust {
+        Some(Distrust::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
+        Some(Distrust::NotConverged(_) | Distrust::HeldOutNotConverged(_)) => return Score::Failed("not-converged"),
+        Some(Distrust::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
+        Some(Distrust::Misses { .. }) => return Score::Failed("misses-the-data"),
+        Some(Distrust::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
+        None => {}
+    }
+    let held_out = &found.fitted.held_out;
+    if !held_out.rms.norm.is_finite() {
+        return Score::Failed("no-equilibrium");
+    }
+    let parameters = found.estimates.iter().zip(found.x.iter()).zip(&data.truth).map(|((estimate, x), truth)| {
+        truth.map(|truth| ParameterScore { error: x - truth, std_error: of_x(estimate) })
+    });
+    Score::Fitted(Fitted {
+        held_out_mean: held_out.mean.norm,
+        held_out_rms: held_out.rms.norm,
+        reduced_chi2: found.reduced_chi2,
+        iterations: found.iterations,
+        parameters: parameters.collect(),
+    })
+}
+
+/// The standard error of x, which is a logarithm for stiffnesses.
+fn of_x(estimate: &Estimate) -> Option<f64> {
+    let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
+    estimate.std_error.map(|error| error / scale)
+}
