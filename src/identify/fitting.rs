@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::placement::Late;
+use super::placement::HeldOutOnly;
 use super::registration::register;
 use super::stage::{Gauge, Stage, StageEnd, StageError};
 use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strategy};
@@ -26,7 +26,7 @@ pub(super) struct Fitting<'a> {
     pub split: &'a Split,
     pub placement: &'a Placement,
     /// Bases and targets that only held-out rows use.
-    pub late: Late,
+    pub held_out_only: HeldOutOnly,
     pub strategy: Strategy,
     pub solver: SolverChoice,
     /// How the residual of a pose counts in the strategy's fits.
@@ -60,10 +60,10 @@ impl From<StageEnd> for FitEnd {
 }
 
 impl<'a> Fitting<'a> {
-    /// Parameters of a kind, those of late bases and targets left out.
+    /// Parameters of a kind, those of bases and targets of held-out rows alone left out.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
         let all = self.model.parameters.iter().enumerate();
-        all.filter(|&(k, parameter)| !self.late.parameters[k] && choose(parameter)).map(|(k, _)| k).collect()
+        all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter)).map(|(k, _)| k).collect()
     }
 
     fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
@@ -99,10 +99,10 @@ impl<'a> Fitting<'a> {
     }
 
     /// Bases and targets of held-out sessions, as one stage on their rows.
-    pub fn late_stage(&self) -> Option<Stage<'a>> {
-        let unknowns: Vec<usize> =
-            self.late.parameters.iter().enumerate().filter(|(_, late)| **late).map(|(k, _)| k).collect();
-        (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(&self.late.rows, unknowns) })
+    pub fn held_out_stage(&self) -> Option<Stage<'a>> {
+        let HeldOutOnly { parameters, rows } = &self.held_out_only;
+        let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
+        (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
     }
 
     /// First row whose pose has no equilibrium on the nominal arm.
@@ -120,14 +120,14 @@ impl<'a> Fitting<'a> {
         for pose in &poses {
             known[pose.base] = true;
         }
-        let late = self.placement.poses(self.measurements, &self.late.rows, self.sigma);
-        poses.extend(late.into_iter().filter(|pose| !known[pose.base]));
+        let held_out = self.placement.poses(self.measurements, &self.held_out_only.rows, self.sigma);
+        poses.extend(held_out.into_iter().filter(|pose| !known[pose.base]));
         register(self.model, &poses, &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
         if !placements.is_empty() {
             x = self.placing(&self.split.identification, placements).run(&x)?.x;
         }
-        match self.late_stage() {
+        match self.held_out_stage() {
             Some(stage) => Ok(stage.run(&x)?.x),
             None => Ok(x),
         }

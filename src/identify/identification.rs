@@ -9,9 +9,9 @@ use super::covariance::Collected;
 use super::fitting::{FitEnd, Fitting};
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
+use super::quality::{QualityFlag, TooFewPoses, beyond_prior, misses, underdetermined};
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::trust::{Distrust, TooFewPoses, beyond_prior, misses, underdetermined};
 use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::{Identifiability, Loss};
@@ -180,7 +180,7 @@ pub fn identify_model(
         measurements,
         split,
         placement: &placement,
-        late: placement.late(model, split),
+        held_out_only: placement.held_out_only(model, split),
         strategy,
         solver,
         loss: problem.robust.map_or(Loss::Squares, loss),
@@ -210,16 +210,16 @@ pub fn identify_model(
     enter((&mut estimates, &mut covariance), &fitting.whole(), &end, &statistics);
     let numbers = measurements.pose_numbers(problem);
     let poses = different(&numbers, split.identification.iter().copied());
-    let mut distrust = (!end.termination.converged()).then_some(Distrust::NotConverged(end.termination));
-    if let Some(stage) = fitting.late_stage() {
-        let late: FitEnd = stage.run(&end.x)?.into();
-        end.iterations += late.iterations;
-        end.evaluations += late.evaluations;
-        distrust = distrust
-            .or_else(|| (!late.termination.converged()).then_some(Distrust::HeldOutNotConverged(late.termination)));
-        let statistics = Statistics::of(&stage, &late, noise_is_declared)?;
-        enter((&mut estimates, &mut covariance), &stage, &late, &statistics);
-        end.x = late.x;
+    let mut not_converged = (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
+    if let Some(stage) = fitting.held_out_stage() {
+        let placed: FitEnd = stage.run(&end.x)?.into();
+        end.iterations += placed.iterations;
+        end.evaluations += placed.evaluations;
+        not_converged = not_converged
+            .or((!placed.termination.converged()).then_some(QualityFlag::HeldOutNotConverged(placed.termination)));
+        let statistics = Statistics::of(&stage, &placed, noise_is_declared)?;
+        enter((&mut estimates, &mut covariance), &stage, &placed, &statistics);
+        end.x = placed.x;
     }
     if noise == Noise::Unknown {
         for estimate in &mut estimates {
@@ -233,12 +233,12 @@ pub fn identify_model(
     // An arm that was near before the fit was driven away by a solver that did not converge.
     let misses = far(&fitted).filter(|_| end.termination.converged() || far(&registered).is_some());
     let parameters = unknowns.len();
-    let distrust = too_few_equations(&fitting, &numbers, &unknowns)
+    let quality_flag = too_few_equations(&fitting, &numbers, &unknowns)
         .or(misses)
-        .or(distrust)
+        .or(not_converged)
         .or_else(|| beyond_prior(model, &end.x));
     Ok(Identification {
-        distrust,
+        quality_flag,
         too_few_poses: (3 * poses < parameters).then_some(TooFewPoses { poses, parameters }),
         strategy,
         solver,
@@ -266,14 +266,14 @@ pub fn identify_model(
 }
 
 /// The whole fit, a base or a target with fewer coordinates than parameters without a prior; `numbers` are those of the poses.
-fn too_few_equations(fitting: &Fitting, numbers: &[usize], unknowns: &[&Parameter]) -> Option<Distrust> {
-    let Fitting { model, placement, late, split, .. } = fitting;
+fn too_few_equations(fitting: &Fitting, numbers: &[usize], unknowns: &[&Parameter]) -> Option<QualityFlag> {
+    let Fitting { model, placement, held_out_only, split, .. } = fitting;
     let coordinates = 3 * different(numbers, split.identification.iter().copied());
     let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
     (coordinates < without_prior)
-        .then(|| Distrust::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
-        .or_else(|| underdetermined(model, placement, numbers, &split.identification, |k| !late.parameters[k]))
-        .or_else(|| underdetermined(model, placement, numbers, &late.rows, |k| late.parameters[k]))
+        .then(|| QualityFlag::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
+        .or_else(|| underdetermined(model, placement, numbers, &split.identification, |k| !held_out_only.parameters[k]))
+        .or_else(|| underdetermined(model, placement, numbers, &held_out_only.rows, |k| held_out_only.parameters[k]))
 }
 
 /// Runs the strategy; where no σ is declared, again and again until the scatter about the fit is the σ assumed.

@@ -6,7 +6,7 @@ use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
-use super::{ActiveConstraint, Distrust, ErrorSummary, Outlier, SolverChoice, Strategy, TooFewPoses};
+use super::{ActiveConstraint, ErrorSummary, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
 use crate::least_squares::Identifiability;
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::model::parameter::Parameter;
@@ -73,7 +73,7 @@ pub struct Identification {
     /// Why it stopped.
     pub termination: Termination,
     /// Why the fit is not to be trusted, if it is not.
-    pub distrust: Option<Distrust>,
+    pub quality_flag: Option<QualityFlag>,
     /// Whether the poses are too few to say much without priors.
     pub too_few_poses: Option<TooFewPoses>,
     /// Steps tried, over all stages.
@@ -118,7 +118,7 @@ pub struct Identification {
 impl Identification {
     /// Whether the fit is to be trusted.
     pub fn is_trusted(&self) -> bool {
-        self.distrust.is_none()
+        self.quality_flag.is_none()
     }
 
     /// A parameter by its name: `joint2.stiffness`.

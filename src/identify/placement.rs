@@ -91,7 +91,7 @@ impl Placement {
     /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.
     ///
     /// They say nothing about the arm: they are fitted on their held-out rows, alone.
-    pub fn late(&self, model: &Model, split: &Split) -> Late {
+    pub(super) fn held_out_only(&self, model: &Model, split: &Split) -> HeldOutOnly {
         let unused = |count: usize, of_row: &[usize]| {
             let mut unused = vec![true; count];
             split.identification.iter().for_each(|&row| unused[of_row[row]] = false);
@@ -109,13 +109,13 @@ impl Placement {
             })
             .collect();
         let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];
-        Late { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
+        HeldOutOnly { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
     }
 }
 
 /// Bases and targets that appear in held-out rows only.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Late {
+pub(super) struct HeldOutOnly {
     /// Whether each parameter of the model belongs to one.
     pub parameters: Vec<bool>,
     /// The held-out rows that use one.

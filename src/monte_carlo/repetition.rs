@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::study::{Cell, Source, Study};
 use super::tally::{Fitted, ParameterScore, Score};
-use crate::identify::{Distrust, Estimate, Identification, IdentifyError, Options, Placement, identify};
+use crate::identify::{Estimate, Identification, IdentifyError, Options, Placement, QualityFlag, identify};
 use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
@@ -114,12 +114,14 @@ pub fn table(rows: &[Row]) -> Measurements {
 }
 
 fn score(data: &Data, found: &Identification) -> Score {
-    match &found.distrust {
-        Some(Distrust::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
-        Some(Distrust::NotConverged(_) | Distrust::HeldOutNotConverged(_)) => return Score::Failed("not-converged"),
-        Some(Distrust::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
-        Some(Distrust::Misses { .. }) => return Score::Failed("misses-the-data"),
-        Some(Distrust::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
+    match &found.quality_flag {
+        Some(QualityFlag::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
+        Some(QualityFlag::NotConverged(_) | QualityFlag::HeldOutNotConverged(_)) => {
+            return Score::Failed("not-converged");
+        }
+        Some(QualityFlag::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
+        Some(QualityFlag::Misses { .. }) => return Score::Failed("misses-the-data"),
+        Some(QualityFlag::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
         None => {}
     }
     let held_out = &found.fitted.held_out;

@@ -116,7 +116,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
         Block::Text(verdict(closure)),
     ];
-    blocks.extend(distrust(closure));
+    blocks.extend(quality_flag(closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
@@ -151,7 +151,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
-    blocks.extend(distrust(closure));
+    blocks.extend(quality_flag(closure));
     blocks.extend([
         Block::Table(errors(closure)),
         Block::Text(gain(closure)),
@@ -252,7 +252,7 @@ fn lower(words: &str) -> String {
 }
 
 /// Why the final fit is not to be trusted.
-fn distrust<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
+fn quality_flag<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
     let after = &closure.after;
     (!after.is_trusted()).then(|| Block::Note(format!("Beware: {}.", why_not_trusted(after))))
 }

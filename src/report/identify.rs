@@ -10,7 +10,7 @@ use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentifie
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters};
 use super::quantity::{decimals, mm, number};
 use super::render::{Report, report, text};
-use crate::identify::{ActiveConstraint, Distrust, ErrorSummary, Estimate, Identification, Noise, Outlier};
+use crate::identify::{ActiveConstraint, ErrorSummary, Estimate, Identification, Noise, Outlier, QualityFlag};
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
 
@@ -134,7 +134,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
 
 /// Why a fit is not to be trusted, in one line.
 pub fn why_not_trusted(found: &Identification) -> String {
-    match &found.distrust {
+    match &found.quality_flag {
         Some(reason) => format!("the fit is not to be trusted: {reason}"),
         None => "the fit is to be trusted".to_owned(),
     }
@@ -261,7 +261,8 @@ fn noise(problem: &Problem, found: &Identification) -> String {
                 .to_owned()
         }
         (Noise::Declared, Some(_))
-            if found.too_few_poses.is_some() || matches!(found.distrust, Some(Distrust::TooFewEquations { .. })) =>
+            if found.too_few_poses.is_some()
+                || matches!(found.quality_flag, Some(QualityFlag::TooFewEquations { .. })) =>
         {
             "There are not enough different poses to judge the declared σ, or the model.".to_owned()
         }

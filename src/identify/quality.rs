@@ -1,4 +1,4 @@
-//! When a fit is not to be trusted.
+//! Quality flags of a fit: why it is not to be trusted, and whether priors decide most of it.
 
 use std::fmt;
 
@@ -23,7 +23,8 @@ const LEAST_SPREAD: f64 = 0.01;
 
 /// Why a fit is not to be trusted.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Distrust {
+#[non_exhaustive]
+pub enum QualityFlag {
     /// Fewer equations than unknowns without a prior.
     TooFewEquations {
         /// What the unknowns belong to: the whole fit, or a base or tool.
@@ -53,7 +54,7 @@ pub enum Distrust {
     },
 }
 
-impl fmt::Display for Distrust {
+impl fmt::Display for QualityFlag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFewEquations { of, coordinates, unknowns } => {
@@ -106,7 +107,7 @@ impl fmt::Display for TooFewPoses {
 }
 
 /// The parameter of the arm's geometry that lies furthest beyond its prior, if that is out of all proportion.
-pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> {
+pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<QualityFlag> {
     let ratio = |(k, parameter): (usize, &Parameter)| match parameter.slot {
         Slot::Joint { field, .. } if JointField::GEOMETRY.contains(&field) && parameter.driver.is_constant() => {
             parameter.sigma.map(|sigma| (k, x[k].abs() / sigma))
@@ -115,7 +116,7 @@ pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<Distrust> 
     };
     let ratios = model.parameters.iter().enumerate().filter_map(ratio);
     let (k, sigmas) = ratios.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (sigmas > OUT_OF_PROPORTION).then(|| Distrust::BeyondPrior { name: model.parameters[k].name.clone(), sigmas })
+    (sigmas > OUT_OF_PROPORTION).then(|| QualityFlag::BeyondPrior { name: model.parameters[k].name.clone(), sigmas })
 }
 
 /// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates measured in different
@@ -127,12 +128,16 @@ pub(super) fn underdetermined(
     numbers: &[usize],
     rows: &[usize],
     varied: impl Fn(usize) -> bool,
-) -> Option<Distrust> {
+) -> Option<QualityFlag> {
     let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
         let coordinates = 3 * different(numbers, rows.iter().copied().filter(|&row| used(row)));
         let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
-        (0 < coordinates && coordinates < unknowns).then_some(Distrust::TooFewEquations { of, coordinates, unknowns })
+        (0 < coordinates && coordinates < unknowns).then_some(QualityFlag::TooFewEquations {
+            of,
+            coordinates,
+            unknowns,
+        })
     };
     let base = |b: usize| {
         let alone = |t: usize| rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b);
@@ -158,7 +163,7 @@ pub(super) fn misses(
     rows: &[usize],
     fitted: &ErrorSummary,
     sigma: Option<f64>,
-) -> Option<Distrust> {
+) -> Option<QualityFlag> {
     let mut squares = 0.0;
     for base in 0..placement.bases.len() {
         let own = || rows.iter().filter(|&&row| placement.base_of(row) == base).map(|&row| measurements.positions[row]);
@@ -168,5 +173,5 @@ pub(super) fn misses(
     let spread = (squares / rows.len().max(1) as f64).sqrt();
     let rms = fitted.rms.norm;
     let noise = sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
-    (spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise).then_some(Distrust::Misses { rms, spread })
+    (spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise).then_some(QualityFlag::Misses { rms, spread })
 }
