@@ -5,7 +5,7 @@ use std::io::Write as _;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
-use flexcal::error::{InputError, Location, Warning};
+use flexcal::error::{InputError, InputErrorKind, Location, Warning};
 use flexcal::identify::{Identification, IdentifyError};
 use flexcal::report;
 
@@ -27,10 +27,18 @@ pub fn print(error: &(dyn Error + 'static)) {
             _ => None,
         });
     if let Some(input) = input {
-        show(Level::ERROR, &input.to_string(), Some(&input.location));
+        show(Level::ERROR, &with_arguments(input), Some(&input.location));
     } else {
         let flagged = error.downcast_ref().and_then(by_arguments);
         show(Level::ERROR, &flagged.unwrap_or_else(|| with_causes(error)), None);
+    }
+}
+
+/// A mistake in the input, and the argument that avoids it, where there is one.
+fn with_arguments(error: &InputError) -> String {
+    match *error.kind {
+        InputErrorKind::NoDataFiles => format!("{error} or with --data"),
+        _ => error.to_string(),
     }
 }
 

@@ -219,7 +219,7 @@ pub enum InputErrorKind {
     UnknownSession { session: String, sessions: Vec<String> },
 
     // Tables of measurements.
-    #[error("no measurements; name them in `files` or with --data")]
+    #[error("no measurements; name them in `files`")]
     NoDataFiles,
     #[error("{} is named twice; its rows would count twice", path.display())]
     RepeatedFile { path: PathBuf },
