@@ -5,6 +5,7 @@
 
 mod common;
 
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use common::arms::{measured, path};
@@ -60,7 +61,9 @@ fn ur10() -> Option<PathBuf> {
 #[test]
 fn three_sessions_of_a_measured_ur10() {
     let Some(folder) = ur10() else {
-        println!("skipped: no measurements of the UR10; name their folder in FLEXCAL_UR10_DATA");
+        // Not by `eprintln!`: what that writes is shown for failed tests alone.
+        let why = "no session_A.csv of the measured UR10 at hand; name its folder in FLEXCAL_UR10_DATA";
+        writeln!(std::io::stderr().lock(), "three_sessions_of_a_measured_ur10 skipped: {why}").unwrap();
         return;
     };
     let problem = Problem::read(&path("problems/ur10-ipa")).unwrap();

@@ -233,6 +233,11 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             &["problem.toml:78", "tool.x", "_mm"],
         ),
         ("missing data file", |b| fs::remove_file(b.path(DATA)).unwrap(), &["problem.toml:81", DATA]),
+        (
+            "no data file",
+            |b| b.edit(PROBLEM, "files = [\"a-none.csv\"]\n", ""),
+            &["problem.toml:80", "`files` or with --data"],
+        ),
         ("missing problem", |b| fs::remove_file(b.path(PROBLEM)).unwrap(), &["no such file"]),
         (
             "zero sigma",
