@@ -1,10 +1,9 @@
-//! `[[constraint]]` on the lunar sampler: exact where active, without effect where not, and what they cost.
+//! `[[constraint]]` on the lunar sampler: exact where active, without effect where not.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use flexcal::diagnose::trace;
 use flexcal::identify::{
@@ -148,56 +147,6 @@ fn what_cannot_be_is_refused() {
         assert_eq!(result.is_ok(), words.is_empty(), "{terms}: {message}");
         for word in words {
             assert!(message.contains(word), "{terms}: no {word:?} in {message}");
-        }
-    }
-}
-
-/// `cargo test --release --test constraints -- --ignored --nocapture`
-///
-/// Limits stay near the free optimum: far from it the residual is large, and Gauss–Newton steps take hundreds of
-/// iterations with bounds and constraints alike.
-#[test]
-#[ignore = "a measurement"]
-fn cost_of_bounds() {
-    let file = cases().join("problem.toml");
-    let text = fs::read_to_string(&file).unwrap();
-    let rules = [
-        (
-            "\"A.*\" = { sigma_relative = 0.5 }",
-            "\"A.*\" = { sigma_relative = 0.5, max_relative = 1.02, min_relative = 0.98 }",
-        ),
-        ("\"joint*.d\" = { sigma_mm = 30.0 }", "\"joint*.d\" = { sigma_mm = 30.0, min_mm = -1, max_mm = 1 }"),
-    ];
-    let narrow = rules.iter().fold(text.clone(), |text, (from, to)| text.replace(from, to));
-    let rows = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", "at_least = 1.0")
-        + &constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_m = 3.7395");
-    for data in ["a-none.csv", "h-none-large.csv"] {
-        let seconds = |text: &str| {
-            let problem = Problem::parse(text, &file).unwrap();
-            let (measurements, _) = Measurements::read(&[cases().join(data)], &problem).unwrap();
-            let data = Dataset::of(&problem, measurements).unwrap();
-            let mut best = f64::INFINITY;
-            let mut last = None;
-            for _ in 0..10 {
-                let clock = Instant::now();
-                last = Some(identify(&problem, &data, &Options::default()).unwrap());
-                best = best.min(clock.elapsed().as_secs_f64());
-            }
-            (best, last.unwrap())
-        };
-        let (free, result) = seconds(&text);
-        println!("{data}: free {:.2} ms, {} steps", free * 1e3, result.iterations);
-        for (what, text) in [("bounds", narrow.clone()), ("constraints", format!("{text}\n{rows}"))] {
-            let (time, result) = seconds(&text);
-            let bounds = result.estimates.iter().filter(|estimate| estimate.at_bound.is_some()).count();
-            println!(
-                "  {what}: {:.2} ms = {:.2} times; {} steps, {bounds} bounds and {} constraints active, {}",
-                time * 1e3,
-                time / free,
-                result.iterations,
-                result.active_constraints.len(),
-                result.termination
-            );
         }
     }
 }

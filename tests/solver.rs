@@ -18,7 +18,5 @@ mod inequalities;
 mod nist;
 #[path = "solver/robust.rs"]
 mod robust;
-#[path = "solver/speed.rs"]
-mod speed;
 #[path = "solver/threads.rs"]
 mod threads;

@@ -97,10 +97,14 @@ fn rates_and_times() {
     ] {
         let rates = Rates::of(problems, noise_only(poses, unknowns, prior));
         rates.print(&format!("{poses} poses, {unknowns} unknowns, prior {prior:?}, {problems} problems"));
+        assert!(rates.failed <= at_most(problems, 0.01), "{} of {problems}", rates.failed);
     }
-    Rates::of(2000, heavy_tails(28, 32))
-        .print("Student's t with 3 degrees of freedom, 28 poses, 32 unknowns, 2000 problems");
-    Rates::of(2000, uneven).print("noise twice as large at every other pose, 2000 problems");
+    let heavy = Rates::of(2000, heavy_tails(28, 32));
+    heavy.print("Student's t with 3 degrees of freedom, 28 poses, 32 unknowns, 2000 problems");
+    assert!(heavy.structured <= at_most(2000, 0.01), "{} of 2000", heavy.structured);
+    let uneven = Rates::of(2000, uneven);
+    uneven.print("noise twice as large at every other pose, 2000 problems");
+    assert!(uneven.structured <= at_most(2000, 0.01), "{} of 2000", uneven.structured);
     for (poses, unknowns, size) in [(28, 32, 3.0), (28, 32, 6.0), (28, 20, 3.0), (60, 20, 1.0), (200, 32, 0.5)] {
         let all: Vec<Findings> = (0..200).into_par_iter().map(|seed| driven(poses, unknowns, size, seed)).collect();
         let structured = all.iter().filter(|findings| findings.is_structured()).count();
@@ -112,6 +116,7 @@ fn rates_and_times() {
         println!(
             "{poses} poses, {unknowns} unknowns, {size} σ of q2: structure {structured}, strongest on q2 {on_q2} of 200"
         );
+        assert!(on_q2 >= 180, "{on_q2} of 200");
     }
     for (poses, unknowns) in [(28, 32), (200, 32), (6500, 60)] {
         let mut linear = Linear::new(poses, unknowns, None, 5);
@@ -121,7 +126,7 @@ fn rates_and_times() {
         }
         let noise = linear.noise();
         let residual = linear.leaves(noise);
-        for threads in [1, 2] {
+        let [one, two] = [1, 2].map(|threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let start = Instant::now();
             let findings = pool.install(|| linear.check(&residual));
@@ -130,6 +135,8 @@ fn rates_and_times() {
                 findings.tests.len(),
                 start.elapsed()
             );
-        }
+            findings
+        });
+        assert_eq!(one, two, "{poses} poses");
     }
 }

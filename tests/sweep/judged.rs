@@ -10,7 +10,7 @@ use crate::common::made::model_of;
 use crate::families::{Lacking, declared};
 
 /// Probability by chance above which an effect is not distinguishable, even for one who knows it.
-pub const DISTINGUISHABLE: f64 = 1e-4;
+const DISTINGUISHABLE: f64 = 1e-4;
 
 /// Where the loop has a true effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +72,15 @@ impl Judged {
             best: full.held_out / NOISE,
             closure,
         }
+    }
+
+    /// How many true effects are distinguishable, and of those named, and named or stated as alternatives.
+    pub fn counts(&self) -> [usize; 3] {
+        let shown = self.places.iter().zip(&self.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
+        let places: Vec<Place> = shown.map(|(place, _)| *place).collect();
+        let named = places.iter().filter(|place| **place == Place::Found).count();
+        let stated = places.iter().filter(|place| matches!(place, Place::Found | Place::Alternative)).count();
+        [places.len(), named, stated]
     }
 
     /// One line of figures.

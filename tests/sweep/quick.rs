@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::bench::{NOISE, SMALL, lunar};
 use crate::common::arms::measured as read;
 use crate::families::{Lacking, catalogue, pairs};
-use crate::judged::{DISTINGUISHABLE, Judged, Place, is_the_same, name};
+use crate::judged::{Judged, is_the_same, name};
 use crate::outside::Left;
 
 /// Sets of noise alone.
@@ -30,26 +30,21 @@ fn noise_alone_says_nothing() {
 }
 
 /// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and named or alternatives.
-fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> (usize, usize, usize) {
+fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> [usize; 3] {
     let one = |(k, kind): (usize, &Vec<Lacking>)| {
         let seed = seed + k as u64;
         let judged = Judged::of(kind, SMALL, seed);
         println!("{}", judged.line(&name(kind), SMALL, seed));
         assert!(judged.after < judged.before + 1.0, "{}: {} from {}", name(kind), judged.after, judged.before);
-        let shown = judged.places.iter().zip(&judged.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
-        let places: Vec<Place> = shown.map(|(place, _)| *place).collect();
-        let named = places.iter().filter(|place| **place == Place::Found).count();
-        let stated = places.iter().filter(|place| matches!(place, Place::Found | Place::Alternative)).count();
-        (places.len(), named, stated)
+        judged.counts()
     };
-    let add = |a: (usize, usize, usize), b: (usize, usize, usize)| (a.0 + b.0, a.1 + b.1, a.2 + b.2);
-    kinds.par_iter().enumerate().map(one).reduce(|| (0, 0, 0), add)
+    kinds.par_iter().enumerate().map(one).reduce(|| [0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
 }
 
 #[test]
 fn one_effect_is_named() {
     let every_fifth: Vec<Vec<Lacking>> = catalogue().into_iter().step_by(5).map(|one| vec![one]).collect();
-    let (shown, named, stated) = named_of(&every_fifth, 700);
+    let [shown, named, stated] = named_of(&every_fifth, 700);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
     assert!(shown >= 7);
     assert!(10 * named >= 8 * shown && 10 * stated >= 9 * shown, "{named} and {stated} of {shown}");
@@ -57,7 +52,7 @@ fn one_effect_is_named() {
 
 #[test]
 fn two_effects_are_both_named() {
-    let (shown, named, stated) = named_of(&pairs()[..2], 800);
+    let [shown, named, stated] = named_of(&pairs()[..2], 800);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
     assert!(shown == 4 && stated == 4 && named >= 3, "{named} and {stated} of {shown}");
 }
