@@ -6,7 +6,7 @@ use crate::model::parameter::{JointField, Quantity, Slot};
 use crate::quantity::Unit;
 
 /// What is known of every pose and a residual may depend on; joints are counted from 0. Its `Display` is the name in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Covariate {
     /// q of a joint [rad] or, where it slides, [m].
@@ -23,6 +23,10 @@ pub enum Covariate {
     Row,
     /// Side from which a joint came, −1 to 1.
     Approach(usize),
+    /// Forces and moments of the loads.
+    Load,
+    /// Measured position.
+    Position,
 }
 
 impl Covariate {
@@ -49,6 +53,8 @@ impl fmt::Display for Covariate {
             Self::Time => f.write_str("time"),
             Self::Row => f.write_str("row"),
             Self::Approach(joint) => write!(f, "approach{}", joint + 1),
+            Self::Load => f.write_str("load"),
+            Self::Position => f.write_str("position"),
         }
     }
 }

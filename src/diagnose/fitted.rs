@@ -111,13 +111,24 @@ impl Fitted {
                 places.push(smooth_term.slot);
             }
         }
+        self.linearised_with(data, rows, effects, &places)
+    }
+
+    /// The same with further slots.
+    pub fn linearised_with<'a>(
+        &'a self,
+        data: &Data<'a>,
+        rows: &[usize],
+        effects: &[Effect],
+        slots: &[Slot],
+    ) -> Linearised<'a> {
         let mut poses = self.poses(data, rows);
         if self.problem.robust.is_some() {
             let is_outlier = |row: &usize| self.found.outliers.iter().any(|outlier| outlier.row == *row);
             let gross = poses.iter_mut().zip(rows).filter(|(_, row)| is_outlier(row));
             gross.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
         }
-        Linearised::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, &places))
+        Linearised::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, slots))
     }
 
     /// The fit in its linear neighbourhood with `smooth_terms` taken in.

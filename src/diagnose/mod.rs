@@ -10,6 +10,7 @@ mod candidates;
 mod covariate;
 mod data;
 mod detection;
+mod evidence;
 mod fitted;
 mod neighbourhood;
 mod power;
@@ -25,6 +26,7 @@ mod unexplained;
 pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
 pub use covariate::{Covariate, Place};
 pub use detection::{Detectable, Detection, Size, detectable};
+pub use evidence::{Claims, Evidence, Explanation, Hypothesis, Law, Part};
 pub use residual_tests::{
     CovariateValues, Findings, FitResidual, Outcome, ResidualTest, Sequence, Test, Untestable, test_residual,
 };

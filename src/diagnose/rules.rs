@@ -92,6 +92,33 @@ pub struct SelectionRules {
     pub resamples: usize,
     /// Part of the resamples within that interval.
     pub covered: f64,
+    /// Poses, taken evenly, on which hypotheses are weighed against each other at most: the work grows with their square.
+    pub weighed_poses: usize,
+    /// Chance of a family of functions of unknown law, over that of a family of effects: the catalogue holds what is common.
+    pub unknown_law: f64,
+    /// Root mean square displacements that a hypothesis may cause, in units of σ, each as probable as the others: from a third
+    /// of σ, which hardly shows, by steps of three to what nobody overlooks.
+    pub displacements: [f64; 6],
+    /// Half width of the distribution of ln(true σ / declared σ): mostly to a tenth, but its tails are those of Cauchy.
+    pub trust_declared: f64,
+    /// The same of a σ that was estimated from the same residual.
+    pub trust_estimated: f64,
+    /// Hypotheses that an explanation holds at most.
+    pub together: usize,
+    /// Explanations with as many hypotheses that are extended by a further one.
+    pub extended: usize,
+    /// Hypotheses, those that explain most alone, that extend any but the best of them, which all extend.
+    pub extending: usize,
+    /// ln of the odds behind the best explanation from which on larger ones are not looked for.
+    pub hopeless: f64,
+    /// Lengths over which smooth functions change, as parts of the range that was measured.
+    pub smooth_lengths: [f64; 3],
+    /// The same of functions of two covariates.
+    pub surface_length: f64,
+    /// The same of the height and phase of what nearly repeats.
+    pub slow_length: f64,
+    /// Highest order of what nearly repeats in a turn of a joint: as that of harmonics.
+    pub near_orders: u32,
     /// Seed of what is random: blocks, permutations, resamples, telling poses.
     pub seed: u64,
 }
@@ -139,6 +166,19 @@ impl SelectionRules {
         time_step: 60.0,
         resamples: 2000,
         covered: 0.95,
+        weighed_poses: 240,
+        unknown_law: 0.25,
+        displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
+        trust_declared: 0.1,
+        trust_estimated: 1.0,
+        together: 4,
+        extended: 8,
+        extending: 80,
+        hopeless: 12.0,
+        smooth_lengths: [0.5, 0.2, 0.08],
+        surface_length: 0.4,
+        slow_length: 0.5,
+        near_orders: 60,
         seed: 20_211_206,
     };
 }

@@ -2,6 +2,7 @@
 
 use super::candidates::{Candidates, NOT_FINITE};
 use super::data::Data;
+use super::evidence::{Evidence, weigh};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
 use super::residual_tests::{Findings, FitResidual, test_residual};
@@ -47,6 +48,8 @@ pub struct Trace {
     pub untestable: Vec<(Effect, &'static str)>,
     /// Candidates that the fitted parameters absorb: nothing is left to show them.
     pub absorbed: Vec<Effect>,
+    /// Explanations weighed against each other, functions of unknown law among them; `None` where only the ranking was asked for.
+    pub evidence: Option<Evidence>,
     /// Whether times were measured; where not, the order of the rows stands for them.
     pub time_measured: bool,
 }
@@ -77,7 +80,8 @@ pub fn trace_by(
     rules: &SelectionRules,
 ) -> Result<Trace, IdentifyError> {
     let data = Data::new(data, rules).with_candidates(&options.candidates);
-    Ok(trace_fit(&Fitted::new(problem.clone(), &data, options)?, &data))
+    let fitted = Fitted::new(problem.clone(), &data, options)?;
+    Ok(Trace { evidence: Some(weigh(&fitted, &data)), ..trace_fit(&fitted, &data) })
 }
 
 /// Traces the residual of a fit.
@@ -142,6 +146,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         level: rules.level,
         untestable,
         absorbed,
+        evidence: None,
         time_measured: data.measurements.time_measured,
     }
 }

@@ -195,6 +195,22 @@ impl LinearNeighbourhood {
         self.share_within(unknowns).map(|(_, part)| part.norm_squared())
     }
 
+    /// Columns of the data, shape = (3 N, k), with everything fitted projected out, shape = (3 N + priors, k).
+    pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        // Twice is enough [Giraud, Langou & Rozložník 2005].
+        for _ in 0..2 {
+            let along = self.basis.tr_mul(&left);
+            left.gemm(-1.0, &self.basis, &along, 1.0);
+        }
+        left
+    }
+
+    /// Whitened residual at the optimum, priors below.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.residual
+    }
+
     /// Part of the residual along orthonormal directions.
     pub fn along(&self, directions: &DMatrix<f64>) -> DVector<f64> {
         directions.tr_mul(&self.residual)

@@ -1,0 +1,427 @@
+//! Columns of the hypotheses: what each would do to every measured coordinate.
+
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::hypothesis::{Hypothesis, Law, Part};
+use crate::diagnose::covariate::Covariate;
+use crate::diagnose::neighbourhood::{Linearised, tries};
+use crate::diagnose::rules::SelectionRules;
+use crate::diagnose::smooth_term::places;
+use crate::model::Pose;
+use crate::model::parameter::{BeamField, JointField, Slot};
+use crate::problem::{Effect, JointKind, Problem};
+
+/// Margin beyond the range on either side, where functions need not be flat.
+const MARGIN: f64 = 0.25;
+/// Variance of a basis function, of that of the first, below which it is left out.
+const NEGLIGIBLE: f64 = 1e-3;
+/// A hypothesis with its columns and the logarithm of its prior probability.
+pub(super) struct Candidate {
+    pub hypothesis: Hypothesis,
+    /// Shape = (3 N, k), of root mean square 1 all together.
+    pub columns: DMatrix<f64>,
+    pub ln_prior: f64,
+    /// For each column, whether its parameter is never negative.
+    pub never_negative: Vec<bool>,
+}
+
+/// A covariate at every pose.
+struct Known {
+    covariate: Covariate,
+    /// As measured.
+    values: Vec<f64>,
+    /// From 0 to 1.
+    scaled: Vec<f64>,
+    /// Different values.
+    levels: usize,
+}
+
+/// Slots whose columns the hypotheses need beside those of effects.
+pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
+    let mut slots: Vec<Slot> = places(problem).collect();
+    slots.extend((0..3).map(|axis| Slot::Shift { axis }));
+    for joint in 0..problem.joints.len() {
+        slots.extend([JointField::Compliance, JointField::LateralX].map(|field| Slot::Joint { joint, field }));
+        if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
+            slots.extend(WARMING.map(|field| Slot::Beam { joint, field }));
+        }
+    }
+    slots
+}
+
+const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
+
+/// Everything that may explain a residual.
+pub(super) struct Columns<'a, 'l> {
+    pub problem: &'a Problem,
+    pub linearised: &'a Linearised<'l>,
+    pub time_measured: bool,
+    pub rules: &'a SelectionRules,
+    candidates: Vec<Candidate>,
+    /// Family of each candidate and its share of the family's chance.
+    shares: Vec<(String, f64)>,
+}
+
+impl<'a, 'l> Columns<'a, 'l> {
+    /// Effects, with the columns of those that the fit holds already, and functions of unknown law.
+    pub fn all(
+        problem: &'a Problem,
+        linearised: &'a Linearised<'l>,
+        (time_measured, rules): (bool, &'a SelectionRules),
+        effects: &[(Effect, DMatrix<f64>)],
+    ) -> Vec<Candidate> {
+        let mut all = Self { problem, linearised, time_measured, rules, candidates: Vec::new(), shares: Vec::new() };
+        all.effects(effects);
+        all.functions();
+        all.weighted()
+    }
+
+    fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: DMatrix<f64>) {
+        self.entered(family, share, hypothesis, columns, Vec::new());
+    }
+
+    fn entered(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        mut columns: DMatrix<f64>,
+        never_negative: Vec<bool>,
+    ) {
+        let size = (columns.norm_squared() / columns.nrows().max(1) as f64).sqrt();
+        if size > 0.0 && size.is_finite() {
+            columns /= size;
+            self.candidates.push(Candidate { hypothesis, columns, ln_prior: 0.0, never_negative });
+            self.shares.push((family.to_owned(), share));
+        }
+    }
+
+    fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
+        let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
+        let (tries, _) = tries(&only);
+        let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
+        for ((effect, columns), tries) in effects.iter().zip(tries) {
+            let mut columns = columns.clone();
+            // Parameters of several units: each alone moves the poses as much as the others.
+            for mut column in columns.column_iter_mut() {
+                let length = column.norm();
+                if length > 0.0 {
+                    column /= length;
+                }
+            }
+            let hypothesis = Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
+            let never = effect.terms(self.problem).iter().map(|term| term.never_negative).collect();
+            self.entered(effect.name(), 1.0 / tries, hypothesis, columns, never);
+        }
+    }
+
+    fn functions(&mut self) {
+        let (known, loads) = (self.known(), self.loads());
+        // The shortest only of the coordinates that joints move: it takes many poses.
+        let lengths = self.rules.smooth_lengths;
+        for slot in places(self.problem) {
+            let Some(at) = self.linearised.place(slot) else { continue };
+            let moving = self.moving(slot);
+            let (family, own) = if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
+            for of in &known {
+                self.smooth(family, slot, &[&at], of, own);
+            }
+            for of in &loads {
+                self.smooth(family, slot, &[&at], of, &lengths[..2]);
+            }
+            if moving {
+                self.surfaces(slot, &at, &known);
+                self.per_pose(slot, &at);
+                if let Slot::Joint { joint, .. } = slot {
+                    self.near_harmonics(slot, &at, joint);
+                }
+            }
+        }
+        self.measurement(&known);
+        self.warming(&known);
+    }
+
+    /// Whether a slot is the coordinate that a joint moves.
+    fn moving(&self, slot: Slot) -> bool {
+        let Slot::Joint { joint, field } = slot else { return false };
+        match self.problem.joints[joint].kind {
+            JointKind::Revolute => field == JointField::Theta,
+            JointKind::Prismatic => field == JointField::D,
+            JointKind::Fixed => false,
+        }
+    }
+
+    /// What is known of every pose and varies.
+    fn known(&self) -> Vec<Known> {
+        let poses = self.linearised.poses();
+        let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
+        let moving = self.problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        for (joint, _) in moving.clone() {
+            let q = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
+            all.push((Covariate::Command(joint), q));
+        }
+        for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
+            let of = |pose: &Pose| match covariate {
+                Covariate::Temperature => pose.setup.temperature,
+                Covariate::Payload => pose.setup.payload,
+                _ => pose.setup.hoist,
+            };
+            all.extend(poses.iter().map(of).collect::<Option<Vec<f64>>>().map(|values| (covariate, values)));
+        }
+        let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+        all.push((time, poses.iter().map(|pose| pose.setup.elapsed).collect()));
+        for (joint, _) in moving {
+            let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
+            all.extend(sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)));
+        }
+        all.into_iter().filter_map(|(covariate, values)| Known::of(covariate, values)).collect()
+    }
+
+    /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a compliance there would do, over
+    /// what an angle does.
+    fn loads(&self) -> Vec<Known> {
+        let pairs = [(JointField::Compliance, JointField::Theta), (JointField::LateralX, JointField::Alpha)];
+        let of = |joint: usize, (gives, turns): (JointField, JointField)| {
+            let at = |field| self.linearised.place(Slot::Joint { joint, field });
+            let (gives, turns) = (at(gives)?, at(turns)?);
+            let lever = |k: usize| turns.rows(3 * k, 3).norm_squared();
+            let longest = (0..turns.len() / 3).map(lever).fold(0.0, f64::max);
+            let moment = |k: usize| {
+                let along = gives.rows(3 * k, 3).dot(&turns.rows(3 * k, 3));
+                if lever(k) > 1e-12 * longest { along / lever(k) } else { 0.0 }
+            };
+            Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect()).filter(|known| known.levels > 3)
+        };
+        (0..self.problem.joints.len())
+            .flat_map(|joint| pairs.into_iter().filter_map(move |pair| of(joint, pair)))
+            .collect()
+    }
+
+    /// Smooth functions of one covariate at some columns that belong together.
+    fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
+        let hypothesis =
+            |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate] };
+        // Of two values a function is the effect that the catalogue has.
+        if of.levels < 3 {
+            return;
+        }
+        for &length in lengths.iter().filter(|_| of.levels > 3) {
+            self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&of.scaled, length)));
+        }
+        if of.levels == 3 {
+            self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&of.scaled, self.rules.smooth_lengths[0])));
+        }
+        if matches!(of.covariate, Covariate::Time | Covariate::Row) {
+            // What settles changes fast at first.
+            let range = of.values.iter().copied().fold(0.0, f64::max);
+            let logarithm: Vec<f64> = of.values.iter().map(|t| (t + range / 30.0).ln()).collect();
+            if let Some(warped) = Known::of(of.covariate, logarithm) {
+                self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&warped.scaled, 0.25)));
+            }
+        }
+    }
+
+    /// Functions of two covariates: of two commands, of a direction and something else, of temperature and time.
+    fn surfaces(&mut self, slot: Slot, at: &DVector<f64>, known: &[Known]) {
+        for (k, one) in known.iter().enumerate() {
+            for other in &known[k + 1..] {
+                if goes_with(one.covariate, other.covariate) {
+                    self.surface("surface", slot, &[at], (one, other));
+                }
+            }
+        }
+    }
+
+    fn surface(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], (one, other): (&Known, &Known)) {
+        let mut depends_on = vec![one.covariate, other.covariate];
+        depends_on.sort();
+        let hypothesis = Hypothesis { law: Law::Smooth, part: Part::of(slot), slot: Some(slot), depends_on };
+        self.add(
+            family,
+            1.0,
+            hypothesis,
+            times(at, &products_of(&[&one.scaled, &other.scaled], self.rules.surface_length)),
+        );
+    }
+
+    /// Another error in every pose.
+    fn per_pose(&mut self, slot: Slot, at: &DVector<f64>) {
+        let poses = at.len() / 3;
+        let hypothesis =
+            Hypothesis { law: Law::PerPose, part: Part::of(slot), slot: Some(slot), depends_on: Vec::new() };
+        self.add("per pose", 1.0, hypothesis, times(&[at], &DMatrix::identity(poses, poses)));
+    }
+
+    /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums of neighbouring ones.
+    fn near_harmonics(&mut self, slot: Slot, at: &DVector<f64>, joint: usize) {
+        if self.problem.joints[joint].kind != JointKind::Revolute {
+            return;
+        }
+        let q: Vec<f64> = self.linearised.poses().iter().map(|pose| pose.setup.configuration[joint]).collect();
+        let Some(known) = Known::of(Covariate::Command(joint), q) else { return };
+        let slow = basis(&known.scaled, self.rules.slow_length);
+        for order in 1..=self.rules.near_orders {
+            let k = slow.ncols();
+            let waves = DMatrix::from_fn(slow.nrows(), 2 * k, |row, j| {
+                let angle = f64::from(order) * known.values[row];
+                slow[(row, j % k)] * if j < k { angle.sin() } else { angle.cos() }
+            });
+            let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate]);
+            let hypothesis = Hypothesis { law, part: Part::Joint(joint), slot: Some(slot), depends_on };
+            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, times(&[at], &waves));
+        }
+    }
+
+    /// What moves every measured position: functions of one covariate, and of the position.
+    fn measurement(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> = (0..3).filter_map(|axis| self.linearised.place(Slot::Shift { axis })).collect();
+        if axes.len() < 3 {
+            return;
+        }
+        let (slot, at) = (Slot::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let lengths = self.rules.smooth_lengths;
+        for of in known {
+            self.smooth("smooth in the measurement", slot, &at, of, &lengths);
+        }
+        let poses = self.linearised.poses();
+        let coordinate = |axis: usize| Known::of(Covariate::Position, poses.iter().map(|p| p.measured[axis]).collect());
+        let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
+        let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
+            let scaled = &coordinates[j].scaled;
+            scaled[k] - scaled.iter().sum::<f64>() / scaled.len() as f64
+        });
+        let hypothesis =
+            |law| Hypothesis { law, part: Part::Measurement, slot: None, depends_on: vec![Covariate::Position] };
+        self.add("field", 1.0, hypothesis(Law::Linear), times(&at, &linear));
+        if let [x, y, z] = coordinates.as_slice() {
+            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
+            self.add("field", 1.0, hypothesis(Law::Smooth), times(&at, &plane));
+        }
+    }
+
+    /// Curvature and strain of beams by other functions than the temperature's multiple.
+    fn warming(&mut self, known: &[Known]) {
+        let Some(reference) = self.problem.data.reference_temperature else { return };
+        let poses = self.linearised.poses();
+        let above: Vec<f64> = poses
+            .iter()
+            .map(|pose| pose.setup.temperature.map_or(0.0, |temperature| temperature - reference))
+            .collect();
+        for joint in 0..self.problem.joints.len() {
+            for fields in [&WARMING[..2], &WARMING[2..]] {
+                let per_degree = |&field: &BeamField| {
+                    let mut column = self.linearised.place(Slot::Beam { joint, field })?;
+                    for (k, above) in above.iter().enumerate() {
+                        let factor = if above.abs() > 1e-9 { above.recip() } else { 0.0 };
+                        column.rows_mut(3 * k, 3).iter_mut().for_each(|value| *value *= factor);
+                    }
+                    (column.norm_squared() > 0.0).then_some(column)
+                };
+                let columns: Vec<DVector<f64>> = fields.iter().filter_map(per_degree).collect();
+                if columns.is_empty() {
+                    continue;
+                }
+                let (slot, at) = (Slot::Beam { joint, field: fields[0] }, columns.iter().collect::<Vec<_>>());
+                let of_covariate = |wanted: &Covariate| known.iter().find(|known| known.covariate == *wanted);
+                for of in known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_))) {
+                    self.smooth("smooth in a link", slot, &at, of, &self.rules.smooth_lengths[..2]);
+                }
+                let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+                if let (Some(one), Some(other)) = (of_covariate(&Covariate::Temperature), of_covariate(&time)) {
+                    self.surface("surface in a link", slot, &at, (one, other));
+                }
+            }
+        }
+    }
+
+    /// The candidates with their prior probabilities: a half that anything is at work, then equal chances for all families and,
+    /// but for harmonics, all members of a family.
+    fn weighted(self) -> Vec<Candidate> {
+        let mut families: Vec<(&str, f64, f64)> = Vec::new();
+        for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
+            if let Some((_, _, sum)) = families.iter_mut().find(|(known, ..)| *known == family.as_str()) {
+                *sum += share;
+            } else {
+                let weight = if candidate.hypothesis.effect().is_some() { 1.0 } else { self.rules.unknown_law };
+                families.push((family, weight, *share));
+            }
+        }
+        let all: f64 = families.iter().map(|(_, weight, _)| weight).sum();
+        let mut candidates = self.candidates;
+        for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
+            let own = families.iter().find(|(known, ..)| *known == family.as_str());
+            let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
+            candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
+        }
+        candidates
+    }
+}
+
+impl Known {
+    /// A covariate that varies.
+    fn of(covariate: Covariate, values: Vec<f64>) -> Option<Self> {
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !(high > low && (high - low).is_finite()) {
+            return None;
+        }
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let scaled = values.iter().map(|value| (value - low) / (high - low)).collect();
+        Some(Self { covariate, values, scaled, levels: sorted.len() })
+    }
+}
+
+/// Whether a function of these two is looked for.
+fn goes_with(one: Covariate, other: Covariate) -> bool {
+    use Covariate::{Approach, Command, Row, Temperature, Time};
+    match (one, other) {
+        (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),
+        (Command(_), Command(_)) | (Temperature, Time | Row) | (Time | Row, Temperature) => true,
+        _ => false,
+    }
+}
+
+/// Cosines over the range and its margin, each with the deviation that a Gaussian process of squared-exponential covariance
+/// with that length has along it [Solin & Särkkä 2020]; shape = (poses, functions).
+fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
+}
+
+fn cosine(k: usize, u: f64) -> f64 {
+    (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
+}
+
+/// Deviations along the cosines, down to a negligible variance.
+fn weights(length: f64) -> Vec<f64> {
+    let variance = |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2)).exp();
+    let count = (0..usize::MAX).find(|&k| variance(k) <= NEGLIGIBLE).unwrap_or(0);
+    (0..count).map(|k| variance(k).sqrt()).collect()
+}
+
+/// Products of cosines, one of each covariate.
+fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
+    for _ in scaled {
+        let longer =
+            |index: &Vec<usize>| (0..weights.len()).map(|k| [index.as_slice(), &[k]].concat()).collect::<Vec<_>>();
+        indices = indices.iter().flat_map(longer).collect();
+    }
+    let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
+    indices.retain(|index| weight(index).powi(2) > NEGLIGIBLE);
+    DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
+        let index = &indices[j];
+        weight(index) * index.iter().zip(scaled).map(|(&k, scaled)| cosine(k, scaled[row])).product::<f64>()
+    })
+}
+
+/// Columns times functions of the pose: every column with every function, shape = (3 N, columns · functions).
+fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
+    let k = functions.ncols();
+    DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| at[j / k][row] * functions[(row / 3, j % k)])
+}

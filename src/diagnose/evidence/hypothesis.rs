@@ -1,0 +1,146 @@
+//! What may explain a residual: effects by their laws, and functions whose law nobody knows.
+
+use std::fmt;
+
+use crate::diagnose::covariate::Covariate;
+use crate::model::parameter::{BeamField, Driver, JointField, Quantity, Slot};
+use crate::problem::{Effect, Problem};
+
+/// A part of the arm or of its measurement; joints are counted from 0. Its `Display` is the name in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Part {
+    /// A joint.
+    Joint(usize),
+    /// The link before a joint.
+    LinkBefore(usize),
+    /// The base, or what it stands on.
+    Base,
+    /// The payload.
+    Payload,
+    /// The hoist.
+    Hoist,
+    /// The arm as a whole.
+    Arm,
+    /// What measures.
+    Measurement,
+}
+
+impl Part {
+    /// The part that a slot belongs to.
+    pub fn of(slot: Slot) -> Self {
+        match slot {
+            Slot::Joint { joint, field: JointField::Alpha | JointField::A } | Slot::Beam { joint, .. } => {
+                Self::LinkBefore(joint)
+            }
+            Slot::Joint { joint, .. } => Self::Joint(joint),
+            Slot::Arm(field) => {
+                use crate::model::parameter::ArmField as Field;
+                match field {
+                    Field::Payload => Self::Payload,
+                    Field::HoistForce | Field::HoistLeanX | Field::HoistLeanY | Field::HoistTrolley => Self::Hoist,
+                    Field::MountingX | Field::MountingY | Field::GravityX | Field::GravityY => Self::Base,
+                    Field::Mixing => Self::Arm,
+                }
+            }
+            Slot::Base { .. } => Self::Base,
+            Slot::Target { .. } => Self::Payload,
+            Slot::Shift { .. } | Slot::Scale => Self::Measurement,
+        }
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Joint(joint) => write!(f, "joint {}", joint + 1),
+            Self::LinkBefore(joint) => write!(f, "link before joint {}", joint + 1),
+            Self::Base => f.write_str("base"),
+            Self::Payload => f.write_str("payload"),
+            Self::Hoist => f.write_str("hoist"),
+            Self::Arm => f.write_str("arm"),
+            Self::Measurement => f.write_str("measurement"),
+        }
+    }
+}
+
+/// How a part's error follows from what it depends on.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Law {
+    /// As an effect says.
+    Effect(Effect),
+    /// Some smooth function.
+    Smooth,
+    /// Some function that repeats about so many times a turn of the joint, its height and phase changing slowly.
+    NearHarmonic(u32),
+    /// Another value in every pose: nothing that is known of a pose tells it.
+    PerPose,
+    /// Linear in the position.
+    Linear,
+}
+
+/// One explanation of a residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypothesis {
+    /// The law, or what is known of it.
+    pub law: Law,
+    /// Where it acts.
+    pub part: Part,
+    /// The coordinate of the part, where the error is one of a single coordinate.
+    pub slot: Option<Slot>,
+    /// What it depends on, ascending.
+    pub depends_on: Vec<Covariate>,
+}
+
+impl Hypothesis {
+    /// An effect of the catalogue or of one's own: where its parameters enter and what drives them say the rest.
+    pub fn of_effect(effect: &Effect, problem: &Problem, approach_known: bool, time_measured: bool) -> Self {
+        let terms = effect.terms(problem);
+        let part = terms.first().map_or(Part::Arm, |term| Part::of(term.slot));
+        let mut depends_on: Vec<Covariate> =
+            terms.iter().map(|term| covariate(term.slot, term.driver, approach_known, time_measured)).collect();
+        depends_on.sort();
+        depends_on.dedup();
+        Self { law: Law::Effect(effect.clone()), part, slot: None, depends_on }
+    }
+
+    /// Whether another says the same: the same law at the same part, of the same covariates.
+    pub fn says(&self, other: &Self) -> bool {
+        self.law == other.law && self.part == other.part && self.depends_on == other.depends_on
+    }
+
+    /// Its effect, if its law is one.
+    pub fn effect(&self) -> Option<&Effect> {
+        match &self.law {
+            Law::Effect(effect) => Some(effect),
+            _ => None,
+        }
+    }
+}
+
+/// What a parameter depends on by what drives it, or by the physics of where it enters.
+fn covariate(slot: Slot, driver: Driver, approach_known: bool, time_measured: bool) -> Covariate {
+    let time = Covariate::of(Quantity::Elapsed, time_measured);
+    match driver {
+        Driver::Command(joint) | Driver::Travel(joint) | Driver::Sine(joint, _) | Driver::Cosine(joint, _) => {
+            Covariate::Command(joint)
+        }
+        Driver::Warming { .. } => Covariate::Temperature,
+        Driver::Elapsed | Driver::Since(_) => time,
+        Driver::Spline { of, .. } | Driver::Bump { of, .. } | Driver::Step { of, .. } => {
+            Covariate::of(of, time_measured)
+        }
+        _ => match slot {
+            Slot::Joint { joint, field: JointField::Play | JointField::SlidingPlay } if approach_known => {
+                Covariate::Approach(joint)
+            }
+            Slot::Beam { field: BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion, .. } => {
+                Covariate::Temperature
+            }
+            Slot::Arm(crate::model::parameter::ArmField::Payload) => Covariate::Payload,
+            Slot::Scale => Covariate::Position,
+            _ => Covariate::Load,
+        },
+    }
+}

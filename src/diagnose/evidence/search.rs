@@ -1,0 +1,143 @@
+//! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::super::rules::SelectionRules;
+use super::marginal::{Noise, of_block, over_noise};
+
+/// Columns of one hypothesis with everything fitted projected out, and the logarithm of its prior probability.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    /// A, shape = (rows, k), of root mean square 1 in the data before the projection.
+    columns: DMatrix<f64>,
+    /// AᵀA.
+    gram: DMatrix<f64>,
+    /// Aᵀr.
+    product: DVector<f64>,
+    ln_prior: f64,
+    /// For each column, whether its parameter is never negative; empty: none.
+    never_negative: Vec<bool>,
+}
+
+impl Block {
+    /// Of projected columns, with what they have in common with a projected residual.
+    pub fn new(columns: DMatrix<f64>, residual: &DVector<f64>, ln_prior: f64, never_negative: Vec<bool>) -> Self {
+        let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
+        // The narrow side is transposed: this is the product that is fast.
+        gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
+        Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative }
+    }
+}
+
+/// What is explained: a projected residual with its degrees of freedom, and how far its σ is trusted.
+#[derive(Debug, Clone)]
+pub(super) struct Target {
+    /// Shape = (rows).
+    pub residual: DVector<f64>,
+    pub noise: Noise,
+}
+
+/// Members, ascending, and their probability among all sets looked at.
+pub(super) type Weighted = (Vec<usize>, f64);
+
+/// A set with the sizes of its members and ln of its posterior, up to a constant.
+#[derive(Debug, Clone)]
+struct Set {
+    members: Vec<usize>,
+    sizes: Vec<f64>,
+    ln_posterior: f64,
+}
+
+/// What a set leaves of the residual: with A of its members scaled by their sizes and 1 + AᵀA = L Lᵀ, Z = L⁻¹AᵀC takes its part off
+/// other columns C.
+struct Conditioned {
+    /// L⁻¹Aᵀ, shape = (columns of the set, rows).
+    within: DMatrix<f64>,
+    /// L⁻¹Aᵀr.
+    taken: DVector<f64>,
+    squares: f64,
+    /// Of the noise, and ln p(r | set) over it.
+    grid: Vec<(f64, f64)>,
+    without: f64,
+}
+
+impl Conditioned {
+    fn new(set: &Set, blocks: &[Block], target: &Target) -> Option<Self> {
+        let rows = target.residual.len();
+        let own = set.members.iter().zip(&set.sizes);
+        let columns: Vec<DVector<f64>> = own
+            .flat_map(|(&member, &size)| blocks[member].columns.column_iter().map(move |column| column * size))
+            .collect();
+        let all = if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&columns) };
+        let k = all.ncols();
+        let inner = DMatrix::identity(k, k) + all.tr_mul(&all);
+        let within = inner.cholesky()?.l().solve_lower_triangular(&all.transpose())?;
+        let taken = &within * &target.residual;
+        let squares = target.residual.norm_squared() - taken.norm_squared();
+        let grid = target.noise.grid();
+        let without = over_noise(squares, &grid);
+        Some(Self { within, taken, squares, grid, without })
+    }
+
+    /// ln p(r | set and block) − ln p(r | set), and the block's most probable size.
+    fn gain(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
+        let (mut gram, mut product) = (block.gram.clone(), block.product.clone());
+        if self.within.nrows() > 0 {
+            let along = &self.within * &block.columns;
+            gram.gemm(-1.0, &along.transpose(), &along, 1.0);
+            product.gemv_tr(-1.0, &along, &self.taken, 1.0);
+        }
+        let left = (self.squares, target.noise.freedom);
+        let (with, size) = of_block(&gram, &product, left, &self.grid, (&rules.displacements, &block.never_negative));
+        (with - self.without, size)
+    }
+}
+
+/// All sets that were looked at, most probable first; the empty set stands for "nothing".
+pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules) -> Vec<Weighted> {
+    let mut known: BTreeMap<Vec<usize>, f64> = BTreeMap::from([(Vec::new(), 0.0)]);
+    let mut front = vec![Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 }];
+    let mut promising: Vec<usize> = (0..blocks.len()).collect();
+    for depth in 0..rules.together {
+        let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+        for (place, set) in front.iter().enumerate() {
+            let Some(conditioned) = Conditioned::new(set, blocks, target) else { continue };
+            let tried: Vec<usize> = if place == 0 { (0..blocks.len()).collect() } else { promising.clone() };
+            let gains: Vec<(usize, (f64, f64))> = tried
+                .into_par_iter()
+                .filter(|block| !set.members.contains(block))
+                .map(|block| (block, conditioned.gain(&blocks[block], target, rules)))
+                .collect();
+            for (block, (gain, size)) in gains {
+                let ln_posterior = set.ln_posterior + gain + blocks[block].ln_prior;
+                let mut key = set.members.clone();
+                key.push(block);
+                key.sort_unstable();
+                if next.get(&key).is_none_or(|other| ln_posterior > other.ln_posterior) {
+                    let members = [set.members.as_slice(), &[block]].concat();
+                    next.insert(key, Set { members, sizes: [set.sizes.as_slice(), &[size]].concat(), ln_posterior });
+                }
+            }
+        }
+        let best_known = known.values().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut sets: Vec<Set> = next.values().cloned().collect();
+        known.extend(next.into_iter().map(|(key, set)| (key, set.ln_posterior)));
+        sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        if depth == 0 {
+            promising = sets.iter().take(rules.extending).map(|set| set.members[0]).collect();
+        }
+        sets.truncate(rules.extended);
+        front = sets;
+        if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
+            break;
+        }
+    }
+    let most = known.values().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = known.values().map(|ln| (ln - most).exp()).sum();
+    let mut all: Vec<Weighted> = known.into_iter().map(|(key, ln)| (key, (ln - most).exp() / total)).collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    all
+}
