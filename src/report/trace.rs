@@ -2,18 +2,23 @@
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use super::document::{Block, Point, some_of};
 use super::errors::counted;
 use super::json::{Both, object, to_text};
 use super::quantity::{mm, number, p_value};
 use super::render::text;
 use super::{effect, findings};
-use crate::diagnose::{Ranked, TellingPose, Trace};
+use crate::diagnose::{Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace};
 use crate::identify::Identification;
 use crate::problem::{Effect, JointKind, Problem};
 
 /// Candidates that fit on a screen.
 const SHOWN: usize = 6;
+/// Explanations that fit on a screen, and their least probability in trace.json.
+const SHOWN_EXPLANATIONS: usize = 4;
+const LEAST_PROBABLE: f64 = 0.01;
 /// Effects alike that are named.
 const SHOWN_ALIKE: usize = 3;
 
@@ -32,6 +37,10 @@ object! {
         /// The p below which a candidate stands out.
         level: f64 = trace.level,
         ranking: Vec<RankedEntry<'a>> = trace.ranking.iter().map(|ranked| RankedEntry::of(ranked, trace)).collect(),
+        /// Explanations weighed against each other, most probable first.
+        explanations: Vec<ExplanationEntry<'a>> = explanations(trace).map(|one| ExplanationEntry::of(one, trace)).collect(),
+        /// What is claimed of the best of them, from the least to the most.
+        claims: Vec<ClaimsEntry> = claims(trace).iter().map(|one| ClaimsEntry::of(one, trace)).collect(),
         untestable: Vec<effect::Untestable<'a>> = untestable.iter().map(effect::Untestable::of).collect(),
         absorbed: Vec<&'a Effect> = absorbed.iter().map(|(effect, ())| effect).collect(),
     }
@@ -75,6 +84,137 @@ object! {
     }
 }
 
+object! {
+    ExplanationEntry<'a>(one: &'a Explanation, trace: &Trace) {
+        probability: f64 = one.probability,
+        /// Empty: noise alone.
+        hypotheses: Vec<HypothesisEntry<'a>> = one.hypotheses.iter().map(|own| HypothesisEntry::of(own, trace)).collect(),
+    }
+}
+object! {
+    HypothesisEntry<'a>(own: &'a Hypothesis, trace: &Trace) {
+        /// The effect, if the law is one.
+        #[serde(flatten)]
+        effect: Option<&'a Effect> = own.effect(),
+        law: &'a str = law(own),
+        description: String = words(own, trace),
+        place: String = own.part.to_string(),
+        depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
+    }
+}
+object! {
+    ClaimsEntry(one: &Claims, trace: &Trace) {
+        place: Claim<String> = Claim::new(one.place.0.to_string(), one.place.1),
+        depends_on: Claim<Vec<String>> =
+            Claim::new(one.depends_on.0.iter().map(ToString::to_string).collect(), one.depends_on.1),
+        /// None where it is not known.
+        law: Claim<Option<String>> =
+            Claim::new(one.law.0.effect().map(|effect| effect.name().to_owned()), one.law.1),
+        description: String = words(&one.law.0, trace),
+    }
+}
+
+/// A claim with its probability.
+#[derive(Debug, Serialize)]
+struct Claim<T> {
+    value: T,
+    probability: f64,
+}
+
+impl<T> Claim<T> {
+    fn new(value: T, probability: f64) -> Self {
+        Self { value, probability }
+    }
+}
+
+/// Explanations that are worth a line.
+fn explanations(trace: &Trace) -> impl Iterator<Item = &Explanation> {
+    let all = trace.evidence.iter().flat_map(|evidence| &evidence.explanations);
+    all.filter(|one| one.probability > LEAST_PROBABLE)
+}
+
+/// What is claimed of the best explanation.
+fn claims(trace: &Trace) -> Vec<Claims> {
+    let of = |evidence: &Evidence| evidence.best().iter().map(|own| evidence.claims(own)).collect();
+    trace.evidence.as_ref().map_or_else(Vec::new, of)
+}
+
+/// The law as JSON names it.
+fn law(own: &Hypothesis) -> &str {
+    match &own.law {
+        Law::Effect(effect) => effect.name(),
+        Law::NearHarmonic(_) => "near-harmonic",
+        Law::PerPose => "per-pose",
+        Law::Linear => "linear",
+        _ => "smooth",
+    }
+}
+
+/// A hypothesis in words.
+fn words(own: &Hypothesis, trace: &Trace) -> String {
+    let (part, on) = (own.part, depends_on(&own.depends_on));
+    match &own.law {
+        Law::Effect(effect) => effect::both(effect, trace),
+        Law::NearHarmonic(order) => {
+            let cycles = if *order == 1 { "once".to_owned() } else { format!("about {order} times") };
+            format!("{part}: a function of {on} that repeats {cycles} a revolution; its law is not known")
+        }
+        Law::PerPose => format!("{part}: another error in every pose, by nothing that is known of the poses"),
+        Law::Linear => format!("{part}: linear in the position, as scale by axis and shear are"),
+        _ => format!("{part}: a smooth function of {on}; its law is not known"),
+    }
+}
+
+fn depends_on(covariates: &[Covariate]) -> String {
+    covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ")
+}
+
+/// Explanations beside each other, and what is claimed of the best.
+fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
+    let together = |one: &Explanation| match one.hypotheses.as_slice() {
+        [] => "noise alone".to_owned(),
+        several => several.iter().map(|own| words(own, trace)).collect::<Vec<_>>().join("; and "),
+    };
+    let point = |one: &Explanation| format!("{}: {}", percent(one.probability), together(one));
+    let shown: Vec<String> = explanations(trace).take(SHOWN_EXPLANATIONS).map(point).collect();
+    if shown.is_empty() {
+        return Vec::new();
+    }
+    let claimed = |claims: &Claims| {
+        let law = match claims.law.0.effect() {
+            Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
+            None => "its law is not known".to_owned(),
+        };
+        let on = match claims.depends_on.0.as_slice() {
+            [] => String::new(),
+            some => format!("; depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
+        };
+        format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
+    };
+    let mut blocks = vec![
+        Block::heading(
+            "Explanations weighed against each other, several effects and functions of unknown law among them",
+        ),
+        Block::list(shown),
+    ];
+    let claims: Vec<String> = claims(trace).iter().map(claimed).collect();
+    if !claims.is_empty() {
+        blocks.push(Block::heading(
+            "How probable it is that something acts there, that it depends on that, and that this is its law",
+        ));
+        blocks.push(Block::list(claims));
+    }
+    blocks
+}
+
+fn percent(probability: f64) -> String {
+    match probability {
+        p if p > 0.995 => "over 99 %".to_owned(),
+        p if p < 0.005 => "under 1 %".to_owned(),
+        p => format!("{:.0} %", 100.0 * p),
+    }
+}
+
 /// A trace as JSON text, ending in a line break; SI units except where a key says otherwise.
 pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
     let untestable = effect::joined(trace.untestable.iter().cloned());
@@ -90,6 +230,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
         Block::List(findings::all(&trace.findings)),
     ];
     blocks.extend(findings::another_size(&trace.findings, trace.fit.reduced_chi2).map(Block::Text));
+    blocks.extend(weighed(trace));
     blocks.extend(ranking(problem, trace, SHOWN, "trace.json holds them all"));
     blocks.extend(not_seen(trace));
     text(&blocks)

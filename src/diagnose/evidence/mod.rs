@@ -49,8 +49,8 @@ pub struct Claims {
     pub place: (Part, f64),
     /// On what it depends, and the probability that what acts there depends on that.
     pub depends_on: (Vec<Covariate>, f64),
-    /// Its law, and the probability that the law is at work there and no function that knows none.
-    pub law: (Law, f64),
+    /// The hypothesis, and the probability that its law is at work there and no function that knows none.
+    pub law: (Hypothesis, f64),
 }
 
 impl Evidence {
@@ -75,7 +75,7 @@ impl Evidence {
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
         let law = self.explanations.iter().filter(has_law).map(|explanation| explanation.probability).sum();
-        Claims { place: (of.part, place), depends_on: (of.depends_on.clone(), depends_on), law: (of.law.clone(), law) }
+        Claims { place: (of.part, place), depends_on: (of.depends_on.clone(), depends_on), law: (of.clone(), law) }
     }
 }
 
