@@ -24,8 +24,8 @@ use columns::{Columns, slots};
 pub use hypothesis::{Hypothesis, Law, Part};
 use search::{Block, Target, search};
 
-/// Explanations that are kept, most probable first.
-const KEPT: usize = 1000;
+/// Probability below which an explanation is not kept: thousands of them add up to nothing.
+const NEGLIGIBLE: f64 = 1e-10;
 /// Hypotheses that may be at work together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
@@ -108,7 +108,7 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Evidence {
         },
     };
     let mut explanations: Vec<Explanation> = Vec::new();
-    for (members, probability) in search(&blocks, &target, data.rules).into_iter().take(KEPT) {
+    for (members, probability) in search(&blocks, &target, data.rules).into_iter().filter(|(_, p)| *p > NEGLIGIBLE) {
         let own: Vec<&Hypothesis> = members.into_iter().map(|member| &hypotheses[member]).collect();
         // Functions of one covariate that change over other lengths are one hypothesis.
         let is_same = |other: &&mut Explanation| {
