@@ -10,8 +10,9 @@ use flexcal::problem::Problem;
 use flexcal::report;
 
 use super::input::Common;
+use super::outcome::Outcome;
 use super::poses::Source;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]

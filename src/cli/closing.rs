@@ -10,8 +10,9 @@ use flexcal::identify::Options;
 use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
+use super::outcome::Outcome;
 use super::progress::Line;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal loop`.
 #[derive(Debug, Args)]

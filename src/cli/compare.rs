@@ -7,8 +7,9 @@ use flexcal::identify;
 use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
+use super::outcome::Outcome;
 use super::progress::Line;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal compare`.
 #[derive(Debug, Args)]

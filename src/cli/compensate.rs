@@ -13,7 +13,8 @@ use flexcal::{identify, report};
 use serde::Deserialize;
 
 use super::input::Common;
-use super::{Outcome, diagnostic, output};
+use super::outcome::Outcome;
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal compensate`.
 #[derive(Debug, Args)]

@@ -2,10 +2,11 @@
 
 use std::error::Error;
 
-use clap::{Args, CommandFactory as _};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::{Cli, Outcome, output};
+use super::outcome::Outcome;
+use super::output;
 
 /// Arguments of `flexcal completions`.
 #[derive(Debug, Args)]
@@ -19,10 +20,10 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints what makes a shell complete flexcal's arguments.
-pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+/// Prints what makes a shell complete the arguments of `flexcal`.
+pub fn run(arguments: &Arguments, mut flexcal: Command) -> Result<Outcome, Box<dyn Error>> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "flexcal", &mut script);
+    clap_complete::generate(arguments.shell, &mut flexcal, "flexcal", &mut script);
     output::print(&String::from_utf8_lossy(&script))?;
     Ok(Outcome::Done)
 }

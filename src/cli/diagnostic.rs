@@ -9,7 +9,7 @@ use flexcal::error::{InputError, InputErrorKind, Location, Warning};
 use flexcal::identify::{Identification, IdentifyError};
 use flexcal::report;
 
-use super::Outcome;
+use super::outcome::Outcome;
 
 /// Wide enough that messages keep to one line.
 const WIDTH: usize = 1000;

@@ -8,8 +8,9 @@ use flexcal::identify::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
+use super::outcome::Outcome;
 use super::progress::Line;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]

@@ -3,10 +3,11 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, Command, CommandFactory as _};
+use clap::{Args, Command};
 use clap_mangen::Man;
 
-use super::{Cli, Outcome, output};
+use super::outcome::Outcome;
+use super::output;
 
 /// Arguments of `flexcal man`.
 #[derive(Debug, Args)]
@@ -19,9 +20,9 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// Prints the manual page, or writes those of all commands.
-pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
-    let mut flexcal = Cli::command().disable_help_subcommand(true);
+/// Prints the manual page of `flexcal`, or writes those of all its commands.
+pub fn run(arguments: &Arguments, flexcal: Command) -> Result<Outcome, Box<dyn Error>> {
+    let mut flexcal = flexcal.disable_help_subcommand(true);
     flexcal.build();
     let Some(folder) = &arguments.out else {
         output::print(&page(flexcal)?)?;

@@ -9,6 +9,7 @@ mod diagnostic;
 mod identify;
 mod input;
 mod man;
+mod outcome;
 mod output;
 mod plan;
 mod poses;
@@ -19,7 +20,9 @@ mod trace;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use outcome::Outcome;
 
 /// Identify the geometric and elastic parameters of robot arms from measured end-point positions.
 #[derive(Debug, Parser)]
@@ -65,15 +68,6 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// What a command says to the shell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
-    /// Exit status 0.
-    Done,
-    /// Exit status 1: the fit is not to be trusted.
-    NotTrusted,
-}
-
 /// Runs the command line: exit status 0 done, 1 the fit is not to be trusted, 2 bad input.
 pub fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -94,8 +88,8 @@ pub fn run() -> ExitCode {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments),
-        Command::Man(arguments) => man::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments, Cli::command()),
+        Command::Man(arguments) => man::run(&arguments, Cli::command()),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -10,9 +10,10 @@ use flexcal::problem::Problem;
 use flexcal::report;
 
 use super::input::Common;
+use super::outcome::Outcome;
 use super::poses::Source;
 use super::progress::Line;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal plan`.
 #[derive(Debug, Args)]

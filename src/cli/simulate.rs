@@ -7,7 +7,8 @@ use clap::{Args, value_parser};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::simulate::{Simulation, Truth, simulate};
 
-use super::{Outcome, diagnostic, output};
+use super::outcome::Outcome;
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]

@@ -7,8 +7,9 @@ use clap::{Args, Subcommand};
 use flexcal::monte_carlo::{self, CellResult, Shard, Store, Study};
 use flexcal::report;
 
+use super::outcome::Outcome;
+use super::output;
 use super::progress::FitBar;
-use super::{Outcome, output};
 
 /// Arguments of `flexcal study`.
 #[derive(Debug, Args)]

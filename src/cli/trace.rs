@@ -7,8 +7,9 @@ use flexcal::identify::Options;
 use flexcal::{diagnose, report};
 
 use super::input::{Common, Input};
+use super::outcome::Outcome;
 use super::progress::Line;
-use super::{Outcome, diagnostic, output};
+use super::{diagnostic, output};
 
 /// Arguments of `flexcal trace`.
 #[derive(Debug, Args)]

@@ -124,7 +124,6 @@ fn files_are_short() {
 }
 
 #[test]
-#[ignore = "some circles are left"]
 fn no_files_use_each_other_in_a_circle() {
     forbid(circles(&sources()).into_iter());
 }
