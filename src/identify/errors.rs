@@ -30,6 +30,15 @@ pub struct ErrorSummary {
     pub rms: AxisValues,
 }
 
+/// Errors on both parts of the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// On the poses that are fitted.
+    pub identification: ErrorSummary,
+    /// On the poses that decide nothing.
+    pub held_out: ErrorSummary,
+}
+
 impl ErrorSummary {
     /// Of the errors measured − predicted [m].
     pub fn of(errors: &[Vector3<f64>]) -> Self {

@@ -6,7 +6,7 @@ use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
-use super::{ActiveConstraint, ErrorSummary, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
+use super::{ActiveConstraint, Errors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
 use crate::least_squares::Identifiability;
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::model::parameter::Parameter;
@@ -17,15 +17,6 @@ use crate::quantity::Unit;
 pub const STRONG_CORRELATION: f64 = 0.9;
 /// A parameter of which the data gave no more than this part has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;
-
-/// Errors on both parts of the data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Errors {
-    /// On the poses that are fitted.
-    pub identification: ErrorSummary,
-    /// On the poses that decide nothing.
-    pub held_out: ErrorSummary,
-}
 
 /// Where the assumed noise comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::box_step::BoxProblem;
-use super::factor::RADIUS_SLACK;
 use super::levenberg_marquardt::Model;
 use super::polyhedron::Polyhedron;
 use super::polyhedron_step::PolyhedronProblem;
+use super::settings::RADIUS_SLACK;
 use super::{AtBound, Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
 

@@ -5,9 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use super::pivoted::Pivoted;
 use super::spectrum::Spectrum;
 
-/// A length within this fraction of the radius fills it [Moré 1978].
-pub(super) const RADIUS_SLACK: f64 = 0.1;
-
 /// min ‖B q + c‖ factorised once, to be solved for any damping.
 ///
 /// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
@@ -96,6 +93,7 @@ fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::RADIUS_SLACK;
     use super::*;
 
     fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {

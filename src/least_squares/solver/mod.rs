@@ -18,6 +18,7 @@ mod polyhedron_step;
 mod pseudo_inverse;
 mod run;
 mod settings;
+mod solution;
 mod spectrum;
 mod termination;
 mod trust_region;
@@ -32,8 +33,11 @@ pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use pseudo_inverse::{
     PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed, minimum_norm_step,
 };
-pub use run::{Solution, minimise, minimise_bounded, minimise_bounded_observed, minimise_observed};
-pub use run::{minimise_constrained, minimise_constrained_observed};
+pub use run::{
+    minimise, minimise_bounded, minimise_bounded_observed, minimise_constrained, minimise_constrained_observed,
+    minimise_observed,
+};
 pub use settings::Settings;
+pub use solution::Solution;
 pub use termination::Termination;
 pub use trust_region::{State, Step, Subproblem, TrustRegion};

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
 
-use super::factor::RADIUS_SLACK;
+use super::settings::RADIUS_SLACK;
 use crate::least_squares::Triangle;
 
 /// Newton steps allowed to the secular equation before the singular values are asked.

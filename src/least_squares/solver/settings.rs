@@ -31,3 +31,6 @@ impl Default for Settings {
         }
     }
 }
+
+/// A length within this fraction of the radius fills it [Moré 1978].
+pub(super) const RADIUS_SLACK: f64 = 0.1;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::factor::RADIUS_SLACK;
+use super::settings::RADIUS_SLACK;
 use crate::least_squares::orthogonalise;
 
 /// Newton steps allowed to the secular equation.
