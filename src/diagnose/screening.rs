@@ -48,7 +48,8 @@ pub struct Trace {
     pub untestable: Vec<(Effect, &'static str)>,
     /// Candidates that the fitted parameters absorb: nothing is left to show them.
     pub absorbed: Vec<Effect>,
-    /// Explanations weighed against each other, functions of unknown law among them; `None` where only the ranking was asked for.
+    /// Explanations weighed against each other, functions of unknown law among them; `None` where only the ranking was asked for,
+    /// or the residual is not finite.
     pub evidence: Option<Evidence>,
     /// Whether times were measured; where not, the order of the rows stands for them.
     pub time_measured: bool,
@@ -81,7 +82,7 @@ pub fn trace_by(
 ) -> Result<Trace, IdentifyError> {
     let data = Data::new(data, rules).with_candidates(&options.candidates);
     let fitted = Fitted::new(problem.clone(), &data, options)?;
-    Ok(Trace { evidence: Some(weigh(&fitted, &data)), ..trace_fit(&fitted, &data) })
+    Ok(Trace { evidence: weigh(&fitted, &data), ..trace_fit(&fitted, &data) })
 }
 
 /// Traces the residual of a fit.

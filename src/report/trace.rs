@@ -94,10 +94,9 @@ object! {
 object! {
     HypothesisEntry<'a>(own: &'a Hypothesis, trace: &Trace) {
         /// The effect, if the law is one.
-        #[serde(flatten)]
         effect: Option<&'a Effect> = own.effect(),
         law: &'a str = law(own),
-        description: String = words(own, trace),
+        description: String = words(own, |effect| trace.describe(effect)),
         place: String = own.part.to_string(),
         depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
     }
@@ -110,7 +109,7 @@ object! {
         /// None where it is not known.
         law: Claim<Option<String>> =
             Claim::new(one.law.0.effect().map(|effect| effect.name().to_owned()), one.law.1),
-        description: String = words(&one.law.0, trace),
+        description: String = words(&one.law.0, |effect| trace.describe(effect)),
     }
 }
 
@@ -151,10 +150,10 @@ fn law(own: &Hypothesis) -> &str {
 }
 
 /// A hypothesis in words.
-fn words(own: &Hypothesis, trace: &Trace) -> String {
+fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
     let (part, on) = (own.part, depends_on(&own.depends_on));
     match &own.law {
-        Law::Effect(effect) => effect::both(effect, trace),
+        Law::Effect(effect) => describe(effect),
         Law::NearHarmonic(order) => {
             let cycles = if *order == 1 { "once".to_owned() } else { format!("about {order} times") };
             format!("{part}: a function of {on} that repeats {cycles} a revolution; its law is not known")
@@ -173,7 +172,11 @@ fn depends_on(covariates: &[Covariate]) -> String {
 fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
     let together = |one: &Explanation| match one.hypotheses.as_slice() {
         [] => "noise alone".to_owned(),
-        several => several.iter().map(|own| words(own, trace)).collect::<Vec<_>>().join("; and "),
+        several => several
+            .iter()
+            .map(|own| words(own, |effect| effect::both(effect, trace)))
+            .collect::<Vec<_>>()
+            .join("; and "),
     };
     let point = |one: &Explanation| format!("{}: {}", percent(one.probability), together(one));
     let shown: Vec<String> = explanations(trace).take(SHOWN_EXPLANATIONS).map(point).collect();

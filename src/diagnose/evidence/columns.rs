@@ -79,7 +79,8 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: DMatrix<f64>) {
-        self.entered(family, share, hypothesis, columns, Vec::new());
+        // Names of effects, one's own among them, have no space before them.
+        self.entered(&format!(" {family}"), share, hypothesis, columns, Vec::new());
     }
 
     fn entered(
@@ -336,7 +337,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// The candidates with their prior probabilities: a half that anything is at work, then equal chances for all families and,
+    /// The candidates with their prior probabilities: odds of one to two for each further hypothesis, then equal chances for all families and,
     /// but for harmonics, all members of a family.
     fn weighted(self) -> Vec<Candidate> {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();

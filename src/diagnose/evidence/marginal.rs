@@ -7,12 +7,14 @@
 //!
 //! and the size c of the columns (their root mean square displacement in units of σ) and the factor f of the noise are summed
 //! over a grid. c runs over what positions can show, from a third of σ to a hundred of it; ln f has a Cauchy
-//! distribution about 0: mostly a declared σ is right to a tenth, and where it is not, it may be off by any factor.
+//! distribution about 0: mostly a declared σ is right to a tenth, and where it is not, it may be far off.
 
 use nalgebra::{DMatrix, DVector};
 
-/// f is summed from 1/10 to 10 in this many steps.
-const STEPS: i32 = 40;
+/// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in this many steps either side: closer together than the
+/// likelihood of some 2000 degrees of freedom is wide, 1/√(2ν).
+const STEPS: i32 = 70;
+const REACH: f64 = 3.5;
 
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
@@ -25,10 +27,10 @@ impl Noise {
     /// For each factor f of the grid ln of its prior and of f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
         let at = |step: i32| {
-            let ln_f = std::f64::consts::LN_10 * (2.0 * f64::from(step) / f64::from(STEPS) - 1.0);
+            let ln_f = REACH * f64::from(step) / f64::from(STEPS);
             (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
         };
-        (0..=STEPS).map(at).collect()
+        (-STEPS..=STEPS).map(at).collect()
     }
 }
 

@@ -19,6 +19,7 @@ use super::covariate::Covariate;
 use super::data::Data;
 use super::fitted::Fitted;
 use crate::identify::Noise;
+use crate::model::parameter::{JointField, Parameter, Slot};
 use crate::problem::Effect;
 use columns::{Columns, slots};
 pub use hypothesis::{Hypothesis, Law, Part};
@@ -80,11 +81,22 @@ impl Evidence {
 }
 
 /// Weighs what may explain the residual of a fit.
-pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Evidence {
+///
+/// `None` where the residual is not a finite number, as that of a pose without equilibrium.
+pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Option<Evidence> {
     let rows = data.thinned(data.rules.weighed_poses);
     let candidates = Candidates::of(&fitted.problem, data).testable;
-    let linearised = fitted.linearised_with(data, &rows, &candidates, &slots(&fitted.problem));
+    // What the model has already as a constant is a fitted column.
+    let taken = |slot: &Slot| {
+        let own = |parameter: &&Parameter| parameter.slot == *slot && parameter.driver.is_constant();
+        !is_added(*slot) && fitted.model.parameters.iter().find(own).is_some()
+    };
+    let slots: Vec<Slot> = slots(&fitted.problem).into_iter().filter(|slot| !taken(slot)).collect();
+    let linearised = fitted.linearised_with(data, &rows, &candidates, &slots);
     let neighbourhood = fitted.neighbourhood(&linearised, &[]);
+    if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
+        return None;
+    }
     let effects: Vec<(Effect, DMatrix<f64>)> =
         candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect))).collect();
     let all = Columns::all(&fitted.problem, &linearised, (data.measurements.time_measured, data.rules), &effects);
@@ -113,7 +125,9 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Evidence {
         // Functions of one covariate that change over other lengths are one hypothesis.
         let is_same = |other: &&mut Explanation| {
             let others = &other.hypotheses;
-            others.len() == own.len() && own.iter().all(|own| others.iter().any(|other| own.says(other)))
+            others.len() == own.len()
+                && own.iter().all(|own| others.iter().any(|other| own.says(other)))
+                && others.iter().all(|other| own.iter().any(|own| own.says(other)))
         };
         match explanations.iter_mut().find(is_same) {
             Some(known) => known.probability += probability,
@@ -123,5 +137,14 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Evidence {
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    Evidence { explanations }
+    Some(Evidence { explanations })
+}
+
+/// Whether a probe at a slot adds to what the arm declares there.
+fn is_added(slot: Slot) -> bool {
+    match slot {
+        Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field),
+        Slot::Shift { .. } => true,
+        _ => false,
+    }
 }
