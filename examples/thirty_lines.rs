@@ -30,10 +30,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let q: Vec<[f64; 2]> = (0..40_u32).map(|k| [0.15 * f64::from(k) - 3.0, f64::from(7 * k).sin()]).collect();
     let at = |length: f64, angle: f64| Vector3::new(length * angle.cos(), length * angle.sin(), 0.0);
     let data = Dataset::builder(&q, q.iter().map(|[a, b]| at(0.502, *a) + at(0.4, a + b + 3e-3 * a.sin()))).build()?;
-    let own = || Effect::custom(Eccentric);
-    let trace = diagnose::trace(&problem, &data, &identify::Options::default().with_candidates(vec![own()]))?;
-    let found = identify::identify(&problem.with_effect(own()), &data, &identify::Options::default())?;
-    let tip = found.predict(&problem, &Dataset::poses([[0.3, 0.9]]).measurements()?)?[0];
+    let trace = diagnose::trace(
+        &problem,
+        &data,
+        &identify::Options::default().with_candidates(vec![Effect::custom(Eccentric)]),
+    )?;
+    let closed = problem.with_effect(Effect::custom(Eccentric));
+    let found = identify::identify(&closed, &data, &identify::Options::default())?;
+    let tip = found.predict(&closed, &Dataset::poses([[0.3, 0.9]]).measurements()?)?[0];
     let pull = found.estimate("eccentric.pull").ok_or("not fitted")?.estimate * 1e3;
     println!("{}: {pull:.2} mrad; the tip is at {tip:.3?} m", trace.describe(&trace.ranking[0].effect));
     Ok(())

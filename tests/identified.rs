@@ -91,7 +91,33 @@ fn what_was_not_identified_predicts_nothing() {
     found.estimates[gone].name = "another".to_owned();
     let error = found.predict(&problem, &data.measurements).unwrap_err();
     assert!(matches!(&error, IdentifyError::NoEstimate { name } if name == "joint2.stiffness"), "{error}");
+    // Nor does a problem that lacks what was identified.
+    found.estimates[gone].name = "joint2.stiffness".to_owned();
+    assert!(found.predict(&problem, &data.measurements).is_ok());
     problem.parameters.clear();
-    let nominal = found.predict(&problem, &data.measurements).unwrap();
-    assert!(nominal.iter().all(|position: &Vector3<f64>| position.norm() > 0.0));
+    let error = found.predict(&problem, &data.measurements).unwrap_err();
+    assert!(matches!(&error, IdentifyError::NotInModel { name } if name == "joint1.alpha"), "{error}");
+}
+
+#[test]
+fn time_counts_from_the_first_pose_that_was_identified() {
+    let (problem, data, _) = lunar();
+    let problem = problem.with_effect(flexcal::problem::Effect::TrackerDrift);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let late: Vec<usize> = (data.measurements.len() / 2..data.measurements.len()).collect();
+    let (whole, half) = (&data.measurements, data.measurements.select(&late));
+    let (all, some) = (found.predict(&problem, whole).unwrap(), found.predict(&problem, &half).unwrap());
+    for (position, &row) in some.iter().zip(&late) {
+        let apart: Vector3<f64> = position - all[row];
+        assert!(apart.norm() < 1e-12, "{apart}");
+    }
+}
+
+#[test]
+fn configurations_of_another_arm_are_an_error() {
+    let (problem, _, found) = lunar();
+    let few = Dataset::builder([[0.1, 0.2], [0.3, 0.4]], [Vector3::x(), Vector3::y()]).build().unwrap();
+    let wrong = |error: IdentifyError| matches!(error, IdentifyError::JointCount { found: 2, joints: 4 });
+    assert!(identify(&problem, &few, &Options::default()).is_err_and(wrong));
+    assert!(found.predict(&problem, &few.measurements).is_err_and(wrong));
 }

@@ -122,6 +122,20 @@ pub enum IdentifyError {
         /// The strategy that was asked for.
         strategy: &'static str,
     },
+    /// Data have a configuration of another length than the arm.
+    #[error("configurations of {found} joints for an arm of {joints}")]
+    JointCount {
+        /// Of the data.
+        found: usize,
+        /// Of the problem, fixed ones among them.
+        joints: usize,
+    },
+    /// The model lacks a parameter that was identified.
+    #[error("{name} was identified, and the problem has no such parameter: it is another than the one identified")]
+    NotInModel {
+        /// Its name.
+        name: String,
+    },
     /// A parameter is needed that was not identified.
     #[error("{name} was not identified: the sessions, targets or effects are others")]
     NoEstimate {
@@ -164,6 +178,9 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let clock = Instant::now();
+    if measurements.joints != problem.joints.len() {
+        return Err(IdentifyError::JointCount { found: measurements.joints, joints: problem.joints.len() });
+    }
     check_columns(problem, measurements)?;
     if split.identification.is_empty() {
         return Err(IdentifyError::NoPoses);
@@ -260,6 +277,7 @@ pub fn identify_model(
         outliers,
         x: end.x,
         registered_x: start,
+        first_time: measurements.time.iter().copied().fold(f64::INFINITY, f64::min),
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })

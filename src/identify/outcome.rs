@@ -102,6 +102,8 @@ pub struct Identification {
     pub x: DVector<f64>,
     /// The same of the nominal arm with base and target fitted where they are free, whose errors are `registered`.
     pub registered_x: DVector<f64>,
+    /// Time from which what follows the time counts: that of the first pose [s].
+    pub first_time: f64,
     /// 1 σ of a coordinate in rows without one of their own, declared or estimated [m].
     pub sigma: f64,
 }

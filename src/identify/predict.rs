@@ -32,7 +32,8 @@ impl Identification {
     /// be among those identified. `problem` is the one that was identified.
     ///
     /// # Errors
-    /// A parameter of the problem, or of a session or target of `rows`, that was not identified.
+    /// A parameter of the problem, or of a session or target of `rows`, that was not identified, or one that was and that the
+    /// problem lacks; configurations of another number of joints.
     pub fn predict(&self, problem: &Problem, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
         let placement = Placement::of(rows);
         let model = Model::new(problem, &placement.bases, &placement.targets)?;
@@ -44,8 +45,7 @@ impl Identification {
     /// # Errors
     /// A parameter of the model that was not identified.
     pub fn predict_with(&self, model: &Model, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
-        let all: Vec<usize> = (0..rows.len()).collect();
-        let errors = Placement::of(rows).position_errors(model, &self.vector(model)?, rows, &all);
+        let errors = self.errors(model, rows)?;
         Ok(rows.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect())
     }
 
@@ -57,8 +57,7 @@ impl Identification {
         let Dataset { measurements, split } = data;
         let placement = Placement::of(measurements);
         let model = Model::new(problem, &placement.bases, &placement.targets)?;
-        let all: Vec<usize> = (0..measurements.len()).collect();
-        let errors = placement.position_errors(&model, &self.vector(&model)?, measurements, &all);
+        let errors = self.errors(&model, measurements)?;
         let sigma = |row: usize| measurements.sigma.as_ref().map_or(self.sigma, |own| own[row]);
         let residual = |(row, position): (usize, Vector3<f64>)| Residual {
             row,
@@ -70,8 +69,27 @@ impl Identification {
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }
 
+    /// Measured − predicted of every row, measuring frame [m]; time counts from the first pose that was identified.
+    fn errors(&self, model: &Model, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
+        if rows.joints != model.joints() {
+            return Err(IdentifyError::JointCount { found: rows.joints, joints: model.joints() });
+        }
+        let all: Vec<usize> = (0..rows.len()).collect();
+        let mut poses = Placement::of(rows).poses(rows, &all, 1.0);
+        for pose in &mut poses {
+            pose.setup.elapsed = pose.setup.time - self.first_time;
+        }
+        Ok(model.residuals(poses, &self.vector(model)?))
+    }
+
     /// The full parameter vector of a model with the parameters that were identified, by their names.
     fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+        let own = |name: &str| model.parameters.iter().any(|parameter| parameter.name == name);
+        // Rows of one session need no base of another.
+        let placed = |name: &str| name.starts_with("base") || name.starts_with("tool");
+        if let Some(lost) = self.estimates.iter().find(|estimate| !own(&estimate.name) && !placed(&estimate.name)) {
+            return Err(IdentifyError::NotInModel { name: lost.name.clone() });
+        }
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
             place.map(|k| self.x[k]).ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })

@@ -97,6 +97,11 @@ impl Model {
         model
     }
 
+    /// Number of joints, fixed ones among them.
+    pub fn joints(&self) -> usize {
+        self.nominal.joints.len()
+    }
+
     /// Whether bounds or constraints limit the parameters.
     pub fn is_bounded(&self) -> bool {
         !self.constraints.is_empty() || self.parameters.iter().any(Parameter::is_bounded)

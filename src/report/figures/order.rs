@@ -1,4 +1,4 @@
-//! PoseErrors one after another.
+//! Residuals one after another.
 
 use plotters::prelude::*;
 
@@ -12,7 +12,7 @@ use super::frame::{
 const MOST: usize = 300;
 const PANEL: i32 = 92;
 
-/// PoseError coordinates in the order of time, with the band of ±2 σ.
+/// Residual coordinates in the order of time, with the band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
     let mut fitted: Vec<&PoseError> = data.residuals.iter().filter(|residual| !residual.held_out).collect();
     let all = fitted.len();
@@ -32,7 +32,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let across = with_margin((first.0 * factor, first.1 * factor), 0.02);
     let sigma = shown.iter().map(|residual| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
     let most = shown.iter().map(|residual| residual.error.amax() * 1e3).fold(2.2 * sigma, f64::max) * 1.08;
-    let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "PoseErrors in order", |area| {
+    let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "Residuals in order", |area| {
         legend(area, &[("fitted pose", ACCENT, true), ("±2 σ of the measurement", FAINT, true)])?;
         let (_, body) = area.split_vertically(px(20));
         let mut rest = body;
@@ -51,7 +51,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         Ok(())
     });
     let caption = format!(
-        "PoseErrors measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
+        "Residuals measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
              should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}",
         left_out(without),
         thinned(step)

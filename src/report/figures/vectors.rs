@@ -1,4 +1,4 @@
-//! PoseError vectors over the workspace.
+//! Residual vectors over the workspace.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -18,7 +18,7 @@ const LONG: f64 = 0.09;
 const LEAST: f64 = 150.0;
 const GREATEST: f64 = 330.0;
 
-/// PoseErrors from above and from the side, at their measured positions.
+/// Residuals from above and from the side, at their measured positions.
 pub fn vectors(data: &PlotData) -> Drawing {
     let finite = |residual: &&PoseError| residual.error.norm().is_finite();
     let all: Vec<&PoseError> = data.residuals.iter().filter(finite).collect();
@@ -39,7 +39,7 @@ pub fn vectors(data: &PlotData) -> Drawing {
     let bar = rounded(long);
     let larger = LONG * (across.1 - across.0) / bar;
     let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
-    let svg = figure((WIDTH, height), "PoseError vectors from above and from the side", |area| {
+    let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
         legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
         let length = radius(LONG * width);
         let end = px(WIDTH - 12);
