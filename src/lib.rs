@@ -16,7 +16,7 @@
 //! 7. [`report`]: text, JSON, Markdown, HTML and figures.
 //!
 //! Beside this way stand [`design`] (which poses to measure, and what they will tell), [`monte_carlo`] (many fits where the
-//! truth is known), [`paper`] (the closed forms of [Chen2021], a baseline), and [`simulate`], a rig that shares no physics
+//! truth is known), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`simulate`], a rig that shares no physics
 //! with the model.
 //!
 //! # The same walk in code

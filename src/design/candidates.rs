@@ -12,11 +12,11 @@ use crate::problem::{JointKind, PoseRanges, Problem};
 
 /// Angles are commanded in steps of this [°].
 const ANGLE_STEP: f64 = 1e-4;
-/// Lengths are commanded in steps of this [m].
+/// Lengths are commanded in steps of this \[m\].
 const LENGTH_STEP: f64 = 1e-6;
 /// Added to the stream of the poses for what is drawn apart, so that poses are the same with it and without.
 const APART: u64 = 1 << 32;
-/// Forces and temperatures are set in steps of this [N], [°C].
+/// Forces and temperatures are set in steps of this \[N\], [°C].
 const SETTING_STEP: f64 = 0.1;
 
 /// Whether poses at the ends of the ranges are preferred.
@@ -118,7 +118,7 @@ fn stream_of(seed: u64, stream: u64) -> ChaCha8Rng {
 /// A pose as it is drawn.
 #[derive(Clone)]
 struct Draft {
-    /// [rad] or [m].
+    /// \[rad\] or \[m\].
     joints: Vec<f64>,
     /// Place among the payloads, 0…1.
     choice: f64,

@@ -60,7 +60,7 @@ pub struct Check {
     pub prediction: Prediction,
     /// Where that is.
     pub elsewhere: Elsewhere,
-    /// Root mean square length of the error of one measured position [m].
+    /// Root mean square length of the error of one measured position \[m\].
     pub noise: f64,
     /// Of the first n of a series of such poses.
     pub growth: Growth,

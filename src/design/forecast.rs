@@ -47,7 +47,7 @@ pub struct Forecast {
     pub open: usize,
 }
 
-/// Expected error of predicted positions over some poses [m].
+/// Expected error of predicted positions over some poses \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
     /// Median over the poses of the root mean square length of the error.

@@ -39,7 +39,7 @@ pub struct GrowthStep {
 
 impl Growth {
     /// Of the poses of `series` in their order, with predictions judged in the poses `workspace` (in metres); `noise` is the
-    /// root mean square length of the error of one measured position [m], and `also` a number to look at besides. What can be
+    /// root mean square length of the error of one measured position \[m\], and `also` a number to look at besides. What can be
     /// seen is what the series and the poses `elsewhere` see together.
     pub fn new(
         parameters: &[Parameter],

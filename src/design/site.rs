@@ -14,7 +14,7 @@ use crate::model::Model;
 use crate::model::parameter::{BeamField, Parameter, Slot};
 use crate::problem::Problem;
 
-/// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter [kg].
+/// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter \[kg\].
 const PROBE_MASS: f64 = 1.0;
 
 /// The model with a base for every session and a target for every word of some tables of poses.
@@ -57,7 +57,7 @@ impl<'a> Site<'a> {
         Ok(Self { model, problem, bases, targets })
     }
 
-    /// What the poses of a table tell about the nominal arm; `unit` [m] stands for σ, if it is given. Words that the site does
+    /// What the poses of a table tell about the nominal arm; `unit` \[m\] stands for σ, if it is given. Words that the site does
     /// not know are taken for its first.
     pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
         let added = |slot| matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. });

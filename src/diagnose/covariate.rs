@@ -9,15 +9,15 @@ use crate::quantity::Unit;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Covariate {
-    /// q of a joint [rad] or, where it slides, [m].
+    /// q of a joint \[rad\] or, where it slides, \[m\].
     Command(usize),
     /// Temperature [°C].
     Temperature,
-    /// Payload [kg].
+    /// Payload \[kg\].
     Payload,
-    /// Hoist force [N].
+    /// Hoist force \[N\].
     Hoist,
-    /// Time since the first pose [s].
+    /// Time since the first pose \[s\].
     Time,
     /// Number of the row, where no time was measured.
     Row,

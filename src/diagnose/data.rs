@@ -99,7 +99,7 @@ impl<'a> Data<'a> {
         values.len()
     }
 
-    /// Time of each identification row [s].
+    /// Time of each identification row \[s\].
     pub fn time(&self) -> Vec<f64> {
         self.pick(&self.measurements.time)
     }

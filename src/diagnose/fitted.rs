@@ -23,7 +23,7 @@ pub(super) struct Fitted {
     pub unknowns: Vec<usize>,
     /// Rows of the active constraints, shape = (constraints, unknowns).
     active: DMatrix<f64>,
-    /// 1 σ of a coordinate in rows without one of their own [m].
+    /// 1 σ of a coordinate in rows without one of their own \[m\].
     pub sigma: f64,
 }
 
@@ -82,7 +82,7 @@ impl Fitted {
         Placement::of(data.measurements).poses(data.measurements, rows, self.sigma)
     }
 
-    /// Residuals of some rows, measuring frame [m].
+    /// Residuals of some rows, measuring frame \[m\].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.model.residuals(self.poses(data, rows), &self.found.x)
     }

@@ -80,7 +80,7 @@ pub struct SelectionRules {
     pub ranked: usize,
     /// Entries of a ranking whose look-alikes and cross-validation are worked out.
     pub looked_at: usize,
-    /// Largest principal angle [rad] at which two effects are look-alikes: 20°.
+    /// Largest principal angle \[rad\] at which two effects are look-alikes: 20°.
     pub alike: f64,
     /// Poses among which one is sought that tells two look-alikes apart.
     pub telling_poses: usize,

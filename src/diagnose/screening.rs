@@ -21,11 +21,11 @@ pub struct Ranked {
     pub p_value: f64,
     /// F statistic and its degrees of freedom.
     pub f: (f64, usize),
-    /// Expected reduction of the root mean squared error on the identification poses [m].
+    /// Expected reduction of the root mean squared error on the identification poses \[m\].
     pub gain: f64,
-    /// The same on identification poses left out in turn [m]; `None` where it was not worked out.
+    /// The same on identification poses left out in turn \[m\]; `None` where it was not worked out.
     pub cross_validated: Option<f64>,
-    /// Entries of the ranking that it is hard to tell from, with the largest principal angle between them [rad].
+    /// Entries of the ranking that it is hard to tell from, with the largest principal angle between them \[rad\].
     pub alike: Vec<(Effect, f64)>,
     /// A pose that would tell it from the first of those.
     pub telling_pose: Option<TellingPose>,

@@ -12,7 +12,7 @@ use crate::problem::{Effect, Problem};
 /// How well some poses tell two effects apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Separation {
-    /// Largest principal angle [rad] between what the two do once all parameters have been fitted: 0 the same, π/2 nothing
+    /// Largest principal angle \[rad\] between what the two do once all parameters have been fitted: 0 the same, π/2 nothing
     /// in common; `None` where one of them does nothing.
     pub angle: Option<f64>,
     /// The first effect beside the second, and the second beside the first.
@@ -30,7 +30,7 @@ pub struct Side {
 }
 
 impl Side {
-    /// p to be expected of it beside the other, if it has this size [SI] in the direction that is hardest to tell; 1 where
+    /// p to be expected of it beside the other, if it has this size \[SI\] in the direction that is hardest to tell; 1 where
     /// nothing tells it.
     pub fn expected_p(&self, size: f64) -> f64 {
         let told = self

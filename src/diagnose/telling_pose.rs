@@ -14,15 +14,15 @@ use crate::problem::Effect;
 pub struct TellingPose {
     /// The other effect.
     pub other: Effect,
-    /// Configuration within the measured ranges, shape = (joints) [rad] or [m].
+    /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
-    /// Payload [kg], hoist force [N] and temperature [°C] there, where the data have such a column.
+    /// Payload \[kg\], hoist force \[N\] and temperature [°C] there, where the data have such a column.
     pub payload: Option<f64>,
-    /// Hoist force [N].
+    /// Hoist force \[N\].
     pub hoist: Option<f64>,
     /// Temperature [°C].
     pub temperature: Option<f64>,
-    /// Distance between what the arm does with the one effect and with the other, each fitted to the measured poses [m].
+    /// Distance between what the arm does with the one effect and with the other, each fitted to the measured poses \[m\].
     pub difference: f64,
 }
 

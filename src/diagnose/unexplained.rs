@@ -42,11 +42,11 @@ pub struct Correction {
     pub range: (f64, f64),
     /// Held-out poses beyond it, which stay uncorrected.
     pub beyond: usize,
-    /// Root mean squared error of identification poses left out in turn, before and with the correction [m].
+    /// Root mean squared error of identification poses left out in turn, before and with the correction \[m\].
     pub cross_validated: (f64, f64),
     /// Error on held-out poses with the correction.
     pub held_out: ErrorSummary,
-    /// The quantity and the correction of the place there [rad] or [m].
+    /// The quantity and the correction of the place there \[rad\] or \[m\].
     pub curve: Vec<(f64, f64)>,
     /// Partial residuals of the identification poses, in the order of the rows.
     pub points: Vec<PartialResidual>,
@@ -61,7 +61,7 @@ pub struct PartialResidual {
     pub row: usize,
     /// Value of the covariate, in its unit.
     pub covariate: f64,
-    /// Of the coordinate [rad] or [m].
+    /// Of the coordinate \[rad\] or \[m\].
     pub value: f64,
     /// |l| [m/rad] or [m/m]: poses where it is small say little.
     pub lever: f64,

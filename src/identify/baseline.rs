@@ -21,7 +21,7 @@ pub struct Baseline {
     pub iterations: u64,
     /// Evaluations of its residual.
     pub evaluations: u64,
-    /// Time taken [s].
+    /// Time taken \[s\].
     pub seconds: f64,
     /// Why the iteration stopped.
     pub termination: Termination,

@@ -13,13 +13,13 @@ use crate::problem::Problem;
 use super::stage::StageError;
 
 /// 1 σ of the target position against 1 σ = 1 (rad or m) of the way from the seed: the position decides, the seed breaks
-/// ties [m].
+/// ties \[m\].
 const POSITION_WEIGHT: f64 = 1e-6;
 /// A command has settled when a pass changes it by less [rad or m].
 const SETTLED: f64 = 1e-10;
 /// Passes after which a command that does not settle is taken as it is: its miss says how good it is.
 const MAX_PASSES: usize = 20;
-/// A target counts as reached within this distance [m].
+/// A target counts as reached within this distance \[m\].
 const REACHED: f64 = 1e-6;
 
 /// A command for one target.
@@ -27,11 +27,11 @@ const REACHED: f64 = 1e-6;
 pub struct Command {
     /// Row of the target.
     pub row: usize,
-    /// Configuration, shape = (joints) [rad] or [m]; the seed's value at fixed joints.
+    /// Configuration, shape = (joints) \[rad\] or \[m\]; the seed's value at fixed joints.
     pub configuration: Vec<f64>,
-    /// Desired − predicted position [m].
+    /// Desired − predicted position \[m\].
     pub miss: Vector3<f64>,
-    /// Distance to the target before: with the seed as command [m].
+    /// Distance to the target before: with the seed as command \[m\].
     pub seed_miss: f64,
 }
 

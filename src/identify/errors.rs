@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// A value per axis of the measuring frame and for the Euclidean norm [m].
+/// A value per axis of the measuring frame and for the Euclidean norm \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisValues {
     /// Along x.
@@ -15,7 +15,7 @@ pub struct AxisValues {
     pub norm: f64,
 }
 
-/// Size of the position errors of some poses [m].
+/// Size of the position errors of some poses \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ErrorSummary {
     /// Number of poses.
@@ -40,7 +40,7 @@ pub struct Errors {
 }
 
 impl ErrorSummary {
-    /// Of the errors measured − predicted [m].
+    /// Of the errors measured − predicted \[m\].
     pub fn of(errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> = errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();
         let n = values.len().max(1) as f64;

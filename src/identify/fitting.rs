@@ -34,7 +34,7 @@ pub(super) struct Fitting<'a> {
     pub progress: Option<&'a ProgressSink>,
     /// Steps after which a stage of the strategy is stopped.
     pub max_steps: Option<u64>,
-    /// 1 σ of a coordinate in rows without one of their own [m].
+    /// 1 σ of a coordinate in rows without one of their own \[m\].
     pub sigma: f64,
 }
 
@@ -191,7 +191,7 @@ impl<'a> Fitting<'a> {
         Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
     }
 
-    /// Residuals measured − predicted of some rows, measuring frame [m].
+    /// Residuals measured − predicted of some rows, measuring frame \[m\].
     pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
         self.placement.position_errors(self.model, x, self.measurements, rows)
     }

@@ -25,7 +25,7 @@ use crate::problem::{Effect, EffectDeclaration, Problem, Robust, RobustLoss};
 const NOISE_SETTLED: f64 = 1e-3;
 /// Fits after which the search for an undeclared σ stops.
 const MAX_NOISE_FITS: usize = 20;
-/// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding [m].
+/// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding \[m\].
 const LEAST_NOISE: f64 = 1e-9;
 
 /// How to identify: [`Options::default()`] with what the `with_…` methods change.
@@ -38,7 +38,7 @@ pub struct Options {
     pub solver: SolverChoice,
     /// Told of every step.
     pub progress: Option<ProgressSink>,
-    /// Values [SI] by name from which the fit starts; the registered nominal arm gives the others.
+    /// Values \[SI\] by name from which the fit starts; the registered nominal arm gives the others.
     pub start: Vec<(String, f64)>,
     /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
     pub max_steps: Option<u64>,
@@ -66,7 +66,7 @@ impl Options {
         Self { progress: progress.into(), ..self }
     }
 
-    /// The same, starting from these values [SI] by name.
+    /// The same, starting from these values \[SI\] by name.
     #[must_use]
     pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
         Self { start, ..self }

@@ -23,7 +23,7 @@ const NOTHING_LEARNED: f64 = 1e-6;
 pub enum Noise {
     /// From `position_sigma` or the column `sigma`.
     Declared,
-    /// From the scatter about the fit, 1 σ per coordinate [m].
+    /// From the scatter about the fit, 1 σ per coordinate \[m\].
     Estimated(f64),
     /// Neither declared nor to be seen: the fit has no degrees of freedom.
     Unknown,
@@ -71,7 +71,7 @@ pub struct Identification {
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.
     pub evaluations: u64,
-    /// Time taken [s].
+    /// Time taken \[s\].
     pub seconds: f64,
     /// Where the noise comes from.
     pub noise: Noise,
@@ -102,9 +102,9 @@ pub struct Identification {
     pub x: DVector<f64>,
     /// The same of the nominal arm with base and target fitted where they are free, whose errors are `registered`.
     pub registered_x: DVector<f64>,
-    /// Time from which what follows the time counts: that of the first pose [s].
+    /// Time from which what follows the time counts: that of the first pose \[s\].
     pub first_time: f64,
-    /// 1 σ of a coordinate in rows without one of their own, declared or estimated [m].
+    /// 1 σ of a coordinate in rows without one of their own, declared or estimated \[m\].
     pub sigma: f64,
 }
 

@@ -18,16 +18,16 @@ pub struct Outlier {
     pub row: usize,
     /// File and line.
     pub location: Location,
-    /// Length of the whitened residual in units of the scatter [σ].
+    /// Length of the whitened residual in units of the scatter \[σ\].
     pub distance: f64,
-    /// Residual measured − predicted, measuring frame [m].
+    /// Residual measured − predicted, measuring frame \[m\].
     pub error: Vector3<f64>,
 }
 
 /// Lengths of the whitened residuals of some poses, and what counts as too long.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {
-    /// ‖r‖ of each pose [σ].
+    /// ‖r‖ of each pose \[σ\].
     pub values: Vec<f64>,
     /// 1 σ of the scatter in units of the assumed one.
     pub scatter: f64,
@@ -37,7 +37,7 @@ pub(super) struct Lengths {
 impl Lengths {
     /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that is left to scatter, 0…1.
     ///
-    /// A pose is an outlier where P(χ²₃ > s²) < 0.01 / N, with s = ‖r‖ / scatter and N poses [Bonferroni]. The scatter is
+    /// A pose is an outlier where P(χ²₃ > s²) < 0.01 / N, with s = ‖r‖ / scatter and N poses \[Bonferroni\]. The scatter is
     /// median ‖r‖ / 1.538 (√ of the median of χ²₃), which gross errors hardly move, over √`freedom`; under a declared σ it
     /// is no less than that σ. So a model that misses some effect everywhere does not turn every pose into an outlier.
     pub fn of(stage: &Stage, at: &DVector<f64>, freedom: f64, noise_is_declared: bool) -> Self {

@@ -8,7 +8,7 @@ use crate::model::{Model, Pose};
 use crate::problem::PoseView;
 use crate::problem::Problem;
 
-/// Scale of a coordinate's error where no σ is declared and none estimated yet [m].
+/// Scale of a coordinate's error where no σ is declared and none estimated yet \[m\].
 pub(super) const UNKNOWN_SIGMA: f64 = 1e-3;
 
 /// Bases and targets of a set of measurements.
@@ -45,14 +45,14 @@ impl Placement {
         self.target_of_row[row]
     }
 
-    /// 1 σ of a coordinate of some rows together, as declared [m].
+    /// 1 σ of a coordinate of some rows together, as declared \[m\].
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma.as_ref().map_or(whole, |all| all[row]).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
-    /// Rows as poses; `sigma` [m] is that of rows without one of their own.
+    /// Rows as poses; `sigma` \[m\] is that of rows without one of their own.
     pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
         let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
         let n = measurements.joints;
@@ -76,7 +76,7 @@ impl Placement {
             .collect()
     }
 
-    /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`, measuring frame [m]; NaN
+    /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`, measuring frame \[m\]; NaN
     /// where it has no equilibrium.
     pub fn position_errors(
         &self,

@@ -17,16 +17,16 @@ pub struct Residual {
     pub row: usize,
     /// Whether the row was held out.
     pub held_out: bool,
-    /// Measured − predicted position, measuring frame [m]; NaN where the identified arm has no equilibrium.
+    /// Measured − predicted position, measuring frame \[m\]; NaN where the identified arm has no equilibrium.
     pub position: Vector3<f64>,
-    /// The same over 1 σ of a coordinate [1].
+    /// The same over 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
     /// Whether the row is among the [outliers](Identification::outliers) of the fit.
     pub outlier: bool,
 }
 
 impl Identification {
-    /// Positions of the identified arm in the poses of `rows`, measuring frame [m]; NaN where it has no equilibrium.
+    /// Positions of the identified arm in the poses of `rows`, measuring frame \[m\]; NaN where it has no equilibrium.
     ///
     /// The positions in `rows` do not matter ([`Dataset::poses`] makes rows without any); their sessions and targets have to
     /// be among those identified. `problem` is the one that was identified.
@@ -69,7 +69,7 @@ impl Identification {
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }
 
-    /// Measured − predicted of every row, measuring frame [m]; time counts from the first pose that was identified.
+    /// Measured − predicted of every row, measuring frame \[m\]; time counts from the first pose that was identified.
     fn errors(&self, model: &Model, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
         if rows.joints != model.joints() {
             return Err(IdentifyError::JointCount { found: rows.joints, joints: model.joints() });

@@ -18,7 +18,7 @@ const BEYOND_NOISE: f64 = 100.0;
 /// Parameters of an arm that describes the measured one stay within so many σ of their priors.
 const OUT_OF_PROPORTION: f64 = 20.0;
 
-/// Points this close together say nothing about the size of an arm [m].
+/// Points this close together say nothing about the size of an arm \[m\].
 const LEAST_SPREAD: f64 = 0.01;
 
 /// Why a fit is not to be trusted.
@@ -47,9 +47,9 @@ pub enum QualityFlag {
     },
     /// The fitted arm is far from the measurements.
     Misses {
-        /// Root mean squared error on the identification poses [m].
+        /// Root mean squared error on the identification poses \[m\].
         rms: f64,
-        /// Root mean squared distance of the measured points from their centre [m].
+        /// Root mean squared distance of the measured points from their centre \[m\].
         spread: f64,
     },
 }
@@ -156,7 +156,7 @@ pub(super) fn underdetermined(
     bases.or_else(|| (0..placement.targets.len()).find_map(target))
 }
 
-/// Whether the fitted arm is far from what was measured in `rows`; `sigma` [m] is that of a coordinate, if it was declared.
+/// Whether the fitted arm is far from what was measured in `rows`; `sigma` \[m\] is that of a coordinate, if it was declared.
 pub(super) fn misses(
     measurements: &Measurements,
     placement: &Placement,

@@ -41,7 +41,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     }
 }
 
-/// The rotation vector [rad] and translation [m] that carry the first points of the pairs to the second ones best; the
+/// The rotation vector \[rad\] and translation \[m\] that carry the first points of the pairs to the second ones best; the
 /// `nominal` rotation where the points lie on a line, about which they leave the turn open.
 fn rigid_motion(pairs: &[(Vector3<f64>, Vector3<f64>)], nominal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let n = pairs.len() as f64;

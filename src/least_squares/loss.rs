@@ -3,7 +3,7 @@
 use super::Block;
 use super::kernel::{norm, sum_of_squares};
 
-/// How the residual of an item (a pose) counts: ½ρ(s²), where s = ‖r‖ is its whitened length [σ].
+/// How the residual of an item (a pose) counts: ½ρ(s²), where s = ‖r‖ is its whitened length \[σ\].
 ///
 /// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact, the curvature ρ′ JᵀJ leaves
 /// out ρ″: the first-order form of [Triggs et al. 2000, sec. 4.3], which Ceres takes where ρ″ < 0. Every ρ here is concave in
@@ -16,14 +16,14 @@ pub enum Loss {
     Squares,
     /// ρ = s² up to s = k, 2ks − k² beyond                                                         [Huber 1964]
     Huber {
-        /// k [σ].
+        /// k \[σ\].
         threshold: f64,
     },
     /// ρ = 2c (√(s² + ε²) − ε): the length of the residual, rounded off to s²·c/ε where s ≪ ε.
     L1 {
         /// c [1/σ]: the negative log-likelihood of lengths that fall off as exp(−c s).
         slope: f64,
-        /// ε [σ].
+        /// ε \[σ\].
         smoothing: f64,
     },
 }

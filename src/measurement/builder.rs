@@ -75,8 +75,8 @@ pub struct DatasetBuilder {
 }
 
 impl Dataset {
-    /// From plain arrays: configurations, shape = (rows)(joints) [rad] or [m], fixed joints included with any value, and
-    /// measured positions, shape = (rows), measuring frame [m]. Other columns follow by name; no row is held out unless
+    /// From plain arrays: configurations, shape = (rows)(joints) \[rad\] or \[m\], fixed joints included with any value, and
+    /// measured positions, shape = (rows), measuring frame \[m\]. Other columns follow by name; no row is held out unless
     /// [`held_out`](DatasetBuilder::held_out) says so.
     pub fn builder<C: AsRef<[f64]>>(
         configurations: impl IntoIterator<Item = C>,
@@ -106,21 +106,21 @@ impl Dataset {
 }
 
 impl DatasetBuilder {
-    /// 1 σ of each coordinate of a position, above 0 [m].
+    /// 1 σ of each coordinate of a position, above 0 \[m\].
     #[must_use]
     pub fn sigma(mut self, sigma: Vec<f64>) -> Self {
         self.sigma = Some(sigma);
         self
     }
 
-    /// Payload, not negative [kg].
+    /// Payload, not negative \[kg\].
     #[must_use]
     pub fn payload(mut self, payload: Vec<f64>) -> Self {
         self.payload = Some(payload);
         self
     }
 
-    /// Hoist force [N].
+    /// Hoist force \[N\].
     #[must_use]
     pub fn hoist(mut self, hoist: Vec<f64>) -> Self {
         self.hoist = Some(hoist);
@@ -134,7 +134,7 @@ impl DatasetBuilder {
         self
     }
 
-    /// Time [s]; without it, the number of the row.
+    /// Time \[s\]; without it, the number of the row.
     #[must_use]
     pub fn time(mut self, time: Vec<f64>) -> Self {
         self.time = Some(time);

@@ -4,7 +4,7 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::Problem;
 
-/// How far beyond its limit a command may be for rounding alone [rad] or [m].
+/// How far beyond its limit a command may be for rounding alone \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-6;
 
 /// The column of a joint's commands.

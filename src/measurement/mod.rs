@@ -31,19 +31,19 @@ pub struct Measurements {
     pub origin: Vec<(u32, u32)>,
     /// Number of joints of the arm, fixed ones included.
     pub joints: usize,
-    /// Configurations, shape = (rows, joints), row after row [rad] or [m]; 0 at fixed joints.
+    /// Configurations, shape = (rows, joints), row after row \[rad\] or \[m\]; 0 at fixed joints.
     pub configurations: Vec<f64>,
-    /// Measured positions in the measuring frame [m].
+    /// Measured positions in the measuring frame \[m\].
     pub positions: Vec<Vector3<f64>>,
-    /// 1 σ of each coordinate from the column `sigma_mm` [m].
+    /// 1 σ of each coordinate from the column `sigma_mm` \[m\].
     pub sigma: Option<Vec<f64>>,
-    /// Payload [kg].
+    /// Payload \[kg\].
     pub payload: Option<Vec<f64>>,
-    /// Hoist force [N].
+    /// Hoist force \[N\].
     pub hoist: Option<Vec<f64>>,
     /// Temperature [°C].
     pub temperature: Option<Vec<f64>>,
-    /// Time [s]; the row's order where there is no column.
+    /// Time \[s\]; the row's order where there is no column.
     pub time: Vec<f64>,
     /// Whether `time` was measured, not counted.
     pub time_measured: bool,
@@ -100,7 +100,7 @@ impl Measurements {
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
-    /// Configuration of a row, shape = (joints) [rad] or [m].
+    /// Configuration of a row, shape = (joints) \[rad\] or \[m\].
     pub fn configuration(&self, row: usize) -> &[f64] {
         &self.configurations[row * self.joints..(row + 1) * self.joints]
     }

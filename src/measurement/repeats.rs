@@ -5,13 +5,13 @@ use std::collections::{BTreeSet, HashMap};
 use super::Measurements;
 use crate::problem::{Effect, JointKind, Problem};
 
-/// Configurations agree where each angle does to this [rad].
+/// Configurations agree where each angle does to this \[rad\].
 const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
-/// Configurations agree where each length does to this [m].
+/// Configurations agree where each length does to this \[m\].
 const LENGTH_STEP: f64 = 1e-4;
 /// Payloads and hoist forces agree where they do to this part of the largest.
 const LOAD_STEP: f64 = 0.01;
-/// Temperatures agree where they do to this [K].
+/// Temperatures agree where they do to this \[K\].
 const TEMPERATURE_STEP: f64 = 1.0;
 /// Numbers of words and directions agree where they are the same.
 const SAME: f64 = 0.5;

@@ -36,7 +36,7 @@ impl Virtual {
 }
 
 impl Tape {
-    /// Finds Λ, then the derivatives of the position `at` [m] of the target with respect to all parameters.
+    /// Finds Λ, then the derivatives of the position `at` \[m\] of the target with respect to all parameters.
     pub(super) fn differentiate(&mut self, at: &Vector3<f64>) {
         self.anderson.restart();
         for _ in 0..MAX_PASSES {

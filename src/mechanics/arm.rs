@@ -19,11 +19,11 @@ pub struct Arm<S> {
     pub beam_elements: usize,
     /// Joints from the base outwards.
     pub joints: Vec<Joint<S>>,
-    /// Where a payload hangs, last frame [m].
+    /// Where a payload hangs, last frame \[m\].
     pub payload_at: Vector3<f64>,
-    /// Payload where the pose gives none [kg].
+    /// Payload where the pose gives none \[kg\].
     pub payload_mass: f64,
-    /// By how much a payload is heavier than declared, whenever one is carried [kg].
+    /// By how much a payload is heavier than declared, whenever one is carried \[kg\].
     pub payload_error: S,
     /// How ropes pull other than declared.
     pub rope: Option<Rope<S>>,
@@ -78,7 +78,7 @@ impl<S: Scalar> Arm<S> {
         self.mounting.is_some() || self.joints.iter().any(gives)
     }
 
-    /// Degrees above the reference [K]; 0 where the temperature is not known.
+    /// Degrees above the reference \[K\]; 0 where the temperature is not known.
     pub(super) fn warming(&self, setup: &PoseView) -> f64 {
         setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
     }
@@ -92,7 +92,7 @@ impl<S: Scalar> Arm<S> {
         frame
     }
 
-    /// Payload of a pose [kg].
+    /// Payload of a pose \[kg\].
     pub(super) fn payload(&self, setup: &PoseView) -> S {
         let declared = setup.payload.unwrap_or(self.payload_mass);
         if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }

@@ -22,21 +22,21 @@ pub struct Flexibility<S> {
     pub twist: S,
 }
 
-/// Force [N] and moment [N·m] at one point, in one frame.
+/// Force \[N\] and moment [N·m] at one point, in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrench<S> {
-    /// Force [N].
+    /// Force \[N\].
     pub force: Vector3<S>,
     /// Moment about the point [N·m].
     pub moment: Vector3<S>,
 }
 
-/// Displacement [m] and small rotation vector [rad] of a section, root frame.
+/// Displacement \[m\] and small rotation vector \[rad\] of a section, root frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deflection<S> {
-    /// Displacement of the axis [m].
+    /// Displacement of the axis \[m\].
     pub displacement: Vector3<S>,
-    /// Rotation vector [rad].
+    /// Rotation vector \[rad\].
     pub rotation: Vector3<S>,
 }
 
@@ -51,20 +51,20 @@ impl<S: Scalar> Deflection<S> {
 /// What a unit load does: geometry only, shared by both bending planes.
 #[derive(Clone, Copy)]
 struct Shape<S> {
-    /// Deflection per force and flexibility [m³] (evenly spread: per N/m [m⁴]).
+    /// Deflection per force and flexibility \[m³\] (evenly spread: per N/m \[m⁴\]).
     deflection_of_force: S,
-    /// Slope per force and flexibility [m²] ([m³]).
+    /// Slope per force and flexibility \[m²\] (\[m³\]).
     slope_of_force: S,
-    /// Deflection per moment and flexibility [m²].
+    /// Deflection per moment and flexibility \[m²\].
     deflection_of_moment: S,
-    /// Slope per moment and flexibility, also stretch and twist [m].
+    /// Slope per moment and flexibility, also stretch and twist \[m\].
     slope_of_moment: S,
 }
 
 /// A clamped uniform beam with its loads, all in the root frame.
 #[derive(Debug)]
 pub struct Cantilever<'a, S> {
-    /// Signed length L [m].
+    /// Signed length L \[m\].
     pub length: S,
     /// Flexibilities, those of a beam along +x.
     pub flexibility: Flexibility<S>,
@@ -72,12 +72,12 @@ pub struct Cantilever<'a, S> {
     pub spread: Vector3<S>,
     /// Strain without load, the same all along.
     pub strain: Option<Strain<S>>,
-    /// Point loads: station s [m] between 0 and L, and wrench there. The tip load is the one at s = L.
+    /// Point loads: station s \[m\] between 0 and L, and wrench there. The tip load is the one at s = L.
     pub points: &'a [(S, Wrench<S>)],
 }
 
 impl<S: Scalar> Cantilever<'_, S> {
-    /// Deflection of the section at `x` [m], 0 ≤ x/L ≤ 1.
+    /// Deflection of the section at `x` \[m\], 0 ≤ x/L ≤ 1.
     ///
     /// Load F, M at s, for x ≤ s:  δ = F (s x²/2 − x³/6)/EI + M x²/(2EI),  φ = F (s x − x²/2)/EI + M x/EI;
     /// beyond s the beam stays straight. Spread load q:  δ = q (L²x²/4 − L x³/6 + x⁴/24)/EI. Small slopes only.
@@ -123,7 +123,7 @@ impl<S: Scalar> Cantilever<'_, S> {
         self.at(self.length)
     }
 
-    /// Mean displacement along the beam [m]: that of its own centre of mass.
+    /// Mean displacement along the beam \[m\]: that of its own centre of mass.
     pub fn mean_displacement(&self) -> Vector3<S> {
         let l = self.length;
         let k = self.signed_flexibility();

@@ -12,9 +12,9 @@ use crate::spatial::{Frame, rotate};
 pub(super) struct LinkLoad<S> {
     /// Which element carries it.
     pub element: usize,
-    /// Place in the beam's frame [m].
+    /// Place in the beam's frame \[m\].
     pub at: Vector3<S>,
-    /// Force, arm base frame [N].
+    /// Force, arm base frame \[N\].
     pub force: Vector3<S>,
     /// Whether a rope pulls there, whose force may depend on the place.
     pub rope: bool,
@@ -25,18 +25,18 @@ pub(super) struct LinkLoad<S> {
 pub(super) struct Element<'a, S> {
     /// Number along the beam.
     pub number: usize,
-    /// Signed length [m].
+    /// Signed length \[m\].
     pub length: S,
-    /// Where it begins along the beam [m].
+    /// Where it begins along the beam \[m\].
     pub start: S,
     pub flexibility: Flexibility<S>,
     /// Strain without load.
     pub strain: Option<Strain<S>>,
-    /// Own weight [N].
+    /// Own weight \[N\].
     pub weight: Vector3<S>,
     /// Loads of the whole beam.
     pub loads: &'a [LinkLoad<S>],
-    /// Force of everything beyond the tip [N], and its moment about the tip [N·m].
+    /// Force of everything beyond the tip \[N\], and its moment about the tip [N·m].
     pub tip: Wrench<S>,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct BentElement<'a, S> {
     tip: Deflection<S>,
     /// Frame at the root, x along the chord, turned about it by half the twist.
     chord: Frame<S>,
-    /// Rotation vector from the undeflected section at the root to the chord's frame [rad].
+    /// Rotation vector from the undeflected section at the root to the chord's frame \[rad\].
     lean: Vector3<S>,
 }
 
@@ -82,7 +82,7 @@ impl<S: Scalar> Element<'_, S> {
         }
     }
 
-    /// The section that carries a load, measured from the element's root, and the rigid arm from there to it [m].
+    /// The section that carries a load, measured from the element's root, and the rigid arm from there to it \[m\].
     fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
         let x = load.at.x - self.start;
         let part = x.re() / self.length.re();
@@ -124,7 +124,7 @@ impl<S: Scalar> Element<'_, S> {
         BentElement { element: self, cantilever, tip, chord: leaning(&lean), lean }
     }
 
-    /// Where a load hangs on the straight element, arm base frame [m].
+    /// Where a load hangs on the straight element, arm base frame \[m\].
     pub fn straight_point(&self, root: &Frame<S>, load: &LinkLoad<S>) -> Vector3<S> {
         let (station, mut local) = self.station_and_offset(load);
         local.x += station;
@@ -133,7 +133,7 @@ impl<S: Scalar> Element<'_, S> {
 }
 
 impl<S: Scalar> BentElement<'_, S> {
-    /// Place of a load, arm base frame [m].
+    /// Place of a load, arm base frame \[m\].
     pub fn point(&self, load: &LinkLoad<S>) -> Vector3<S> {
         let (station, offset) = self.element.station_and_offset(load);
         let Deflection { displacement, rotation } = self.cantilever.at(station);
@@ -142,7 +142,7 @@ impl<S: Scalar> BentElement<'_, S> {
         self.chord.point(&(axis + rotate(&(rotation - self.lean), &offset)))
     }
 
-    /// Centre of mass of the element itself, arm base frame [m].
+    /// Centre of mass of the element itself, arm base frame \[m\].
     pub fn centre_of_mass(&self) -> Vector3<S> {
         let along = Vector3::new(self.element.length * 0.5, S::from(0.0), S::from(0.0));
         self.chord.point(&(along + self.cantilever.mean_displacement() - self.lean.cross(&along)))

@@ -109,7 +109,7 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Force of a rope [N].
+    /// Force of a rope \[N\].
     fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
         let tension = setup.hoist.unwrap_or(hoist.force);
         match &self.rope {
@@ -239,7 +239,7 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Lists the loads of a beam with elements of `length` [m]; `rope` is the force of its rope [N].
+    /// Lists the loads of a beam with elements of `length` \[m\]; `rope` is the force of its rope \[N\].
     fn load_beam(&self, beam: &Beam<S>, rope: Vector3<S>, length: S, loads: &mut Vec<LinkLoad<S>>) {
         let last = (self.beam_elements - 1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down and clamped")]

@@ -14,7 +14,7 @@ const FLAT: f64 = 20.0;
 pub struct Nonlinear<S> {
     /// Angle per cube of the moment [rad/(N·m)³].
     pub cubic: S,
-    /// Play [rad], [m] where the joint slides: taken up by the direction of approach; where that is not known by the
+    /// Play \[rad\], \[m\] where the joint slides: taken up by the direction of approach; where that is not known by the
     /// moment, which moves no joint along its slide.
     pub play: S,
 }
@@ -31,9 +31,9 @@ pub struct Thermal<S> {
 /// A mass on a link's axis that nobody declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AddedMass<S> {
-    /// Mass [kg].
+    /// Mass \[kg\].
     pub mass: S,
-    /// Distance from the link's root [m].
+    /// Distance from the link's root \[m\].
     pub at: S,
 }
 
@@ -63,7 +63,7 @@ fn tanh<S: Scalar>(x: S) -> S {
 }
 
 impl<S: Scalar> Thermal<S> {
-    /// Strain and curvatures at a warming of `degrees` [K].
+    /// Strain and curvatures at a warming of `degrees` \[K\].
     pub(super) fn strain(&self, degrees: f64) -> Strain<S> {
         Strain { axial: self.expansion * degrees, curvature: self.curvature.map(|k| k * degrees) }
     }
@@ -79,7 +79,7 @@ pub struct Strain<S> {
 }
 
 impl<S: Scalar> Rope<S> {
-    /// Force [N] of a tension [N] in a declared direction, with the hook at these x and y [m], base frame.
+    /// Force \[N\] of a tension \[N\] in a declared direction, with the hook at these x and y \[m\], base frame.
     pub(super) fn pull(&self, direction: &Vector3<f64>, tension: f64, [x, y]: [S; 2]) -> Vector3<S> {
         let mut direction = direction.map(S::from);
         direction.x += self.lean[0] + self.trolley * x;

@@ -9,7 +9,7 @@ use crate::spatial::Frame;
 /// An angle with its sine and cosine, taken once per arm rather than once per pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Angle<S> {
-    /// The angle [rad].
+    /// The angle \[rad\].
     pub value: S,
     /// (sin, cos).
     pub sin_cos: (S, S),
@@ -29,11 +29,11 @@ pub struct Joint<S> {
     pub kind: JointKind,
     /// α.
     pub alpha: Angle<S>,
-    /// a [m].
+    /// a \[m\].
     pub a: S,
-    /// θ [rad].
+    /// θ \[rad\].
     pub theta: S,
-    /// d [m].
+    /// d \[m\].
     pub d: S,
     /// β.
     pub beta: Angle<S>,
@@ -54,7 +54,7 @@ pub struct Joint<S> {
 pub struct Coordinates<S> {
     /// (sin, cos) of θ + q.
     pub angle: (S, S),
-    /// d + q [m].
+    /// d + q \[m\].
     pub offset: S,
 }
 
@@ -108,7 +108,7 @@ impl<S: Scalar> Joint<S> {
         self.nonlinear.as_ref().map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
     }
 
-    /// What play adds to the joint's coordinate when it came from a known direction [rad] or [m].
+    /// What play adds to the joint's coordinate when it came from a known direction \[rad\] or \[m\].
     pub(super) fn slip(&self, approach: Option<f64>) -> Option<S> {
         self.nonlinear.as_ref().zip(approach).map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }

@@ -10,18 +10,18 @@ use crate::scalar::Scalar;
 /// A point mass on its carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointMass {
-    /// Mass [kg].
+    /// Mass \[kg\].
     pub mass: f64,
-    /// Position in the carrier's frame [m].
+    /// Position in the carrier's frame \[m\].
     pub at: Vector3<f64>,
 }
 
 /// A suspension force on a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hoist {
-    /// Hook in the beam's frame [m].
+    /// Hook in the beam's frame \[m\].
     pub at: Vector3<f64>,
-    /// Force where the pose gives none [N].
+    /// Force where the pose gives none \[N\].
     pub force: f64,
     /// Unit direction, arm base frame.
     pub direction: Vector3<f64>,
@@ -30,7 +30,7 @@ pub struct Hoist {
 /// An elastic link along a joint's a, clamped after Rx(α).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Beam<S> {
-    /// Own mass, spread evenly [kg].
+    /// Own mass, spread evenly \[kg\].
     pub mass: f64,
     /// Flexibilities.
     pub flexibility: Flexibility<S>,

@@ -44,7 +44,7 @@ impl Sensitivity {
         }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame, and finds all derivatives.
+    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame, and finds all derivatives.
     pub fn differentiate(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
         let Self { arms, parameters, lanes, ws, tape } = self;
         let mut moments = std::mem::take(&mut ws.moments);
@@ -71,7 +71,7 @@ impl Sensitivity {
         }
     }
 
-    /// Derivative of the position [m], arm base frame, with respect to the parameter in a direction of a segment.
+    /// Derivative of the position \[m\], arm base frame, with respect to the parameter in a direction of a segment.
     pub fn of(&self, segment: Segment, lane: usize) -> Vector3<f64> {
         self.tape.derivative(segment.index(), lane)
     }

@@ -120,7 +120,7 @@ impl Response {
         Self { arm: arm.lift(), ws: Workspace::default() }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` [m], last frame.
+    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame.
     pub fn adjoint(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
         let n = pose.moments.len();
         if n == 0 || (self.arm.is_first_order() && self.arm.mixing.is_none()) {
@@ -179,7 +179,7 @@ impl Equilibrated {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Position [m] of the target at `target` [m] (last frame), arm base frame, with its exact first derivatives.
+    /// Position \[m\] of the target at `target` \[m\] (last frame), arm base frame, with its exact first derivatives.
     ///
     /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and for loads on the bent
     /// arm its Λ for the same target.

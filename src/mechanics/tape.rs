@@ -13,9 +13,9 @@ pub(super) type Each = [Vector3<f64>; 3];
 /// How a part's end moves with one number: point r of everything beyond moves by rotation × r + translation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Column {
-    /// [rad] per unit.
+    /// \[rad\] per unit.
     pub rotation: Vector3<f64>,
-    /// Of the point at the base origin [m] per unit.
+    /// Of the point at the base origin \[m\] per unit.
     pub translation: Vector3<f64>,
 }
 

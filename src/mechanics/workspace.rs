@@ -12,7 +12,7 @@ use crate::spatial::Frame;
 /// What the walk passes, in order from the base outwards.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Event<S> {
-    /// A force [N] at a point [m].
+    /// A force \[N\] at a point \[m\].
     Load { at: Vector3<S>, force: Vector3<S> },
     /// The tip of a beam element: its three moments are unknowns.
     Tip { at: Vector3<S> },
@@ -30,13 +30,13 @@ pub struct Workspace<S> {
     pub(super) events: Vec<Event<S>>,
     pub(super) moments: Vec<S>,
     pub(super) next_moments: Vec<S>,
-    /// Where each hook is, x and y in the arm base frame [m], if ropes may lean: unknowns before all moments.
+    /// Where each hook is, x and y in the arm base frame \[m\], if ropes may lean: unknowns before all moments.
     pub(super) hooks: Vec<[S; 2]>,
     /// Where the segments of the arm end, if it is walked segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
-    /// Force of each link's rope [N], zero without one.
+    /// Force of each link's rope \[N\], zero without one.
     pub(super) ropes: Vec<Vector3<S>>,
-    /// Force of everything beyond each joint's link [N].
+    /// Force of everything beyond each joint's link \[N\].
     pub(super) beyond: Vec<Vector3<S>>,
     /// Frame at each link's root in the last rigid walk.
     pub(super) rigid_roots: Vec<Frame<S>>,
@@ -76,7 +76,7 @@ impl Workspace<f64> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// The unknowns as the last walk gives them: places of hooks [m], then moments where something bends [N·m].
+    /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where something bends [N·m].
     pub(super) fn sum_moments(&mut self) {
         let Self { events, next_moments, hooks, .. } = self;
         let zero = Vector3::from_element(S::from(0.0));

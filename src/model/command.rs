@@ -46,7 +46,7 @@ impl Model {
         }
     }
 
-    /// The full parameter vector for values [SI] by name, or the first name that `value` does not know.
+    /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not know.
     ///
     /// # Errors
     /// A free parameter has no value.

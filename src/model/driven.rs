@@ -8,7 +8,7 @@ use crate::problem::PoseView;
 pub(super) struct Driven {
     pub joint: usize,
     pub driver: Driver,
-    /// [rad] or [m] per unit of the driver.
+    /// \[rad\] or \[m\] per unit of the driver.
     pub value: f64,
 }
 

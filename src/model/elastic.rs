@@ -64,7 +64,7 @@ impl Elastic {
         Self { parts, response, whole, arm, rest, real: Workspace::default(), ws: Workspace::default() }
     }
 
-    /// Writes the derivatives of the `target` [m] of a pose; returns the last frame, measuring frame, `None` where the pose
+    /// Writes the derivatives of the `target` \[m\] of a pose; returns the last frame, measuring frame, `None` where the pose
     /// has no equilibrium.
     pub fn write(
         &mut self,

@@ -59,7 +59,7 @@ fn weightless() -> Beam<f64> {
     }
 }
 
-/// Turns gravity by the rotation vector (x, y, 0) [rad].
+/// Turns gravity by the rotation vector (x, y, 0) \[rad\].
 pub(super) fn turn_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
     arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
 }

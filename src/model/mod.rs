@@ -132,7 +132,7 @@ impl Model {
         self.observation.with(&self.parameters, x)
     }
 
-    /// Base poses in the measuring frame: translation [m] and rotation vector [rad].
+    /// Base poses in the measuring frame: translation \[m\] and rotation vector \[rad\].
     pub fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
         let mut bases = self.bases.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
@@ -152,7 +152,7 @@ impl Model {
         self.base_poses(x).iter().map(|base| Frame::from_rotation_vector(base.translation, &base.rotation)).collect()
     }
 
-    /// Targets in the last frame [m].
+    /// Targets in the last frame \[m\].
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {

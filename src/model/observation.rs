@@ -28,7 +28,7 @@ impl Observation {
         observation
     }
 
-    /// What is measured of a position, measuring frame [m].
+    /// What is measured of a position, measuring frame \[m\].
     #[inline]
     pub fn of(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {
         let mut seen = position * (1.0 + self.scale);

@@ -13,8 +13,8 @@ pub struct Pose<'a> {
     pub base: usize,
     /// Which target.
     pub target: usize,
-    /// Measured position, measuring frame [m].
+    /// Measured position, measuring frame \[m\].
     pub measured: Vector3<f64>,
-    /// 1 σ of each coordinate [m].
+    /// 1 σ of each coordinate \[m\].
     pub sigma: f64,
 }

@@ -51,7 +51,7 @@ impl<'a> PoseResiduals<'a> {
         &self.unknowns
     }
 
-    /// Residuals measured − predicted, measuring frame [m]; NaN where a pose has no equilibrium.
+    /// Residuals measured − predicted, measuring frame \[m\]; NaN where a pose has no equilibrium.
     pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         let mut errors = vec![Vector3::zeros(); self.poses.len()];
         let write = |(chunk, errors): (usize, &mut [Vector3<f64>])| {
@@ -94,20 +94,20 @@ impl<'a> PoseResiduals<'a> {
 }
 
 impl Model {
-    /// Residuals measured − predicted of poses at the full parameter vector `x`, measuring frame [m]; NaN where a pose has no
+    /// Residuals measured − predicted of poses at the full parameter vector `x`, measuring frame \[m\]; NaN where a pose has no
     /// equilibrium.
     pub fn residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         PoseResiduals::new(self, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }
 
-    /// Predicted positions of poses at the full parameter vector `x`, as measured, measuring frame [m]; NaN where a pose has no
+    /// Predicted positions of poses at the full parameter vector `x`, as measured, measuring frame \[m\]; NaN where a pose has no
     /// equilibrium.
     pub fn predict(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.measured).collect();
         measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
     }
 
-    /// Target positions in the arm's base frame [m] at the full parameter vector `x`; `None` without equilibrium.
+    /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.
     ///
     /// What effects do to the measurement is not in them.
     pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {

@@ -47,7 +47,7 @@ impl Rigid {
         Self { links, inputs, carried: Vec::new() }
     }
 
-    /// Writes the derivatives of the `target` [m] of a pose; returns the last frame, measuring frame.
+    /// Writes the derivatives of the `target` \[m\] of a pose; returns the last frame, measuring frame.
     #[inline]
     pub fn write(
         &mut self,
@@ -87,7 +87,7 @@ impl Link {
         Self { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, inputs: [None; 5] }
     }
 
-    /// Carries a point [m] from the frame after the link to the frame before it, with what α, a, θ, d, β do to it.
+    /// Carries a point \[m\] from the frame after the link to the frame before it, with what α, a, θ, d, β do to it.
     #[inline]
     fn carry(&self, at: &Coordinates<Dual64>, point: &Vector3<f64>) -> ([Vector3<f64>; 5], Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;

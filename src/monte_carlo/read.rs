@@ -118,7 +118,7 @@ fn prior(rule: &ParameterRule) -> RandomRule {
     }
 }
 
-/// Noise levels [m].
+/// Noise levels \[m\].
 fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     let Some((item, unit)) = root.quantity("position_sigma", Unit::Length)? else {
         return Err(root.missing("position_sigma_mm", "position_sigma_mm = [0.05], the noise levels"));

@@ -29,7 +29,7 @@ pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
     problem
 }
 
-/// Fits a repetition, counted from 0; also the time that the fit took [s].
+/// Fits a repetition, counted from 0; also the time that the fit took \[s\].
 pub(super) fn fit(study: &Study, problem: &Problem, cell: &Cell, repetition: usize) -> (Score, f64) {
     let Some(data) = data(study, cell, repetition) else { return (Score::Failed("no-equilibrium"), 0.0) };
     let options = Options { strategy: cell.strategy, solver: cell.solver, ..Options::default() };
@@ -73,7 +73,7 @@ fn seed_of(study: &Study, repetition: usize) -> u64 {
     random.next_u64()
 }
 
-/// Positions that the model predicts for an arm as declared [m].
+/// Positions that the model predicts for an arm as declared \[m\].
 fn by_model(mut arm: Problem, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
     let model = Model::new(&arm, &[String::new()], &[String::new()]).ok()?;
@@ -84,7 +84,7 @@ fn by_model(mut arm: Problem, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
 }
 
-/// Positions on the virtual test rig [m].
+/// Positions on the virtual test rig \[m\].
 fn by_rig(arm: Problem, truth: &Truth, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     rows.iter().map(|row| rig.position(&row.conditions).ok()).collect()

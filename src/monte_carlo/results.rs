@@ -18,11 +18,11 @@ pub struct CellResult {
     pub cell: Cell,
     /// What came of it.
     pub tally: Tally,
-    /// Time of each fit [s]; differs from run to run.
+    /// Time of each fit \[s\]; differs from run to run.
     pub seconds: Vec<f64>,
 }
 
-/// One parameter of a cell; x is a deviation [rad], [m], or ln(value / nominal).
+/// One parameter of a cell; x is a deviation \[rad\], \[m\], or ln(value / nominal).
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterResult<'a> {
     /// The parameter.
@@ -43,7 +43,7 @@ pub struct ParameterResult<'a> {
     pub coverage: Option<f64>,
 }
 
-/// How long the fits of a cell took [s].
+/// How long the fits of a cell took \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
     /// Middle fit.

@@ -42,7 +42,7 @@ pub(super) struct Kept {
     /// The inputs that it belongs to.
     key: String,
     pub tally: Tally,
-    /// Time of each fit [s]; the only thing here that differs from run to run.
+    /// Time of each fit \[s\]; the only thing here that differs from run to run.
     pub seconds: Vec<f64>,
 }
 

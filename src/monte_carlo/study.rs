@@ -50,7 +50,7 @@ pub enum Source {
 /// What is fitted, to how many poses, under how much noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// 1 σ of a measured coordinate, in the measurements and as declared to the fit [m].
+    /// 1 σ of a measured coordinate, in the measurements and as declared to the fit \[m\].
     pub sigma: f64,
     /// Poses to identify with.
     pub poses: usize,

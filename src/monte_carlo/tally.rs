@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Half the width of the interval that should cover the truth in 95 % of the fits [σ].
+/// Half the width of the interval that should cover the truth in 95 % of the fits \[σ\].
 const COVERING: f64 = 1.96;
 
 /// Number, mean and scatter of values that were given one by one.
@@ -59,7 +59,7 @@ impl Moments {
     }
 }
 
-/// One parameter over many fits: deviations x [rad], [m], or of ln(value).
+/// One parameter over many fits: deviations x \[rad\], \[m\], or of ln(value).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterTally {
     /// Estimate − truth.
@@ -77,9 +77,9 @@ pub struct Tally {
     pub fits: u64,
     /// Fits that are not to be trusted, by reason.
     pub failures: BTreeMap<String, u64>,
-    /// Mean position error of the held-out poses of each fit [m].
+    /// Mean position error of the held-out poses of each fit \[m\].
     pub held_out_mean: Moments,
-    /// Root mean squared position error of the held-out poses of each fit [m].
+    /// Root mean squared position error of the held-out poses of each fit \[m\].
     pub held_out_rms: Moments,
     /// χ² over its degrees of freedom.
     pub reduced_chi2: Moments,

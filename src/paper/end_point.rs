@@ -29,7 +29,7 @@ impl EndPoint {
         Self { elastic: Elastic::new(&chain, &loads, reading), chain, reading: *reading }
     }
 
-    /// Displacement [m] in the measuring frame of a motion D of the end frame: R [I 0] D.
+    /// Displacement \[m\] in the measuring frame of a motion D of the end frame: R [I 0] D.
     ///
     /// Printed differently: `EndFrame`. D of eq. 27 and 37 lies in the end frame, yet eq. 39 sets it equal to
     /// `PE_meas` − `PE_nom` of the measuring frame: [I 0] D.
@@ -38,7 +38,7 @@ impl EndPoint {
         if self.reading.keeps(Misprint::EndFrame) { own } else { split(&self.chain.end()).0 * own }
     }
 
-    /// `D_f` = `J_f` `d_f` as a displacement, measuring frame [m]                          [Chen2021, eq. 27, 39]
+    /// `D_f` = `J_f` `d_f` as a displacement, measuring frame \[m\]                          [Chen2021, eq. 27, 39]
     pub fn deflection(&self, parameters: &Parameters) -> Vector3<f64> {
         self.displacement(&self.elastic.motion(parameters))
     }
@@ -51,14 +51,14 @@ impl EndPoint {
         Matrix3xX::from_columns(&columns)
     }
 
-    /// `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring frame [m]        [Chen2021, eq. 39, 41]
+    /// `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring frame \[m\]        [Chen2021, eq. 39, 41]
     ///
     /// e = [e₁ … e_n] has 5n entries. Eq. 40 has `d_f` of the true parameters; eq. 41 takes it at E and S and so drops what e changes in the deflection.
     pub fn error(&self, parameters: &Parameters, e: &DVector<f64>) -> Vector3<f64> {
         self.deflection(parameters) + self.jacobian() * e
     }
 
-    /// `PE_nom` + `D_f`: where the paper expects the end point, measuring frame [m].
+    /// `PE_nom` + `D_f`: where the paper expects the end point, measuring frame \[m\].
     pub fn position(&self, parameters: &Parameters) -> Vector3<f64> {
         self.chain.position() + self.deflection(parameters)
     }

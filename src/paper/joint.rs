@@ -6,7 +6,7 @@ use super::form::{Misprint, Reading};
 use super::kinematics::Mdh;
 use super::loads::JointLoads;
 
-/// Δφ [rad] of joint `k` (counted from 0) with flexibility l/(`GI_p`) = 1/stiffness [rad/(N·m)].
+/// Δφ \[rad\] of joint `k` (counted from 0) with flexibility l/(`GI_p`) = 1/stiffness [rad/(N·m)].
 ///
 /// Δφ = `M_V` l/(`GI_p`) − `M_F` l/(`GI_p`)                                                   [Chen2021, eq. 8-10]
 ///
@@ -28,7 +28,7 @@ pub fn torsion(k: usize, loads: &JointLoads, flexibility: f64, links: &[Mdh], re
     angle
 }
 
-/// `d_Ji`: differential motion of frame i by a torsion Δφ [rad] of its joint, frame i.
+/// `d_Ji`: differential motion of frame i by a torsion Δφ \[rad\] of its joint, frame i.
 ///
 /// `d_Ji` = Δφ [0 0 0 −sβ 0 cβ]ᵀ: the motion that Δθ makes, the third column of eq. 31; for β = 0 that is
 /// `d_Ji` = [0 0 0 0 0 Δφ]ᵀ                                                                   [Chen2021, eq. 8-11]

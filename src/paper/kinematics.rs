@@ -8,15 +8,15 @@ use crate::spatial::Frame;
 /// The five parameters of a joint and the link before it, `E_i` of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mdh {
-    /// α [rad].
+    /// α \[rad\].
     pub alpha: f64,
-    /// a [m].
+    /// a \[m\].
     pub a: f64,
-    /// θ [rad].
+    /// θ \[rad\].
     pub theta: f64,
-    /// d [m].
+    /// d \[m\].
     pub d: f64,
-    /// β [rad].
+    /// β \[rad\].
     pub beta: f64,
 }
 
@@ -31,7 +31,7 @@ impl Mdh {
         [&mut self.alpha, &mut self.a, &mut self.theta, &mut self.d, &mut self.beta]
     }
 
-    /// With the configuration coordinate q [rad] or [m] added to θ or d.
+    /// With the configuration coordinate q \[rad\] or \[m\] added to θ or d.
     #[must_use]
     pub fn at(mut self, kind: JointKind, q: f64) -> Self {
         match kind {
@@ -66,7 +66,7 @@ fn shift(translation: Vector3<f64>) -> Matrix4<f64> {
     Matrix4::new_translation(&translation)
 }
 
-/// The axes of a transform, as a rotation matrix, and its origin [m].
+/// The axes of a transform, as a rotation matrix, and its origin \[m\].
 pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     (transform.fixed_view::<3, 3>(0, 0).into_owned(), transform.fixed_view::<3, 1>(0, 3).into_owned())
 }
@@ -89,7 +89,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) [rad] or [m]; missing coordinates are 0.
+    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) \[rad\] or \[m\]; missing coordinates are 0.
     pub fn new(problem: &Problem, geometry: &[Mdh], configuration: &[f64]) -> Self {
         let q = configuration.iter().copied().chain(std::iter::repeat(0.0));
         let declared = geometry.iter().zip(&problem.joints);
@@ -119,7 +119,7 @@ impl Chain {
         self.base * self.after[0]
     }
 
-    /// `PE_nom`: nominal position of the end point, measuring frame [m].
+    /// `PE_nom`: nominal position of the end point, measuring frame \[m\].
     pub fn position(&self) -> Vector3<f64> {
         split(&self.end()).1
     }

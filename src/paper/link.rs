@@ -50,7 +50,7 @@ impl LinkTerms {
     /// slope y = q_y l³ / (6EI) + [Σ P_y s² + G_y l² + 2 M l] / (2EI), slope z = [Σ M_s s + M l] / (EI)
     /// \[Chen2021, eq. 4 for a link that carries loads, eq. 6 for one that does not\]
     ///
-    /// Link frame: q [N/m], point loads P [N], `M_s` [N·m] at s [m], tip load G [N], M [N·m]. The paper's links bend in a
+    /// Link frame: q [N/m], point loads P \[N\], `M_s` [N·m] at s \[m\], tip load G \[N\], M [N·m]. The paper's links bend in a
     /// vertical plane, so that it needs no forces along z and no moments of carried masses in the vertical plane; both forms
     /// here have all terms in both planes, which are zero for its arm.
     ///
@@ -93,7 +93,7 @@ impl LinkTerms {
         }
     }
 
-    /// `D_A` or `D_B`: differential motion [Δx Δy Δz Δα Δβ Δθ] of the link's tip, [m] and [rad], link frame.
+    /// `D_A` or `D_B`: differential motion [Δx Δy Δz Δα Δβ Δθ] of the link's tip, \[m\] and \[rad\], link frame.
     ///
     /// Bending along y turns about z, bending along z about −y: Δθ = slope y, Δβ = −slope z     [Chen2021, eq. 5, 7]
     ///

@@ -9,10 +9,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::kinematics::{Chain, split};
 use crate::problem::{Beam, PoseView, Problem};
 
-/// Force [N] and moment [N·m] at a point.
+/// Force \[N\] and moment [N·m] at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
-    /// Force [N].
+    /// Force \[N\].
     pub force: Vector3<f64>,
     /// Moment about the point [N·m].
     pub moment: Vector3<f64>,
@@ -21,7 +21,7 @@ pub struct Wrench {
 /// A load between root and tip of a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLoad {
-    /// s, distance from the root along the link [m]; the paper's `r_cx` and `l_F1`.
+    /// s, distance from the root along the link \[m\]; the paper's `r_cx` and `l_F1`.
     pub station: f64,
     /// Force and moment there, link frame.
     pub wrench: Wrench,
@@ -32,7 +32,7 @@ pub struct PointLoad {
 /// Loads of an elastic link, in the frame at its root, x along it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkLoads {
-    /// l [m], negative for a link along −x.
+    /// l \[m\], negative for a link along −x.
     pub length: f64,
     /// q, own weight over l [N/m].
     pub spread: Vector3<f64>,
@@ -62,7 +62,7 @@ pub struct Loads {
     pub joints: Vec<JointLoads>,
 }
 
-/// A force [N] somewhere on the arm [m], base frame.
+/// A force \[N\] somewhere on the arm \[m\], base frame.
 struct Load {
     at: Vector3<f64>,
     force: Vector3<f64>,
@@ -111,7 +111,7 @@ impl Loads {
     }
 }
 
-/// Places in the link's frame [m] and forces in the base frame [N] of what a beam carries.
+/// Places in the link's frame \[m\] and forces in the base frame \[N\] of what a beam carries.
 fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &PoseView) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
     let masses = beam.masses.iter().map(|mass| (mass.position, gravity * mass.mass, false));
     let hoist = beam.hoist.iter();

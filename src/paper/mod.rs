@@ -1,6 +1,6 @@
 //! The paper's closed forms, equation by equation, in plain numbers: a baseline and a check.
 //!
-//! [Chen2021] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar Sampling Manipulator with
+//! \[Chen2021\] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar Sampling Manipulator with
 //! Elastic Deformation", J. Nanjing Univ. of Aeronautics & Astronautics 53(1), 2021, 1-10,
 //! doi 10.16356/j.1005-2615.2021.01.001 (Chinese).
 //!

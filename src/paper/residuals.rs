@@ -14,11 +14,11 @@ use crate::problem::{PoseView, Problem};
 pub struct Measured<'a> {
     /// What was set.
     pub setup: PoseView<'a>,
-    /// `PE_meas`, measuring frame [m].
+    /// `PE_meas`, measuring frame \[m\].
     pub position: Vector3<f64>,
 }
 
-/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` [m] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
 ///
 /// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near the minimum of ‖r‖, not
 /// in it.

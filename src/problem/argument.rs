@@ -17,7 +17,7 @@ pub enum Argument {
     Orders(Vec<u32>),
     /// Name of a beam, or the place of a custom effect.
     Name(String),
-    /// A time [s].
+    /// A time \[s\].
     Time(f64),
 }
 
@@ -141,7 +141,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         if orders.is_empty() { Err(item.error(InputErrorKind::NoOrders)) } else { Ok(orders) }
     }
 
-    /// A time [s]; its key ends in the unit.
+    /// A time \[s\]; its key ends in the unit.
     pub fn time(&mut self, key: &str) -> Result<f64, InputError> {
         let base = key.strip_suffix("_s").unwrap_or(key);
         self.section.number(base, Unit::Time)?.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))

@@ -5,17 +5,17 @@
 /// V holds one number per joint: a `Vec<f64>` where poses are made, a `&[f64]` where they are read ([`PoseView`]).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseConditions<V = Vec<f64>> {
-    /// Configuration q, shape = (joints) [rad] or [m]; fixed joints ignore theirs.
+    /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
     pub configuration: V,
-    /// Payload [kg]; `None`: as the problem declares.
+    /// Payload \[kg\]; `None`: as the problem declares.
     pub payload: Option<f64>,
-    /// Hoist force [N]; `None`: as the problem declares.
+    /// Hoist force \[N\]; `None`: as the problem declares.
     pub hoist: Option<f64>,
     /// Temperature [°C]; `None`: the reference.
     pub temperature: Option<f64>,
-    /// Time [s].
+    /// Time \[s\].
     pub time: f64,
-    /// Time since the first pose [s].
+    /// Time since the first pose \[s\].
     pub elapsed: f64,
     /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
     pub approach: Option<V>,
@@ -25,7 +25,7 @@ pub struct PoseConditions<V = Vec<f64>> {
 pub type PoseView<'a> = PoseConditions<&'a [f64]>;
 
 impl<'a> PoseView<'a> {
-    /// A configuration, shape = (joints) [rad] or [m], of which nothing else is known.
+    /// A configuration, shape = (joints) \[rad\] or \[m\], of which nothing else is known.
     pub fn of(configuration: &'a [f64]) -> Self {
         Self { configuration, ..Self::default() }
     }
@@ -49,11 +49,11 @@ impl PoseConditions {
 /// From where poses are drawn: ranges evenly, each quantity by itself.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PoseRanges {
-    /// Range of each joint, shape = (joints) [rad] or [m]; not used at fixed joints.
+    /// Range of each joint, shape = (joints) \[rad\] or \[m\]; not used at fixed joints.
     pub joints: Vec<(f64, f64)>,
-    /// Payloads to choose from [kg]; empty: as the problem declares.
+    /// Payloads to choose from \[kg\]; empty: as the problem declares.
     pub payloads: Vec<f64>,
-    /// Range of the hoist's force [N]; `None`: as the problem declares.
+    /// Range of the hoist's force \[N\]; `None`: as the problem declares.
     pub hoist: Option<(f64, f64)>,
     /// Range of the temperature [°C]; `None`: not known.
     pub temperature: Option<(f64, f64)>,

@@ -32,7 +32,7 @@ pub struct ConstraintTerm {
 /// A limit of a constraint.
 #[derive(Debug, Clone)]
 pub struct Limit {
-    /// Value [rad], [m] or of the logarithm.
+    /// Value \[rad\], \[m\] or of the logarithm.
     pub value: f64,
     /// What it limits.
     pub kind: LimitKind,
@@ -43,9 +43,9 @@ pub struct Limit {
 /// What a constraint adds up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimitKind {
-    /// Angles [rad].
+    /// Angles \[rad\].
     Angle,
-    /// Lengths [m].
+    /// Lengths \[m\].
     Length,
     /// Logarithms of stiffnesses and rigidities in SI units.
     Logarithm,

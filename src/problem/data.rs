@@ -11,7 +11,7 @@ use crate::quantity::Unit;
 pub struct Data {
     /// Measurement files, already resolved against the problem's folder.
     pub files: Vec<PathBuf>,
-    /// 1 σ of a measured coordinate [m]; `None`: not known.
+    /// 1 σ of a measured coordinate \[m\]; `None`: not known.
     pub position_sigma: Option<f64>,
     /// Which rows never take part in fitting or choosing; `None` where the file says nothing.
     pub held_out: Option<HeldOut>,

@@ -7,9 +7,9 @@ use crate::error::Location;
 /// What a joint's configuration coordinate does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
-    /// q adds to θ [rad].
+    /// q adds to θ \[rad\].
     Revolute,
-    /// q adds to d [m].
+    /// q adds to d \[m\].
     Prismatic,
     /// A constant transform that takes no q.
     Fixed,
@@ -22,17 +22,17 @@ pub struct Joint {
     pub name: String,
     /// What q does.
     pub kind: JointKind,
-    /// α [rad].
+    /// α \[rad\].
     pub alpha: f64,
-    /// a [m].
+    /// a \[m\].
     pub a: f64,
-    /// θ [rad].
+    /// θ \[rad\].
     pub theta: f64,
-    /// d [m].
+    /// d \[m\].
     pub d: f64,
-    /// β [rad].
+    /// β \[rad\].
     pub beta: f64,
-    /// Range of q [rad] or [m], infinite where none is given; commands keep to it.
+    /// Range of q \[rad\] or \[m\], infinite where none is given; commands keep to it.
     pub limits: (f64, f64),
     /// Torsional stiffness about `z_i` [N·m/rad]; `None`: rigid.
     pub stiffness: Option<f64>,
@@ -49,9 +49,9 @@ pub struct Joint {
 pub struct Beam {
     /// Name; its parameters are `<name>.EA` and so on.
     pub name: String,
-    /// Mass spread evenly over the length [kg].
+    /// Mass spread evenly over the length \[kg\].
     pub mass: f64,
-    /// Axial rigidity EA [N]; `None`: does not stretch.
+    /// Axial rigidity EA \[N\]; `None`: does not stretch.
     pub ea: Option<f64>,
     /// Flexural rigidity about y, `EI_y` [N·m²]: bends in the x-z plane; `None`: rigid there.
     pub ei_y: Option<f64>,
@@ -70,18 +70,18 @@ pub struct Beam {
 pub struct Body {
     /// Name for people.
     pub name: String,
-    /// Mass [kg], not negative.
+    /// Mass \[kg\], not negative.
     pub mass: f64,
-    /// Centre of mass in the carrier's frame [m].
+    /// Centre of mass in the carrier's frame \[m\].
     pub position: Vector3<f64>,
 }
 
 /// `[joint.beam.hoist]`: a suspension force on a beam.
 #[derive(Debug, Clone)]
 pub struct Hoist {
-    /// Hook in the beam's frame [m].
+    /// Hook in the beam's frame \[m\].
     pub at: Vector3<f64>,
-    /// Force [N]; a column `hoist_N` overrides it pose by pose.
+    /// Force \[N\]; a column `hoist_N` overrides it pose by pose.
     pub force: f64,
     /// Unit direction in the arm's base frame.
     pub direction: Vector3<f64>,

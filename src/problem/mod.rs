@@ -80,19 +80,19 @@ pub enum Equilibrium {
 /// `[tool]`.
 #[derive(Debug, Clone)]
 pub struct Tool {
-    /// The measured point in the last frame [m].
+    /// The measured point in the last frame \[m\].
     pub target: Vector3<f64>,
-    /// Where a payload hangs, in the last frame [m].
+    /// Where a payload hangs, in the last frame \[m\].
     pub payload_at: Vector3<f64>,
-    /// Payload where no column `payload_kg` says otherwise [kg].
+    /// Payload where no column `payload_kg` says otherwise \[kg\].
     pub payload_mass: f64,
 }
 
 /// `[base]`: pose of the arm's base in the measuring frame.
 #[derive(Debug, Clone)]
 pub struct BasePose {
-    /// Origin [m].
+    /// Origin \[m\].
     pub translation: Vector3<f64>,
-    /// Rotation vector [rad].
+    /// Rotation vector \[rad\].
     pub rotation: Vector3<f64>,
 }

@@ -35,9 +35,9 @@ pub enum Freedom {
 /// The same thing said for each kind of parameter that a pattern may match.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Quantities {
-    /// Angles [rad].
+    /// Angles \[rad\].
     pub angle: Option<f64>,
-    /// Lengths [m].
+    /// Lengths \[m\].
     pub length: Option<f64>,
     /// Relative to nominal; a σ is that of ln(value / nominal).
     pub relative: Option<f64>,
@@ -95,7 +95,7 @@ fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputE
     section.get(key).map(|item| item.boolean()).transpose()
 }
 
-/// A σ or bound [SI] and its place.
+/// A σ or bound \[SI\] and its place.
 type Value<'a, 'i> = (f64, Item<'a, 'i>);
 
 /// A σ or bound for each of [`KINDS`].

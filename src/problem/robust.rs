@@ -8,7 +8,7 @@ use crate::error::{InputError, InputErrorKind};
 pub struct Robust {
     /// What residuals count.
     pub loss: RobustLoss,
-    /// `threshold_sigma`: the length of a residual from which it counts less than its square [σ]; `None`: the usual one.
+    /// `threshold_sigma`: the length of a residual from which it counts less than its square \[σ\]; `None`: the usual one.
     pub threshold: Option<f64>,
 }
 

@@ -138,20 +138,20 @@ impl<'a, 'i> Section<'a, 'i> {
         self.pick(base, unit)
     }
 
-    /// A number with a unit [SI].
+    /// A number with a unit \[SI\].
     pub fn number(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         Ok(Some((suffix.to_si)(item.number()?)))
     }
 
-    /// A number with a unit that is not negative [SI].
+    /// A number with a unit that is not negative \[SI\].
     pub fn not_negative(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
         if value < 0.0 { Err(item.error(InputErrorKind::Negative { value })) } else { Ok(Some((suffix.to_si)(value))) }
     }
 
-    /// A number with a unit that is above zero [SI]; `zero` makes the error where it is not.
+    /// A number with a unit that is above zero \[SI\]; `zero` makes the error where it is not.
     pub fn positive(
         &mut self,
         base: &str,
@@ -165,13 +165,13 @@ impl<'a, 'i> Section<'a, 'i> {
         if converted > 0.0 { Ok(Some(converted)) } else { Err(item.error(zero(value))) }
     }
 
-    /// Three numbers with a unit [SI].
+    /// Three numbers with a unit \[SI\].
     pub fn vector(&mut self, base: &str, unit: Unit) -> Result<Option<Vector3<f64>>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         Ok(Some(item.vector()?.map(suffix.to_si)))
     }
 
-    /// Three numbers with a unit that have to be there [SI].
+    /// Three numbers with a unit that have to be there \[SI\].
     pub fn require_vector(&mut self, base: &str, unit: Unit) -> Result<Vector3<f64>, InputError> {
         self.vector(base, unit)?.ok_or_else(|| self.missing(base, unit.spelled(base)))
     }

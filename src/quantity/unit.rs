@@ -6,23 +6,23 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unit {
-    /// [rad]
+    /// \[rad\]
     Angle,
-    /// [m]
+    /// \[m\]
     Length,
-    /// [kg]
+    /// \[kg\]
     Mass,
-    /// [N]
+    /// \[N\]
     Force,
     /// [m/s²]
     Acceleration,
     /// [°C]
     Temperature,
-    /// [s]
+    /// \[s\]
     Time,
     /// [N·m/rad]
     TorsionalStiffness,
-    /// EA [N]
+    /// EA \[N\]
     AxialRigidity,
     /// EI or GJ [N·m²]
     FlexuralRigidity,
@@ -166,7 +166,7 @@ impl Unit {
         matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
     }
 
-    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` [SI].
+    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` \[SI\].
     pub fn display(self, magnitude: f64) -> Display {
         let Row { symbol, shown, .. } = self.row();
         match shown {

@@ -36,7 +36,7 @@ object! {
         held_out_gain_mm: IntervalEntry = IntervalEntry::of(&closure.gain),
         effects: Vec<FoundEntry<'a>> = closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
         unexplained: Option<UnexplainedEntry> = closure.unexplained.as_ref().map(UnexplainedEntry::of),
-        /// 1 σ of the prior that waves of joints were given [rad].
+        /// 1 σ of the prior that waves of joints were given \[rad\].
         wave_prior_rad: Option<f64> = closure.harmonic_sigma,
         steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
         checks_before: Vec<findings::Entry> = findings::entries(&closure.before.findings),

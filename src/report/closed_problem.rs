@@ -32,7 +32,7 @@ pub fn closed_problem(
     }
 }
 
-/// The text with a prior of σ [rad] for all waves of joints at the end of `[parameters]`.
+/// The text with a prior of σ \[rad\] for all waves of joints at the end of `[parameters]`.
 fn with_rule(text: &str, sigma: f64) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));

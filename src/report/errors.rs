@@ -6,7 +6,7 @@ use crate::identify::{ErrorSummary, Errors};
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
 
-/// Cells of a table of errors: whose, on which poses, mean, rms and largest distance [mm].
+/// Cells of a table of errors: whose, on which poses, mean, rms and largest distance \[mm\].
 pub(super) fn row(poses: &str, arm: &str, of: &ErrorSummary) -> Vec<String> {
     let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| mm(value, 4));
     [vec![poses.to_owned(), arm.to_owned()], values.to_vec()].concat()

@@ -20,7 +20,7 @@ object! {
     }
 }
 
-/// Nominal value and some errors [SI] of a parameter in a unit for display: cells, and the unit.
+/// Nominal value and some errors \[SI\] of a parameter in a unit for display: cells, and the unit.
 pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
     let digits = errors.iter().flatten().map(|error| decimals(error * unit.factor, MOST)).min().unwrap_or(4).min(4);
@@ -29,7 +29,7 @@ pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>
     (cells, unit.symbol)
 }
 
-/// A size [SI] with two digits that count.
+/// A size \[SI\] with two digits that count.
 pub(super) fn size(value: Option<f64>, unit: &Display) -> String {
     or_dash(value.map(|value| value * unit.factor), |value| number(value, decimals(value, MOST)))
 }

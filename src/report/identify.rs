@@ -310,7 +310,7 @@ fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> 
     (n > 0).then_some(Block::Lines(words, points))
 }
 
-/// A length [m] in mm with about three digits.
+/// A length \[m\] in mm with about three digits.
 pub(super) fn short_mm(length: f64) -> String {
     mm(length, (decimals(length * 1e3, 4) + 1).min(4))
 }

@@ -27,7 +27,7 @@ macro_rules! object {
 pub(super) use object;
 
 object! {
-    /// Of each axis and of the length [mm].
+    /// Of each axis and of the length \[mm\].
     Axes(values: &AxisValues) {
         x: f64 = values.x * 1e3,
         y: f64 = values.y * 1e3,

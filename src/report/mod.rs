@@ -1,6 +1,6 @@
 //! Results as people and programs read them.
 //!
-//! One file a command: its facts as JSON and as blocks ([`document`]), which `render` shows on terminals, as Markdown and
+//! One file a command: its facts as JSON and as blocks (`document`), which `render` shows on terminals, as Markdown and
 //! as a page. `figures` draws what only a page shows.
 
 mod check;

@@ -34,7 +34,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A length [m] in mm with `decimals`.
+/// A length \[m\] in mm with `decimals`.
 pub(super) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)
 }

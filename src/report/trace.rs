@@ -65,7 +65,7 @@ object! {
 object! {
     ApartEntry<'a>(apart: &'a TellingPose) {
         from: &'a Effect = &apart.other,
-        /// Configuration [rad] or [m].
+        /// Configuration \[rad\] or \[m\].
         q: &'a [f64] = &apart.configuration,
         payload_kg: Option<f64> = apart.payload,
         #[serde(rename = "hoist_N")]

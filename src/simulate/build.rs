@@ -95,7 +95,7 @@ impl Rig {
         (before, about)
     }
 
-    /// Payload [kg].
+    /// Payload \[kg\].
     fn payload(&self, conditions: &PoseConditions) -> f64 {
         let declared = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
         let more = |payload: f64, part: Part<'_>| match part {

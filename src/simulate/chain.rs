@@ -11,13 +11,13 @@ pub(super) struct Hinge {
     pub compliance: Vector3<f64>,
     /// Angle about z per cube of the moment [rad/(N·m)³].
     pub cubic: f64,
-    /// Play about z that the moment takes up: b [rad].
+    /// Play about z that the moment takes up: b \[rad\].
     pub play: f64,
     /// Elongation along x per force [m/N].
     pub stretch: f64,
-    /// Rotation vector without load [rad].
+    /// Rotation vector without load \[rad\].
     pub free_rotation: Vector3<f64>,
-    /// Displacement along x without load [m].
+    /// Displacement along x without load \[m\].
     pub free_stretch: f64,
 }
 
@@ -29,7 +29,7 @@ impl Hinge {
         *self == Self::default()
     }
 
-    /// What the hinge does under a force [N] and a moment [N·m] in its own axes.
+    /// What the hinge does under a force \[N\] and a moment [N·m] in its own axes.
     pub fn give(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
         let mut rotation = self.free_rotation + self.compliance.component_mul(moment);
         rotation.z += self.cubic * moment.z.powi(3) + 0.5 * self.play * (moment.z / PLAY_MOMENT).tanh();
@@ -40,9 +40,9 @@ impl Hinge {
 /// How far a hinge has moved.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {
-    /// Rotation vector [rad].
+    /// Rotation vector \[rad\].
     pub rotation: Vector3<f64>,
-    /// Displacement along x [m].
+    /// Displacement along x \[m\].
     pub stretch: f64,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct Piece {
 pub(super) struct Load {
     /// Index of the piece.
     pub piece: usize,
-    /// Where it acts, seen from the piece's hinge [m].
+    /// Where it acts, seen from the piece's hinge \[m\].
     pub at: Vector3<f64>,
     pub force: Force,
 }
@@ -67,11 +67,11 @@ pub(super) struct Load {
 /// What pulls.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Force {
-    /// The same wherever the piece is, base frame [N].
+    /// The same wherever the piece is, base frame \[N\].
     Constant(Vector3<f64>),
     /// A rope whose direction may depend on where its hook is.
     Rope {
-        /// Tension [N].
+        /// Tension \[N\].
         tension: f64,
         /// Direction with the hook at the origin, base frame.
         direction: Vector3<f64>,
@@ -81,7 +81,7 @@ pub(super) enum Force {
 }
 
 impl Force {
-    /// The force [N] at a point [m], base frame.
+    /// The force \[N\] at a point \[m\], base frame.
     pub fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         match *self {
             Self::Constant(force) => force,
@@ -119,7 +119,7 @@ impl Chain {
         }
     }
 
-    /// Hangs a load at a point [m] seen from where the chain ends so far.
+    /// Hangs a load at a point \[m\] seen from where the chain ends so far.
     pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
         let at = self.end().point(point);
         self.loads.push(Load { piece: self.pieces.len() - 1, at, force });

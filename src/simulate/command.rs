@@ -5,7 +5,7 @@ use super::effect::{Cause, Shape, TrueEffect};
 use crate::problem::{Effect, PoseConditions};
 
 impl Rig {
-    /// By how much the coordinate of the joint with this number misses its command, without any load [rad] or [m].
+    /// By how much the coordinate of the joint with this number misses its command, without any load \[rad\] or \[m\].
     ///
     /// Errors of a prismatic joint add to its d.
     pub(super) fn miss(&self, number: usize, conditions: &PoseConditions) -> f64 {

@@ -25,7 +25,7 @@ const SPLIT: u64 = 3;
 pub struct Row {
     /// What was set.
     pub conditions: PoseConditions,
-    /// What the tracker read, measuring frame [m].
+    /// What the tracker read, measuring frame \[m\].
     pub position: Vector3<f64>,
     /// Whether the row is held out.
     pub held_out: bool,
@@ -72,7 +72,7 @@ pub struct Draw {
     pub arm: Problem,
     /// Every parameter with its true value.
     pub parameters: Vec<TrueParameter>,
-    /// The poses in order of time, no row held out; `position` is the noise alone [m].
+    /// The poses in order of time, no row held out; `position` is the noise alone \[m\].
     pub rows: Vec<Row>,
 }
 

@@ -7,7 +7,7 @@ use super::build::softness;
 use super::chain::{Chain, Force, Hinge};
 use crate::problem::{Beam, Effect, Joint, PoseConditions};
 
-/// A load on a link, at a point of the straight link's frame [m].
+/// A load on a link, at a point of the straight link's frame \[m\].
 type LinkLoad = (Vector3<f64>, Force);
 /// Part of a segment before its first hinge and behind its second: they sit at the points of Gauss and Legendre, so that
 /// bending moments that change with up to the cube of the station are summed exactly.
@@ -44,7 +44,7 @@ impl Rig {
         self.span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
     }
 
-    /// A part of a link, `reach` [m] long: its share of the link's segments.
+    /// A part of a link, `reach` \[m\] long: its share of the link's segments.
     fn span(
         &self,
         weight: &Vector3<f64>,
@@ -73,7 +73,7 @@ impl Rig {
         }
     }
 
-    /// The hinge that stands for `length` [m] of a link, which is negative along −x.
+    /// The hinge that stands for `length` \[m\] of a link, which is negative along −x.
     fn hinge(&self, beam: Option<&Beam>, number: usize, length: f64, conditions: &PoseConditions) -> Hinge {
         let mut hinge = Hinge::default();
         let between = length.abs();
@@ -100,7 +100,7 @@ impl Rig {
         hinge
     }
 
-    /// What a beam of signed length `a` [m] carries besides its own weight.
+    /// What a beam of signed length `a` \[m\] carries besides its own weight.
     fn link_loads(&self, beam: &Beam, a: f64, gravity: &Vector3<f64>, conditions: &PoseConditions) -> Vec<LinkLoad> {
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut loads: Vec<LinkLoad> =

@@ -62,7 +62,7 @@ impl Rig {
         self
     }
 
-    /// What the tracker reads for the target in static equilibrium, without noise, measuring frame [m].
+    /// What the tracker reads for the target in static equilibrium, without noise, measuring frame \[m\].
     ///
     /// # Errors
     /// The arm is too soft for its loads.
@@ -73,7 +73,7 @@ impl Rig {
         if seen.iter().all(|x| x.is_finite()) { Ok(self.track(seen, conditions)) } else { Err(NoRest) }
     }
 
-    /// What the tracker makes of a position [m].
+    /// What the tracker makes of a position \[m\].
     fn track(&self, seen: Vector3<f64>, conditions: &PoseConditions) -> Vector3<f64> {
         let mut scale = 1.0;
         let mut moved = Vector3::zeros();

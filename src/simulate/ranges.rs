@@ -12,7 +12,7 @@ const HELD_OUT: f64 = 0.3;
 /// Seconds between poses where the file says nothing.
 const TIME_STEP: f64 = 60.0;
 
-/// Ranges, the time from one pose to the next [s], and which rows are held out.
+/// Ranges, the time from one pose to the next \[s\], and which rows are held out.
 pub(super) fn read(
     mut section: Section<'_, '_>,
     joints: &[Joint],
@@ -43,7 +43,7 @@ fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) ->
     range(section, &base, unit)?.ok_or_else(|| missing(section))
 }
 
-/// `base_unit = [from, to]` [SI].
+/// `base_unit = [from, to]` \[SI\].
 fn range(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<(f64, f64)>, InputError> {
     let Some((item, suffix)) = section.quantity(base, unit)? else { return Ok(None) };
     let (from, to) = pair(&item)?;

@@ -13,11 +13,11 @@ pub struct Truth {
     pub random: Vec<RandomRule>,
     /// `[[effect]]`: what is at work besides.
     pub effects: Vec<TrueEffect>,
-    /// 1 σ of a measured coordinate [m].
+    /// 1 σ of a measured coordinate \[m\].
     pub noise_sigma: f64,
     /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
     pub poses: PoseRanges,
-    /// `[poses]`: range of the time from one pose to the next [s].
+    /// `[poses]`: range of the time from one pose to the next \[s\].
     pub time_step: (f64, f64),
     /// `[poses]`: which rows are held out.
     pub held_out: HeldOutRows,
@@ -30,7 +30,7 @@ pub struct Truth {
 pub struct Deviation {
     /// Name as in the problem file: `joint2.alpha`.
     pub name: String,
-    /// Added to the nominal value [rad] or [m]; multiple of the nominal for a stiffness or rigidity.
+    /// Added to the nominal value \[rad\] or \[m\]; multiple of the nominal for a stiffness or rigidity.
     pub value: f64,
 }
 
@@ -39,9 +39,9 @@ pub struct Deviation {
 pub struct RandomRule {
     /// Name with `*` for any run of characters.
     pub pattern: String,
-    /// 1 σ of angles [rad].
+    /// 1 σ of angles \[rad\].
     pub angle: Option<f64>,
-    /// 1 σ of lengths [m].
+    /// 1 σ of lengths \[m\].
     pub length: Option<f64>,
     /// 1 σ of ln(value / nominal) of stiffnesses and rigidities.
     pub relative: Option<f64>,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::rotation_axes;
 use crate::scalar::Scalar;
 
-/// A frame seen from another: its axes and its origin [m].
+/// A frame seen from another: its axes and its origin \[m\].
 ///
 /// Moving a frame multiplies its transform from the right, so motions are given in its own axes. Rotations about an
 /// axis turn two columns; no 4 × 4 product is ever formed.
@@ -13,7 +13,7 @@ use crate::scalar::Scalar;
 pub struct Frame<S> {
     /// Unit axes x, y, z.
     pub axes: [Vector3<S>; 3],
-    /// Origin [m].
+    /// Origin \[m\].
     pub origin: Vector3<S>,
 }
 
@@ -33,7 +33,7 @@ impl<S: Scalar> Frame<S> {
         }
     }
 
-    /// The frame at `origin` [m] turned by the rotation vector `w` [rad].
+    /// The frame at `origin` \[m\] turned by the rotation vector `w` \[rad\].
     pub fn from_rotation_vector(origin: Vector3<S>, w: &Vector3<S>) -> Self {
         Self { axes: rotation_axes(w), origin }
     }
@@ -62,29 +62,29 @@ impl<S: Scalar> Frame<S> {
         self.axes[second] = v * cos - u * sin;
     }
 
-    /// Turns by the rotation vector `w` [rad], own axes.
+    /// Turns by the rotation vector `w` \[rad\], own axes.
     pub fn rotate(&mut self, w: &Vector3<S>) {
         self.axes = rotation_axes(w).map(|axis| self.vector(&axis));
     }
 
-    /// Moves along the own x axis by `distance` [m].
+    /// Moves along the own x axis by `distance` \[m\].
     #[inline]
     pub fn translate_x(&mut self, distance: S) {
         self.origin += self.axes[0] * distance;
     }
 
-    /// Moves along the own z axis by `distance` [m].
+    /// Moves along the own z axis by `distance` \[m\].
     #[inline]
     pub fn translate_z(&mut self, distance: S) {
         self.origin += self.axes[2] * distance;
     }
 
-    /// Moves by `displacement` [m], own axes.
+    /// Moves by `displacement` \[m\], own axes.
     pub fn translate(&mut self, displacement: &Vector3<S>) {
         self.origin = self.point(displacement);
     }
 
-    /// Reference coordinates of a point [m] given in this frame.
+    /// Reference coordinates of a point \[m\] given in this frame.
     #[inline]
     pub fn point(&self, point: &Vector3<S>) -> Vector3<S> {
         self.origin + self.vector(point)

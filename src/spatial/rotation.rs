@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 
 use crate::scalar::Scalar;
 
-/// Below this squared angle [rad²] the exponential uses its power series, exact to rounding there.
+/// Below this squared angle \[rad²\] the exponential uses its power series, exact to rounding there.
 const SERIES_BELOW: f64 = 0.01;
 
-/// Rotates `vector` by the rotation vector `w` [rad]: exp(`[w]×`) v.
+/// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
 ///
 /// exp(`[w]×`) v = v + A w×v + B w×(w×v), A = sin φ / φ, B = (1 − cos φ) / φ², φ = ‖w‖  (Rodrigues).
 /// Smooth at w = 0, with its derivative.
@@ -18,7 +18,7 @@ pub fn rotate<S: Scalar>(w: &Vector3<S>, vector: &Vector3<S>) -> Vector3<S> {
     vector + first * a + second * b
 }
 
-/// The columns of the rotation matrix exp(`[w]×`) of a rotation vector `w` [rad].
+/// The columns of the rotation matrix exp(`[w]×`) of a rotation vector `w` \[rad\].
 ///
 /// R = cos φ I + A `[w]×` + B w wᵀ with A and B as in [`rotate`], cos φ = 1 − B φ².
 pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
@@ -62,7 +62,7 @@ fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
     (cos * u - sin * v, sin * u + cos * v)
 }
 
-/// (sin φ / φ, (1 − cos φ) / φ²) from φ² [rad²].
+/// (sin φ / φ, (1 − cos φ) / φ²) from φ² \[rad²\].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < SERIES_BELOW {
         let horner = |c: [f64; 5]| {

@@ -244,7 +244,7 @@ impl LinearNeighbourhood {
         Score { gram, product, lengths: columns.column_iter().map(|column| column.norm_squared()).collect() }
     }
 
-    /// Largest principal angle [rad] between what two sets of columns add to the fit; `None` where one of them adds nothing.
+    /// Largest principal angle \[rad\] between what two sets of columns add to the fit; `None` where one of them adds nothing.
     pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
         let (a, b) = (self.clone().add(one), self.clone().add(other));
         if a.is_empty() || b.is_empty() {

@@ -141,7 +141,7 @@ impl<'a, 'l> Scan<'a, 'l> {
         self.linearised.columns(&self.effects[index])
     }
 
-    /// Largest principal angle [rad] between what two candidates add to the fit; none where one of them adds nothing.
+    /// Largest principal angle \[rad\] between what two candidates add to the fit; none where one of them adds nothing.
     pub fn angle(&self, one: usize, other: usize) -> Option<f64> {
         self.linear.angle(&self.columns(one), &self.columns(other))
     }

@@ -60,11 +60,11 @@ pub struct ClosedLoop {
     pub effects: Vec<Found>,
     /// What each round came to.
     pub rounds: Vec<Round>,
-    /// 1 σ of the prior that the closed problem has for the harmonics of joints, where they are many [rad].
+    /// 1 σ of the prior that the closed problem has for the harmonics of joints, where they are many \[rad\].
     pub harmonic_sigma: Option<f64>,
     /// Structure that no effect explains.
     pub unexplained: Option<Unexplained>,
-    /// Mean reduction of the error on held-out poses [m].
+    /// Mean reduction of the error on held-out poses \[m\].
     pub gain: Interval,
 }
 

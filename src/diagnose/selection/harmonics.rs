@@ -22,7 +22,7 @@ use crate::quantity::Unit;
 /// Pattern of the rule that gives all harmonics of joints one prior.
 pub const HARMONICS: &str = "joint-harmonic.*";
 
-/// The fit with every order of the joints whose harmonics are many, and 1 σ of their prior [rad]; the fit, settled, where
+/// The fit with every order of the joints whose harmonics are many, and 1 σ of their prior \[rad\]; the fit, settled, where
 /// they are few or no common prior can hold them. And whether the fit is another than it was.
 pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>, bool), IdentifyError> {
     let rules = rounds.data.rules;
@@ -101,7 +101,7 @@ fn with_scale(mut problem: Problem, sigma: f64) -> Problem {
     problem
 }
 
-/// The scale [rad] of the prior on harmonics with which parts of the joints' ranges that are left out are predicted best,
+/// The scale \[rad\] of the prior on harmonics with which parts of the joints' ranges that are left out are predicted best,
 /// in the linear neighbourhood of the fit.
 fn best_scale(fitted: &Fitted, data: &Data, smooth_terms: &[SmoothTerm], found: f64) -> f64 {
     let own = coefficients(fitted);

@@ -19,7 +19,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Mean reduction of the distance to what was measured on held-out poses [m]; bootstrap over configurations [Efron 1979].
+/// Mean reduction of the distance to what was measured on held-out poses \[m\]; bootstrap over configurations [Efron 1979].
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
     let (rows, draws) = (&data.split.held_out, data.rules.resamples);
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();

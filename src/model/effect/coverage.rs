@@ -15,9 +15,9 @@ pub struct DataCoverage {
     pub both_sides: Vec<bool>,
     /// Whether a payload is carried in some poses.
     pub payload: bool,
-    /// For each joint, the range of its commands [rad] or [m].
+    /// For each joint, the range of its commands \[rad\] or \[m\].
     pub ranges: Vec<(f64, f64)>,
-    /// Times between which a station may have moved [s], ascending.
+    /// Times between which a station may have moved \[s\], ascending.
     pub times: Vec<f64>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,

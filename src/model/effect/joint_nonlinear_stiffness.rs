@@ -6,7 +6,7 @@ use super::place::greatest_moment;
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
-/// More than any joint turns under the greatest conceivable moment [rad].
+/// More than any joint turns under the greatest conceivable moment \[rad\].
 const MOST: f64 = 0.1;
 /// Moment below which arms are not told apart [N·m].
 const LEAST_MOMENT: f64 = 10.0;

@@ -16,7 +16,7 @@ impl Slot {
 }
 
 impl Driver {
-    /// What a joint is told: q [rad] or [m]. The joint is numbered from 1, as in files.
+    /// What a joint is told: q \[rad\] or \[m\]. The joint is numbered from 1, as in files.
     pub fn command(problem: &Problem, joint: usize) -> Self {
         let index = joint.wrapping_sub(1);
         if slides(problem, joint) { Self::Travel(index) } else { Self::Command(index) }

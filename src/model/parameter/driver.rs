@@ -11,22 +11,22 @@ pub enum Driver {
     Constant,
     /// 1, for what is added to a parameter that acts at the same place.
     Unit,
-    /// q of a joint that turns [rad].
+    /// q of a joint that turns \[rad\].
     Command(usize),
-    /// q of a joint that slides [m].
+    /// q of a joint that slides \[m\].
     Travel(usize),
     /// sin kq.
     Sine(usize, u32),
     /// cos kq.
     Cosine(usize, u32),
-    /// Temperature above the reference [K].
+    /// Temperature above the reference \[K\].
     Warming {
         /// T₀ [°C].
         reference: f64,
     },
-    /// Time since the first pose [s].
+    /// Time since the first pose \[s\].
     Elapsed,
-    /// 1 from a time on [s], 0 before.
+    /// 1 from a time on \[s\], 0 before.
     Since(f64),
     /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
     Spline {
@@ -60,15 +60,15 @@ pub enum Driver {
 /// A quantity that is known of every pose; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quantity {
-    /// q of a joint [rad] or [m], joints counted from 0.
+    /// q of a joint \[rad\] or \[m\], joints counted from 0.
     Command(usize),
     /// Temperature [°C].
     Temperature,
-    /// Time since the first pose [s].
+    /// Time since the first pose \[s\].
     Elapsed,
-    /// Payload [kg].
+    /// Payload \[kg\].
     Payload,
-    /// Hoist force [N].
+    /// Hoist force \[N\].
     Hoist,
 }
 

@@ -1,6 +1,6 @@
 //! Free parameters: names, units, priors and bounds, resolved from the problem's rules.
 //!
-//! An unknown x is a deviation from nominal: additive for angles [rad] and lengths [m], ln(value / nominal) for
+//! An unknown x is a deviation from nominal: additive for angles \[rad\] and lengths \[m\], ln(value / nominal) for
 //! stiffnesses and rigidities, so that x = 0 is nominal everywhere and a stiffness never turns negative.
 
 mod constraint;

@@ -58,9 +58,9 @@ pub enum JointField {
     Compliance,
     /// Angle per cube of the moment [rad/(N·m)³].
     Cubic,
-    /// Play: half of it each way, as the direction of approach says, or the moment where that is not known [rad].
+    /// Play: half of it each way, as the direction of approach says, or the moment where that is not known \[rad\].
     Play,
-    /// Play of a joint that slides, which only a direction of approach takes up [m].
+    /// Play of a joint that slides, which only a direction of approach takes up \[m\].
     SlidingPlay,
     /// Flexibility about x before the joint turns [rad/(N·m)].
     LateralX,
@@ -91,16 +91,16 @@ pub enum BeamField {
     WarmingZ,
     /// Strain per degree [1/K].
     Expansion,
-    /// A mass on the beam's axis [kg].
+    /// A mass on the beam's axis \[kg\].
     AddedMass,
-    /// Where that mass is, from the root [m].
+    /// Where that mass is, from the root \[m\].
     AddedAt,
 }
 
 /// What acts on the arm as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ArmField {
-    /// Added to every payload that is carried [kg].
+    /// Added to every payload that is carried \[kg\].
     Payload,
     /// Relative error of the hoist's force.
     HoistForce,
@@ -114,9 +114,9 @@ pub enum ArmField {
     MountingX,
     /// Flexibility of the base about y [rad/(N·m)].
     MountingY,
-    /// Gravity turned about x [rad].
+    /// Gravity turned about x \[rad\].
     GravityX,
-    /// Gravity turned about y [rad].
+    /// Gravity turned about y \[rad\].
     GravityY,
     /// λ between loads on the rigid arm, 0, and on the bent arm, 1.
     Mixing,

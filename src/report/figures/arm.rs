@@ -44,12 +44,12 @@ impl<'a> Poses<'a> {
         (0..self.measurements.len()).collect()
     }
 
-    /// All of them, σ [m] where a row has none of its own.
+    /// All of them, σ \[m\] where a row has none of its own.
     pub fn all(&self, sigma: f64) -> Vec<Pose<'_>> {
         self.placement.poses(self.measurements, &self.rows(), sigma)
     }
 
-    /// Errors measured − predicted of some rows, measuring frame [m].
+    /// Errors measured − predicted of some rows, measuring frame \[m\].
     pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }

@@ -81,7 +81,7 @@ impl Quantity {
         Self::new("temperature [°C]", 1.0)
     }
 
-    /// Up to `most` [s].
+    /// Up to `most` \[s\].
     fn elapsed(most: f64) -> Self {
         let (unit, factor) = if most > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
         Self::new(format!("time since the first pose [{unit}]"), factor)
@@ -108,11 +108,11 @@ fn slides(problem: &Problem, joint: usize) -> bool {
 /// An effect over its cause, before it is known which poses say something.
 struct View<'a> {
     across: Quantity,
-    /// By the largest value [SI] that is shown.
+    /// By the largest value \[SI\] that is shown.
     up: Box<dyn Fn(f64) -> Quantity + 'a>,
     /// The cause in each row.
     x: Vec<f64>,
-    /// What one unit of the ordinate does to each row [m].
+    /// What one unit of the ordinate does to each row \[m\].
     levers: Vec<Vector3<f64>>,
     /// The ordinate at a value of the cause.
     law: Box<dyn Fn(f64) -> f64 + 'a>,
@@ -122,7 +122,7 @@ struct View<'a> {
 /// Every row with its conditions and what an effect does to it.
 struct Rows<'a> {
     poses: Vec<PoseView<'a>>,
-    /// The effect's displacement [m].
+    /// The effect's displacement \[m\].
     own: Vec<Vector3<f64>>,
     parameters: &'a [EffectParameter],
     values: &'a [f64],

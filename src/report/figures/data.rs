@@ -31,7 +31,7 @@ pub enum Stage {
 pub struct StageErrors {
     /// Which.
     pub stage: Stage,
-    /// Errors measured − predicted of the held-out poses, measuring frame [m].
+    /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
 }
 
@@ -40,13 +40,13 @@ pub struct StageErrors {
 pub struct PoseError {
     /// Whether it was held out.
     pub held_out: bool,
-    /// Measured position, measuring frame [m].
+    /// Measured position, measuring frame \[m\].
     pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame [m].
+    /// Residual measured − predicted, measuring frame \[m\].
     pub error: Vector3<f64>,
-    /// 1 σ of each coordinate [m].
+    /// 1 σ of each coordinate \[m\].
     pub sigma: f64,
-    /// Time [s], or the row's number where no time was measured.
+    /// Time \[s\], or the row's number where no time was measured.
     pub time: f64,
 }
 

@@ -6,7 +6,7 @@ use super::data::PlotData;
 use super::frame::{ACCENT, Axis, Drawing, FAINT, WIDTH, chart, figure, legend, line, px};
 
 const HEIGHT: i32 = 280;
-/// Least that the axis reaches [σ]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
+/// Least that the axis reaches \[σ\]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
 const REACH: f64 = 5.0;
 
 /// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
