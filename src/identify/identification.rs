@@ -154,13 +154,17 @@ pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<
     identify_model(&model, problem, data, options)
 }
 
-/// Declared effects of which the measurements hold nothing are mistakes.
-fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
+/// Configurations of another arm are mistakes, and declared effects of which the measurements hold nothing.
+fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), IdentifyError> {
+    let (found, joints) = (measurements.joints, problem.joints.len());
+    if found != joints {
+        return Err(IdentifyError::JointCount { found, joints });
+    }
     let columns =
         Columns { temperature: measurements.temperature.is_some(), approach: measurements.approach.is_some() };
     for EffectDeclaration { effect, location } in &problem.effects {
         if let Some(write) = effect.missing_column(problem, columns) {
-            return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
+            return Err(location.clone().error(InputErrorKind::NeedsColumn { write }).into());
         }
     }
     Ok(())
@@ -178,9 +182,6 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let clock = Instant::now();
-    if measurements.joints != problem.joints.len() {
-        return Err(IdentifyError::JointCount { found: measurements.joints, joints: problem.joints.len() });
-    }
     check_columns(problem, measurements)?;
     if split.identification.is_empty() {
         return Err(IdentifyError::NoPoses);
