@@ -4,17 +4,15 @@
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
 use flexcal::model::{effect::CustomEffect, effect::Term, parameter::Driver, parameter::Slot};
-use flexcal::{
-    diagnose, identify::Options, identify::identify, measurement::Dataset, problem::Effect, problem::Problem,
-};
+use flexcal::{diagnose, identify, measurement::Dataset, problem::Effect, problem::Problem};
 
 const ARM: &str = "name = 'planar'\n[[joint]]\n[[joint]]\na_m = 0.5\n[tool]\ntarget_m = [0.4, 0, 0]
 [parameters]\n'joint2.a' = { sigma_mm = 5 }\n'joint2.theta' = { sigma_deg = 1 }\n[data]\nposition_sigma_mm = 0.05";
 
 // An eccentric of joint 1 pulls at joint 2: Δθ₂ = pull · sin q₁; 1 σ of the prior is 10 mrad.
 #[derive(Debug)]
-struct Eccentric;
-impl CustomEffect for Eccentric {
+struct Cam;
+impl CustomEffect for Cam {
     fn name(&self) -> &'static str {
         "eccentric"
     }
@@ -27,15 +25,15 @@ impl CustomEffect for Eccentric {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let problem = Problem::parse(ARM, "planar.toml".as_ref())?;
+    let arm = Problem::parse(ARM, "planar.toml".as_ref())?;
     // What a tracker sees of an arm that is 2 mm longer and pulls 3 mrad.
     let q: Vec<[f64; 2]> = (0..40_u32).map(|k| [0.15 * f64::from(k) - 3.0, f64::from(7 * k).sin()]).collect();
     let at = |length: f64, angle: f64| flexcal::nalgebra::Vector3::new(length * angle.cos(), length * angle.sin(), 0.0);
     let data = Dataset::builder(&q, q.iter().map(|[a, b]| at(0.502, *a) + at(0.4, a + b + 3e-3 * a.sin()))).build()?;
-    let trace = diagnose::trace(&problem, &data, &Options::default().with_candidates(vec![Effect::custom(Eccentric)]))?;
-    let closed = problem.with_effect(Effect::custom(Eccentric));
-    let found = identify(&closed, &data, &Options::default())?;
-    let tip = found.predict(&closed, &Dataset::poses([[0.3, 0.9]]).measurements()?)?[0];
+    let trace = diagnose::trace(&arm, &data, &identify::Options::default().with_candidates(vec![Effect::custom(Cam)]))?;
+    let arm = arm.with_effect(Effect::custom(Cam));
+    let found = identify::identify(&arm, &data, &identify::Options::default())?;
+    let tip = found.predict(&arm, &data.measurements)?[0];
     let pull = found.estimate("eccentric.pull").map_or(0.0, |pull| pull.estimate * 1e3);
     println!("{}: {pull:.2} mrad; the tip is at {tip:.3?} m", trace.describe(&trace.ranking[0].effect));
     Ok(())

@@ -84,16 +84,17 @@ impl Identification {
 
     /// The full parameter vector of a model with the parameters that were identified, by their names.
     fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+        let x = model.parameters.iter().map(|parameter| {
+            let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
+            place.map(|k| self.x[k]).ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })
+        });
+        let x = x.collect::<Result<Vec<f64>, _>>()?;
         let own = |name: &str| model.parameters.iter().any(|parameter| parameter.name == name);
         // Rows of one session need no base of another.
         let placed = |name: &str| name.starts_with("base") || name.starts_with("tool");
         if let Some(lost) = self.estimates.iter().find(|estimate| !own(&estimate.name) && !placed(&estimate.name)) {
             return Err(IdentifyError::NotInModel { name: lost.name.clone() });
         }
-        let x = model.parameters.iter().map(|parameter| {
-            let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
-            place.map(|k| self.x[k]).ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })
-        });
-        Ok(DVector::from_vec(x.collect::<Result<Vec<f64>, _>>()?))
+        Ok(DVector::from_vec(x))
     }
 }
