@@ -21,6 +21,7 @@ const SETTING_STEP: f64 = 0.1;
 
 /// Whether poses at the ends of the ranges are preferred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Extremes {
     /// Every quantity evenly within its range.
     No,

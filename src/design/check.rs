@@ -26,6 +26,7 @@ const ARM: u64 = 12;
 
 /// Which poses are to be judged.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Judged {
     /// So many, drawn evenly within ranges.
     Drawn(PoseRanges, usize),
@@ -42,6 +43,7 @@ pub enum Judged {
 
 /// Where predictions are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Elsewhere {
     /// In poses drawn evenly within the ranges.
     Ranges,

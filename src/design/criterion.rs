@@ -12,6 +12,7 @@ const MOSTLY_PRIOR: f64 = 0.5;
 /// S, D, A and E are about the arm's parameters. Bases and targets are estimated along with them and are in C, but their own
 /// errors do not count.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Criterion {
     /// det C: the volume of the confidence ellipsoid. Does not depend on units.
     D,

@@ -30,6 +30,7 @@ pub(super) const FIRST_DRAW: u64 = 200;
 
 /// Where the poses of a plan come from.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Candidates {
     /// Anywhere within ranges.
     Within(PoseRanges),

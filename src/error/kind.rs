@@ -252,6 +252,7 @@ pub enum InputErrorKind {
 /// Why one side of the split is empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+#[non_exhaustive]
 pub enum NoRows {
     #[error("column {column} says {word} in every row")]
     Column { column: String, word: &'static str },

@@ -20,6 +20,7 @@ const NOTHING_LEARNED: f64 = 1e-6;
 
 /// Where the assumed noise comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Noise {
     /// From `position_sigma` or the column `sigma`.
     Declared,

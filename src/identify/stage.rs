@@ -21,6 +21,7 @@ const COST_TOLERANCE: f64 = 1e-11;
 
 /// A stage that cannot be set up.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StageError {
     /// Bounds leave a parameter no value.
     #[error(transparent)]

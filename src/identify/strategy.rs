@@ -5,6 +5,7 @@ use crate::model::parameter::Parameter;
 
 /// Which parameters are fitted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Strategy {
     /// Everything at once.
     #[default]
@@ -21,6 +22,7 @@ pub enum Strategy {
 
 /// A solver by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum SolverChoice {
     /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise; `docs/solvers.md` says why.
     #[default]

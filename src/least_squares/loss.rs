@@ -10,6 +10,7 @@ use super::kernel::{norm, sum_of_squares};
 /// s², so the weighted problem lies above the cost of the linearised residual: steps achieve what they predict or more
 /// (gain ratios of 1 to 2), and the tests for convergence hold as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub enum Loss {
     /// ρ = s²: least squares.
     #[default]

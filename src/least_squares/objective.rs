@@ -25,6 +25,7 @@ pub struct LinearRows {
 
 /// Linear rows that do not fit their problem.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RowsError {
     /// The matrix has another number of columns than the problem has unknowns.
     #[error("adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns")]

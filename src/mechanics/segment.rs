@@ -10,6 +10,7 @@ use crate::spatial::Frame;
 
 /// A segment of the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Segment {
     /// The base, where it tilts.
     Mounting,

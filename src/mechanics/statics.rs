@@ -29,6 +29,7 @@ pub(super) const SETTLED: f64 = 1e-13;
 const ROUNDING: f64 = 1e-15;
 /// Why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StaticsError {
     /// The bent arm keeps bending: too soft for its loads.
     #[error("the deflection does not settle: the arm is too soft for its loads")]

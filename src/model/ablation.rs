@@ -6,6 +6,7 @@ use crate::model::parameter::{ArmField, BeamField, Slot};
 
 /// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the arm stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Ablation {
     /// Nothing: geometry alone.
     Rigid,

@@ -13,6 +13,7 @@ use super::tally::Tally;
 /// Why a study has no results.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+#[non_exhaustive]
 pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),

@@ -23,6 +23,7 @@ pub struct Store {
 /// Why a finished part could not be kept or found.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+#[non_exhaustive]
 pub enum StoreError {
     #[error("cannot write {}: {source}", path.display())]
     Unwritable { path: PathBuf, source: io::Error },

@@ -40,6 +40,7 @@ pub struct Study {
 
 /// What measures the true arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Source {
     /// The model that is fitted, at the true parameters: no error but noise.
     Model,

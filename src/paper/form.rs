@@ -2,6 +2,7 @@
 
 /// How a formula is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Form {
     /// As it stands in the paper.
     Printed,
@@ -15,6 +16,7 @@ pub enum Form {
 /// Sizes: the largest change of the end point on the lunar sampler over the 40 poses of `tests/golden`, of a deflection of up
 /// to 62 mm at nominal geometry, or of 49 mm of geometric error at table 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Misprint {
     /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³; 2.8 mm.
     TipForceLever,

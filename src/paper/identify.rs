@@ -11,6 +11,7 @@ use crate::problem::Problem;
 
 /// Where the stiffness comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum StiffnessStage {
     /// It is known: as the problem declares it. Table 2 of the paper lists geometry only.
     Nominal,
@@ -51,6 +52,7 @@ pub struct Identified {
 
 /// Poses that the procedure cannot use.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// Three coordinates a pose are fewer equations than the 5n unknowns of eq. 42.
     #[error("identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}")]

@@ -17,6 +17,7 @@ pub struct Parameters {
 
 /// One flexibility; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Flexibility {
     /// Torsion of a joint, 1/k [rad/(N·m)].
     Joint(usize),

@@ -10,6 +10,7 @@ use crate::quantity::Unit;
 /// An argument of an effect as the files write it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
+#[non_exhaustive]
 pub enum Argument {
     /// Number of a joint, from 1.
     Joint(usize),

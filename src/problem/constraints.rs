@@ -42,6 +42,7 @@ pub struct Limit {
 
 /// What a constraint adds up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LimitKind {
     /// Angles \[rad\].
     Angle,

@@ -27,6 +27,7 @@ pub struct Data {
 
 /// `held_out` of `[data]`.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum HeldOut {
     /// Rows whose column says `validation`.
     Column(String),

@@ -70,6 +70,7 @@ pub struct Statics {
 
 /// On which arm the loads act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Equilibrium {
     /// On the rigid arm: the first order of the paper.
     Undeflected,

@@ -18,6 +18,7 @@ pub struct ParameterRule {
 
 /// What a rule makes of the parameters it matches.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Freedom {
     /// Held at its nominal value.
     Fixed,

@@ -14,6 +14,7 @@ pub struct Robust {
 
 /// What the residual of a pose counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RobustLoss {
     /// Its square up to the threshold, its length beyond.
     Huber,

@@ -54,6 +54,7 @@ pub struct Simulation {
 
 /// Why there are no measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulationError {
     /// One of the poses has no equilibrium.
     #[error("pose {pose} of the simulation: {source}; check stiffnesses, masses and the truth")]

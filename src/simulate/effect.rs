@@ -5,6 +5,7 @@ use crate::quantity::Unit;
 
 /// What makes the arm differ from its declared model.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Cause {
     /// An effect of the catalogue.
     Catalogued(Effect),
@@ -19,6 +20,7 @@ pub enum Cause {
 
 /// Course of an error over q, with u = (q − centre)/width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Shape {
     /// height · exp(−u²/2)
     Bump,

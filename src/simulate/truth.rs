@@ -49,6 +49,7 @@ pub struct RandomRule {
 
 /// How many rows are held out, chosen at random.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum HeldOutRows {
     /// This part of them; at least one, and never all.
     Share(f64),

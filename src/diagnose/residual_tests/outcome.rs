@@ -6,6 +6,7 @@ use crate::diagnose::covariate::Covariate;
 
 /// An order of the poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Sequence {
     /// By time, session by session.
     Time,
@@ -15,6 +16,7 @@ pub enum Sequence {
 
 /// A test of what a fit leaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Test {
     /// Size against the declared σ; statistic: χ² / ν.
     ReducedChiSquared,
@@ -46,6 +48,7 @@ pub enum Test {
 
 /// Why a test says nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Untestable {
     /// The fit leaves (nearly) no degrees of freedom.
     #[error("the fit leaves too few degrees of freedom")]

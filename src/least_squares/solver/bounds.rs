@@ -20,6 +20,7 @@ pub struct Bounds {
 
 /// Bounds that no x can satisfy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BoundsError {
     /// The two vectors differ in length.
     #[error("setting bounds: {lower} lower bounds, but {upper} upper bounds")]

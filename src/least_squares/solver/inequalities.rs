@@ -19,6 +19,7 @@ pub struct Inequalities {
 
 /// Inequalities that make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InequalitiesError {
     /// Matrix and limits differ in their number of rows.
     #[error("setting inequalities: {rows} rows, but {lower} lower and {upper} upper limits")]

@@ -9,6 +9,7 @@ use std::fmt;
 ///
 /// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction of ½‖r‖²; ε = 2⁻⁵².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Termination {
     /// The residual is orthogonal to every column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ `gradient_tolerance`.
     Gradient,

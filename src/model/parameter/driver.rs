@@ -6,6 +6,7 @@ use crate::problem::PoseView;
 ///
 /// Joints are counted from 0, [`Driver::command`] takes the numbers of files; configurations are those commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Driver {
     /// 1: the parameter acts the same in every pose.
     Constant,
@@ -59,6 +60,7 @@ pub enum Driver {
 
 /// A quantity that is known of every pose; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Quantity {
     /// q of a joint \[rad\] or \[m\], joints counted from 0.
     Command(usize),

@@ -4,6 +4,7 @@ use crate::quantity::Unit;
 
 /// Where a parameter enters the model; joints are counted from 0, [`Slot::of_joint`] takes the numbers of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Slot {
     /// A field of a joint.
     Joint {
@@ -47,6 +48,7 @@ pub enum Slot {
 /// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "letters need no words")]
+#[non_exhaustive]
 pub enum JointField {
     Alpha,
     A,
@@ -70,6 +72,7 @@ pub enum JointField {
 
 /// A field of a beam that may be free: rigidities, then what effects add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum BeamField {
     /// EA.
     Axial,
@@ -99,6 +102,7 @@ pub enum BeamField {
 
 /// What acts on the arm as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ArmField {
     /// Added to every payload that is carried \[kg\].
     Payload,

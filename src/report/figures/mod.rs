@@ -24,6 +24,7 @@ pub use data::{PlotData, PoseError, Stage, StageErrors};
 
 /// A figure with its numbers.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub enum Figure<'a> {
     Errors(&'a PlotData),
     Vectors(&'a PlotData),
