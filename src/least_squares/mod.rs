@@ -21,7 +21,6 @@ pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{BlindCombination, Identifiability};
 pub use loss::Loss;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
-pub(crate) use singular::orthogonalise;
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 

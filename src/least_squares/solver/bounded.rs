@@ -2,12 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::box_step::BoxProblem;
 use super::levenberg_marquardt::Model;
-use super::polyhedron::Polyhedron;
-use super::polyhedron_step::PolyhedronProblem;
+use super::polyhedron::{Faces, Polyhedron};
+use super::polyhedron_step::{PolyhedronProblem, PolyhedronSolution};
 use super::settings::RADIUS_SLACK;
-use super::{AtBound, Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
+use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
 
 /// Damped problems tried for one step when the radius limits a step along bounds.
@@ -25,8 +24,8 @@ pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustR
 ///
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
 ///
-/// The unconstrained step is tried first, then the one in the box, and only then the one in the whole polyhedron, each
-/// without damping if that respects the radius. The problem is never evaluated outside (inequalities: beyond rounding);
+/// The unconstrained step is tried first, then the one in the polyhedron (a box without inequalities), each without damping
+/// if that respects the radius. The problem is never evaluated outside (inequalities: beyond rounding);
 /// a start outside is moved to the [`nearest`] point within. Converged when the gradient vanishes along all directions that
 /// bounds and inequalities leave open.
 pub fn constrained_levenberg_marquardt(
@@ -34,7 +33,7 @@ pub fn constrained_levenberg_marquardt(
     rows: Inequalities,
     settings: Settings,
 ) -> TrustRegion<Constrained> {
-    TrustRegion::new(Constrained { bounds, rows, model: None, guess: Vec::new() }, settings)
+    TrustRegion::new(Constrained { bounds, rows, model: None, guess: None }, settings)
 }
 
 /// The point nearest to `x` that keeps bounds and inequalities, if there is one.
@@ -50,10 +49,9 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     }
     let factor = Factor::new(DMatrix::identity(n, n), DVector::zeros(n), f64::EPSILON);
     let polyhedron = Polyhedron::around(x, bounds, rows, &DVector::from_element(n, 1.0));
-    let mut problem = PolyhedronProblem::new(&factor, &polyhedron);
-    let solution = problem.solve(0.0);
+    let solution = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone()).solve(0.0);
     let mut point = x + &solution.q;
-    bounds.hold(&mut point, &problem.bounds_of(&solution));
+    bounds.hold(&mut point, &solution.faces.bounds);
     let kept = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
     (0..rows.len()).all(kept).then_some(point)
 }
@@ -64,8 +62,8 @@ pub struct Constrained {
     bounds: Bounds,
     rows: Inequalities,
     model: Option<Model>,
-    /// Bounds that held in the last boxed problem.
-    guess: Vec<Option<AtBound>>,
+    /// Faces that held in the last problem from the same x.
+    guess: Option<Faces>,
 }
 
 impl Subproblem for Constrained {
@@ -79,9 +77,9 @@ impl Subproblem for Constrained {
         true
     }
 
-    fn prepare(&mut self, x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
+    fn prepare(&mut self, _x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
         self.model = Some(Model::new(linearisation, scale, settings));
-        self.guess = (0..x.len()).map(|j| self.bounds.at(x, j)).collect();
+        self.guess = None;
     }
 
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64 {
@@ -100,51 +98,32 @@ impl Subproblem for Constrained {
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let Some(model) = &mut self.model else { return Step::none(x) };
-        let mut step = model.unbounded_step(x, radius);
-        if !self.bounds.contain(&step.point) {
-            let scale = &model.scale;
-            let lower = (self.bounds.lower() - x).component_mul(scale);
-            let upper = (self.bounds.upper() - x).component_mul(scale);
-            let mut problem = BoxProblem::new(&model.factor, lower, upper, self.guess.clone());
-            let size = problem.gradient_norm();
-            let (solution, damping) = limited(|lambda| problem.solve(lambda), |found| found.q.norm(), size, radius);
-            step = finish(x, &self.bounds, model, &solution.q, &solution.active, damping);
-            self.guess = solution.active;
-        }
-        if self.rows.contain(&step.point) {
+        let step = model.unbounded_step(x, radius);
+        if self.bounds.contain(&step.point) && self.rows.contain(&step.point) {
             return step;
         }
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron);
+        let guess = self.guess.take().unwrap_or_else(|| polyhedron.touched.clone());
+        let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, guess);
         let size = problem.gradient_norm();
-        let (solution, damping) = limited(|lambda| problem.solve(lambda), |found| found.q.norm(), size, radius);
-        finish(x, &self.bounds, model, &solution.q, &problem.bounds_of(&solution), damping)
+        let (PolyhedronSolution { q, faces }, damping) = limited(|lambda| problem.solve(lambda), size, radius);
+        // Exactly on the bounds that hold.
+        let mut point = x + q.component_div(&model.scale);
+        self.bounds.hold(&mut point, &faces.bounds);
+        self.guess = Some(faces);
+        let slope = -model.factor.gradient().dot(&q);
+        let predicted = slope - 0.5 * model.factor.image(&q).norm_squared();
+        Step { point, length: q.norm(), slope, predicted, damping }
     }
-}
-
-/// x + D⁻¹ q, exactly on the bounds that hold.
-fn finish(
-    x: &DVector<f64>,
-    bounds: &Bounds,
-    model: &Model,
-    q: &DVector<f64>,
-    active: &[Option<AtBound>],
-    damping: f64,
-) -> Step {
-    let mut point = x + q.component_div(&model.scale);
-    bounds.hold(&mut point, active);
-    let slope = -model.factor.gradient().dot(q);
-    let predicted = slope - 0.5 * model.factor.image(q).norm_squared();
-    Step { point, length: q.norm(), slope, predicted, damping }
 }
 
 /// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ, `size` is ‖Bᵀc‖.
 ///
 /// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ; within the bracket
 /// Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
-fn limited<Q>(mut solve: impl FnMut(f64) -> Q, norm: impl Fn(&Q) -> f64, size: f64, radius: f64) -> (Q, f64) {
+fn limited(mut solve: impl FnMut(f64) -> PolyhedronSolution, size: f64, radius: f64) -> (PolyhedronSolution, f64) {
     let mut solution = solve(0.0);
-    let mut length = norm(&solution);
+    let mut length = solution.q.norm();
     if length <= (1.0 + RADIUS_SLACK) * radius {
         return (solution, 0.0);
     }
@@ -154,7 +133,7 @@ fn limited<Q>(mut solve: impl FnMut(f64) -> Q, norm: impl Fn(&Q) -> f64, size: f
     let mut best = None;
     for _ in 0..DAMPINGS {
         solution = solve(lambda);
-        length = norm(&solution);
+        length = solution.q.norm();
         let short = length <= (1.0 + RADIUS_SLACK) * radius;
         if short {
             high = lambda;

@@ -4,7 +4,6 @@
 
 mod bounded;
 mod bounds;
-mod box_step;
 mod divergence;
 mod execute;
 mod factor;

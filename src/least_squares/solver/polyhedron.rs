@@ -1,4 +1,4 @@
-//! The polyhedron that bounds and inequalities leave to a step.
+//! The polyhedron that bounds and inequalities leave to a step; a box where there are no inequalities.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,45 +7,47 @@ use super::{AtBound, Bounds, Factor, Inequalities};
 
 /// Normals are dependent when what is left of one is shorter than this part of it.
 const DEPENDENT: f64 = 1e-10;
-/// Rounding allowed in the distance to a face.
+/// Rounding allowed in the distance to a half-space.
 const TOUCH: f64 = 1e-14;
 
-/// What a face of the polyhedron stands for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Face {
-    /// A bound of an unknown.
-    Bound(usize, AtBound),
-    /// A limit of an inequality.
-    Row,
-}
-
-/// Half-spaces G q ≥ h with normals of length one.
+/// Steps lower ≤ q ≤ upper with G q ≥ h, normals of length one.
 #[derive(Debug, Clone)]
 pub(super) struct Polyhedron {
-    pub(super) faces: Vec<Face>,
+    pub(super) lower: DVector<f64>,
+    pub(super) upper: DVector<f64>,
     /// G, k × n.
     pub(super) normals: DMatrix<f64>,
     /// h.
     pub(super) least: DVector<f64>,
-    /// Which faces x lies on.
-    pub(super) touched: Vec<bool>,
+    /// What x lies on.
+    pub(super) touched: Faces,
+}
+
+/// Faces of the polyhedron.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Faces {
+    /// The bound of each unknown.
+    pub(super) bounds: Vec<Option<AtBound>>,
+    /// Which half-spaces.
+    pub(super) rows: Vec<bool>,
+}
+
+impl Faces {
+    /// Unknowns at no bound.
+    pub(super) fn free(&self) -> Vec<usize> {
+        (0..self.bounds.len()).filter(|&j| self.bounds[j].is_none()).collect()
+    }
+
+    /// Half-spaces among the faces.
+    fn chosen(&self) -> Vec<usize> {
+        (0..self.rows.len()).filter(|&i| self.rows[i]).collect()
+    }
 }
 
 impl Polyhedron {
     /// The steps q = D p from `x` that keep bounds and rows; D is `scale`.
     pub(super) fn around(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities, scale: &DVector<f64>) -> Self {
-        let n = x.len();
-        let mut all: Vec<(Face, DVector<f64>, f64, bool)> = Vec::new();
-        let unit = |j: usize, sign: f64| DVector::from_fn(n, |k, _| if k == j { sign } else { 0.0 });
-        for j in 0..n {
-            let (lower, upper) = (bounds.lower()[j], bounds.upper()[j]);
-            if lower.is_finite() {
-                all.push((Face::Bound(j, AtBound::Lower), unit(j, 1.0), (lower - x[j]) * scale[j], x[j] <= lower));
-            }
-            if upper.is_finite() {
-                all.push((Face::Bound(j, AtBound::Upper), unit(j, -1.0), (x[j] - upper) * scale[j], x[j] >= upper));
-            }
-        }
+        let mut spaces: Vec<(DVector<f64>, f64, bool)> = Vec::new();
         for i in 0..rows.len() {
             let row = rows.matrix().row(i).transpose();
             let (value, at) = (row.dot(x), rows.at(x, i));
@@ -53,80 +55,107 @@ impl Polyhedron {
             let size = normal.norm();
             let (lower, upper) = (rows.lower()[i], rows.upper()[i]);
             if lower.is_finite() {
-                all.push((Face::Row, &normal / size, (lower - value) / size, at == Some(AtBound::Lower)));
+                spaces.push((&normal / size, (lower - value) / size, at == Some(AtBound::Lower)));
             }
             let on_upper = at == Some(AtBound::Upper) || (at.is_some() && lower >= upper);
             if upper.is_finite() {
-                all.push((Face::Row, -&normal / size, (value - upper) / size, on_upper));
+                spaces.push((-&normal / size, (value - upper) / size, on_upper));
             }
         }
         Self {
-            faces: all.iter().map(|face| face.0).collect(),
-            normals: DMatrix::from_fn(all.len(), n, |i, j| all[i].1[j]),
-            least: DVector::from_iterator(all.len(), all.iter().map(|face| face.2)),
-            touched: all.iter().map(|face| face.3).collect(),
+            lower: (bounds.lower() - x).component_mul(scale),
+            upper: (bounds.upper() - x).component_mul(scale),
+            normals: DMatrix::from_fn(spaces.len(), x.len(), |i, j| spaces[i].0[j]),
+            least: DVector::from_iterator(spaces.len(), spaces.iter().map(|space| space.1)),
+            touched: Faces {
+                bounds: (0..x.len()).map(|j| bounds.at(x, j)).collect(),
+                rows: spaces.iter().map(|space| space.2).collect(),
+            },
         }
     }
 
     /// What is left of a gradient at q = 0 along the directions that the touched faces leave open.
     ///
-    /// γ − Gᵀμ with μ ≥ 0 of the touched faces; those that would pull inwards are let go.
+    /// γ − Gᵀμ with μ ≥ 0 of the touched faces; those that would pull inwards are left.
     pub(super) fn free_part(&self, gradient: &DVector<f64>) -> DVector<f64> {
-        let mut active = self.touched.clone();
+        let mut faces = self.touched.clone();
         loop {
-            let multipliers = self.multipliers(&active, gradient);
-            if multipliers.iter().all(|&(_, multiplier)| multiplier >= 0.0) {
-                return multipliers.iter().fold(gradient.clone(), |left, &(i, multiplier)| {
-                    left - self.normals.row(i).transpose() * multiplier
-                });
+            let (mut left, multipliers) = self.multipliers(&faces, gradient);
+            let kept = self.kept(&faces, &left, &multipliers, 0.0);
+            if kept == faces {
+                (0..left.len()).filter(|&j| faces.bounds[j].is_some()).for_each(|j| left[j] = 0.0);
+                return left;
             }
-            for (i, multiplier) in multipliers {
-                active[i] = multiplier >= 0.0;
-            }
+            faces = kept;
         }
     }
 
-    /// μ of the active faces with Gᵀμ nearest to `force`, the shortest where several are.
-    pub(super) fn multipliers(&self, active: &[bool], force: &DVector<f64>) -> Vec<(usize, f64)> {
-        let chosen = chosen(active);
+    /// μ of the half-spaces among `faces`, the shortest where several do, and what they leave of `force`: the multipliers of
+    /// the bounds, and nothing else where the faces hold all of it.
+    pub(super) fn multipliers(&self, faces: &Faces, force: &DVector<f64>) -> (DVector<f64>, Vec<(usize, f64)>) {
+        let (chosen, free) = (faces.chosen(), faces.free());
         if chosen.is_empty() {
-            return Vec::new();
+            return (force.clone(), Vec::new());
         }
         let normals = self.normals.select_rows(&chosen).transpose();
-        let multipliers = Factor::new(normals, -force, DEPENDENT).gauss_newton();
-        chosen.into_iter().zip(multipliers.iter().copied()).collect()
+        let multipliers = Factor::new(normals.select_rows(&free), -force.select_rows(&free), DEPENDENT).gauss_newton();
+        (force - normals * &multipliers, chosen.into_iter().zip(multipliers.iter().copied()).collect())
     }
 
-    /// The shortest q on all active faces, and orthonormal columns that span the directions along them.
-    pub(super) fn flat(&self, active: &[bool]) -> (DVector<f64>, DMatrix<f64>) {
-        let (chosen, n) = (chosen(active), self.normals.ncols());
-        if chosen.is_empty() {
-            return (DVector::zeros(n), DMatrix::identity(n, n));
+    /// The faces whose multiplier does not pull inwards by more than `slack`; an unknown with one value only keeps it.
+    pub(super) fn kept(&self, faces: &Faces, bounds: &DVector<f64>, rows: &[(usize, f64)], slack: f64) -> Faces {
+        let mut kept = faces.clone();
+        for (j, bound) in kept.bounds.iter_mut().enumerate().filter(|&(j, _)| self.lower[j] < self.upper[j]) {
+            *bound = bound.filter(|side| match side {
+                AtBound::Lower => bounds[j] >= -slack,
+                AtBound::Upper => bounds[j] <= slack,
+            });
+        }
+        for &(i, multiplier) in rows {
+            kept.rows[i] = multiplier >= -slack;
+        }
+        kept
+    }
+
+    /// The shortest q on some faces, and orthonormal columns that span the directions of the free unknowns along the
+    /// half-spaces among them; none where there are no such half-spaces.
+    pub(super) fn flat(&self, faces: &Faces) -> (DVector<f64>, Option<DMatrix<f64>>) {
+        let mut corner = DVector::from_fn(faces.bounds.len(), |j, _| match faces.bounds[j] {
+            Some(AtBound::Lower) => self.lower[j],
+            Some(AtBound::Upper) => self.upper[j],
+            None => 0.0,
+        });
+        let (chosen, free) = (faces.chosen(), faces.free());
+        if chosen.is_empty() || free.is_empty() {
+            return (corner, None);
         }
         let normals = self.normals.select_rows(&chosen);
-        let least = DVector::from_iterator(chosen.len(), chosen.iter().map(|&i| self.least[i]));
+        let least = self.least.select_rows(&chosen) - &normals * &corner;
+        let normals = normals.select_columns(&free);
         let qr = normals.transpose().col_piv_qr();
         let r = qr.r();
         let rank = (0..r.nrows()).filter(|&i| r[(i, i)].abs() > DEPENDENT * r[(0, 0)].abs()).count();
-        let mut all = DMatrix::identity(n, n);
+        let mut all = DMatrix::identity(free.len(), free.len());
         qr.q_tr_mul(&mut all);
         let mut shortest = Factor::new(normals.clone(), -&least, DEPENDENT).gauss_newton();
         shortest += Factor::new(normals.clone(), normals * &shortest - least, DEPENDENT).gauss_newton();
-        (shortest, all.rows(rank, n - rank).transpose())
+        free.iter().zip(shortest.iter()).for_each(|(&j, value)| corner[j] = *value);
+        (corner, Some(all.rows(rank, free.len() - rank).transpose()))
     }
 
-    /// By how much face `i` is passed, beyond rounding.
-    pub(super) fn passed(&self, i: usize, q: &DVector<f64>) -> bool {
+    /// Whether half-space `i` is left, beyond rounding.
+    pub(super) fn leaves(&self, i: usize, q: &DVector<f64>) -> bool {
         self.normals.row(i).transpose().dot(q) < self.least[i] - TOUCH * (q.norm() + self.least[i].abs())
     }
 
+    /// The bounds that are finite, and all others.
     pub(super) fn half_spaces(&self) -> Vec<HalfSpace> {
+        let side = |bounds: &DVector<f64>, sign: f64| -> Vec<HalfSpace> {
+            let finite = bounds.iter().enumerate().filter(|(_, bound)| bound.is_finite());
+            finite.map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], least: sign * bound }).collect()
+        };
         let normal = |i: usize| self.normals.row(i).iter().copied().enumerate().filter(|&(_, g)| g != 0.0).collect();
-        (0..self.faces.len()).map(|i| HalfSpace { normal: normal(i), least: self.least[i] }).collect()
+        let rows = (0..self.least.len()).map(|i| HalfSpace { normal: normal(i), least: self.least[i] }).collect();
+        [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
     }
-}
-
-/// The faces that are marked.
-pub(super) fn chosen(active: &[bool]) -> Vec<usize> {
-    (0..active.len()).filter(|&i| active[i]).collect()
 }

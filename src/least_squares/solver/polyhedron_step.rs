@@ -1,16 +1,16 @@
-//! Linear least squares in a polyhedron: active-set guess, interior-point solver, polish.
+//! Linear least squares in a polyhedron or box: active-set guess, interior-point solver, polish.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::interior::interior_point;
-use super::polyhedron::{Face, Polyhedron, chosen};
+use super::polyhedron::{Faces, Polyhedron};
 use super::{AtBound, Factor};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 const NEAR: f64 = 1e-6;
 /// Corrections of the active set allowed to a polish.
 const CORRECTIONS: usize = 30;
-/// Rounding allowed in the signs of the multipliers.
+/// Rounding allowed in the optimality conditions.
 const ROUNDING: f64 = 1e-12;
 
 /// min ½‖B q + c‖² + ½λ‖q‖² in a polyhedron.
@@ -18,19 +18,20 @@ pub(super) struct PolyhedronProblem<'a> {
     factor: &'a Factor,
     gradient: DVector<f64>,
     polyhedron: &'a Polyhedron,
-    guess: Vec<bool>,
+    guess: Faces,
 }
 
 /// A minimiser and the faces it lies on.
 #[derive(Debug, Clone)]
 pub(super) struct PolyhedronSolution {
     pub(super) q: DVector<f64>,
-    active: Vec<bool>,
+    pub(super) faces: Faces,
 }
 
 impl<'a> PolyhedronProblem<'a> {
-    pub(super) fn new(factor: &'a Factor, polyhedron: &'a Polyhedron) -> Self {
-        Self { factor, gradient: factor.gradient(), polyhedron, guess: polyhedron.touched.clone() }
+    /// `guess`: the faces that the minimiser may lie on.
+    pub(super) fn new(factor: &'a Factor, polyhedron: &'a Polyhedron, guess: Faces) -> Self {
+        Self { factor, gradient: factor.gradient(), polyhedron, guess }
     }
 
     /// ‖Bᵀc‖.
@@ -38,86 +39,157 @@ impl<'a> PolyhedronProblem<'a> {
         self.gradient.norm()
     }
 
-    /// The bounds among the faces that a solution lies on.
-    pub(super) fn bounds_of(&self, solution: &PolyhedronSolution) -> Vec<Option<AtBound>> {
-        let mut bounds = vec![None; solution.q.len()];
-        for i in chosen(&solution.active) {
-            if let Face::Bound(j, side) = self.polyhedron.faces[i] {
-                bounds[j] = Some(side);
-            }
-        }
-        bounds
-    }
-
     /// The minimiser for damping λ, exact on its faces.
     pub(super) fn solve(&mut self, lambda: f64) -> PolyhedronSolution {
         let solution = self.polish(self.guess.clone(), lambda, 2).unwrap_or_else(|| {
             let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces());
-            let interior = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
-            self.polish(self.near(&interior), lambda, CORRECTIONS).unwrap_or_else(|| self.shortened(interior))
+            let polished = interior.as_ref().and_then(|q| self.polish(self.near(q), lambda, CORRECTIONS));
+            polished.unwrap_or_else(|| self.within(interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()))))
         });
-        self.guess.clone_from(&solution.active);
+        self.guess.clone_from(&solution.faces);
         solution
     }
 
     /// Solves on some faces and corrects the choice until the optimality conditions hold, within `corrections` rounds.
     ///
     /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed.
-    fn polish(&self, mut active: Vec<bool>, lambda: f64, corrections: usize) -> Option<PolyhedronSolution> {
+    fn polish(&self, mut faces: Faces, lambda: f64, corrections: usize) -> Option<PolyhedronSolution> {
         for _ in 0..corrections {
-            let q = self.on_faces(&active, lambda);
-            let corrected = self.corrected(&active, &q, lambda);
-            if corrected == active {
-                let holds = (0..active.len()).all(|i| !self.polyhedron.passed(i, &q));
-                return holds.then_some(PolyhedronSolution { q, active });
+            let q = self.on_faces(&faces, lambda);
+            let corrected = self.corrected(&faces, &q, lambda);
+            if corrected == faces {
+                let q = self.clamped(q);
+                let holds = (0..faces.rows.len()).all(|i| !self.polyhedron.leaves(i, &q));
+                return holds.then_some(PolyhedronSolution { q, faces });
             }
-            active = corrected;
+            faces = corrected;
         }
         None
     }
 
-    fn corrected(&self, active: &[bool], q: &DVector<f64>, lambda: f64) -> Vec<bool> {
+    fn corrected(&self, faces: &Faces, q: &DVector<f64>, lambda: f64) -> Faces {
+        // Multipliers w = Bᵀ(B q + c) + λ q − Gᵀμ: w ≥ 0 at a lower bound, w ≤ 0 at an upper one, μ ≥ 0.
         let force = self.factor.matrix().tr_mul(&self.factor.image(q)) + &self.gradient + lambda * q;
-        let slack = ROUNDING * (self.gradient.norm() + lambda * q.norm());
-        let mut corrected: Vec<bool> = (0..active.len()).map(|i| !active[i] && self.polyhedron.passed(i, q)).collect();
-        for (i, multiplier) in self.polyhedron.multipliers(active, &force) {
-            corrected[i] = multiplier >= -slack;
+        let slack = ROUNDING * (self.gradient.amax() + lambda * q.amax());
+        let (bounds, rows) = self.polyhedron.multipliers(faces, &force);
+        let mut corrected = self.polyhedron.kept(faces, &bounds, &rows, slack);
+        let Polyhedron { lower, upper, .. } = self.polyhedron;
+        let beyond = ROUNDING * q.amax();
+        for j in 0..q.len() {
+            if lower[j] >= upper[j] || (faces.bounds[j].is_none() && q[j] < lower[j] - beyond) {
+                corrected.bounds[j] = Some(AtBound::Lower);
+            } else if faces.bounds[j].is_none() && q[j] > upper[j] + beyond {
+                corrected.bounds[j] = Some(AtBound::Upper);
+            }
+        }
+        for i in (0..faces.rows.len()).filter(|&i| !faces.rows[i]) {
+            corrected.rows[i] = self.polyhedron.leaves(i, q);
         }
         corrected
     }
 
-    /// The least-squares solution along the active faces.
-    fn on_faces(&self, active: &[bool], lambda: f64) -> DVector<f64> {
-        let (corner, along) = self.polyhedron.flat(active);
-        let (free, n) = (along.ncols(), self.factor.matrix().nrows());
-        if free == 0 {
-            return corner;
+    /// The least-squares solution along some faces.
+    fn on_faces(&self, faces: &Faces, lambda: f64) -> DVector<f64> {
+        let (mut q, along) = self.polyhedron.flat(faces);
+        let free = faces.free();
+        let open = self.factor.matrix().select_columns(&free);
+        let open = match &along {
+            Some(along) => open * along,
+            None => open,
+        };
+        let (n, count) = open.shape();
+        if count == 0 {
+            return q;
         }
         // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
-        let extra = if lambda > 0.0 { free } else { 0 };
-        let mut matrix = DMatrix::zeros(n + extra, free);
-        matrix.rows_mut(0, n).copy_from(&(self.factor.matrix() * &along));
+        let extra = if lambda > 0.0 { count } else { 0 };
+        let mut matrix = open.resize_vertically(n + extra, 0.0);
         matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
-        let constant = (self.factor.image(&corner) + self.factor.constant()).resize_vertically(n + extra, 0.0);
-        corner + along * Factor::new(matrix, constant, self.factor.tolerance()).gauss_newton()
+        let constant = (self.factor.image(&q) + self.factor.constant()).resize_vertically(n + extra, 0.0);
+        let y = Factor::new(matrix, constant, self.factor.tolerance()).gauss_newton();
+        let y = match along {
+            Some(along) => along * y,
+            None => y,
+        };
+        free.iter().zip(y.iter()).for_each(|(&j, value)| q[j] += value);
+        q
     }
 
-    fn near(&self, q: &DVector<f64>) -> Vec<bool> {
-        let distance = &self.polyhedron.normals * q - &self.polyhedron.least;
+    fn near(&self, q: &DVector<f64>) -> Faces {
         let size = NEAR * q.amax().max(f64::MIN_POSITIVE);
-        distance.iter().map(|&distance| distance <= size).collect()
+        self.faces_within(q, size)
     }
 
-    /// The part of a step that passes no face; the way back to q = 0 is inside.
-    fn shortened(&self, q: DVector<f64>) -> PolyhedronSolution {
-        let along = &self.polyhedron.normals * &q;
-        let part = along
+    /// The faces no farther from `q` than `distance`.
+    fn faces_within(&self, q: &DVector<f64>, distance: f64) -> Faces {
+        let Polyhedron { lower, upper, normals, least, .. } = self.polyhedron;
+        let bound = |j: usize| match q[j] {
+            value if value - lower[j] <= distance => Some(AtBound::Lower),
+            value if upper[j] - value <= distance => Some(AtBound::Upper),
+            _ => None,
+        };
+        let rows = (normals * q).iter().zip(least).map(|(along, least)| along - least <= distance).collect();
+        Faces { bounds: (0..q.len()).map(bound).collect(), rows }
+    }
+
+    fn clamped(&self, mut q: DVector<f64>) -> DVector<f64> {
+        (0..q.len()).for_each(|j| q[j] = q[j].clamp(self.polyhedron.lower[j], self.polyhedron.upper[j]));
+        q
+    }
+
+    /// The part within the half-spaces of a step that is brought into the box; the way back to q = 0 is inside.
+    fn within(&self, q: DVector<f64>) -> PolyhedronSolution {
+        let q = self.clamped(q);
+        let part = (&self.polyhedron.normals * &q)
             .iter()
             .zip(&self.polyhedron.least)
             .filter(|(along, least)| along < least)
             .fold(1.0_f64, |part, (along, least)| part.min((least / along).clamp(0.0, 1.0)));
         let q = q * part;
-        let active = (&self.polyhedron.normals * &q).iter().zip(&self.polyhedron.least).map(|(a, l)| a <= l).collect();
-        PolyhedronSolution { q, active }
+        PolyhedronSolution { faces: self.faces_within(&q, 0.0), q }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::super::{Bounds, Inequalities};
+    use super::*;
+
+    #[test]
+    fn interior_point_and_polish_agree_on_a_badly_scaled_box() {
+        let n = 8;
+        let spread = |j: usize| 10.0_f64.powf(0.75 * j as f64);
+        let matrix =
+            DMatrix::from_fn(
+                n,
+                n,
+                |i, j| if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 },
+            );
+        let constant = DVector::from_fn(n, |i, _| 1.0 + i as f64);
+        let factor = Factor::new(matrix, constant, 1e-13);
+        let mut lower = DVector::from_fn(n, |j, _| -0.5 / spread(j));
+        let upper = DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 / spread(j) });
+        lower[2] = f64::NEG_INFINITY;
+        let bounds = Bounds::new(lower, upper).unwrap();
+        // Without rows, and with one that the box alone would leave.
+        let row = DMatrix::from_fn(1, n, |_, j| spread(j));
+        let limited = Inequalities::new(row, DVector::from_element(1, -0.2), DVector::from_element(1, f64::INFINITY));
+        for rows in [Inequalities::none(n), limited.unwrap()] {
+            let polyhedron = Polyhedron::around(&DVector::zeros(n), &bounds, &rows, &DVector::from_element(n, 1.0));
+            for lambda in [0.0, 1e-3, 10.0] {
+                let mut problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+                let interior = interior_point(&factor, lambda, &polyhedron.half_spaces()).unwrap();
+                let solution = problem.solve(lambda);
+                let cost =
+                    |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
+                assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
+                assert!(solution.faces.bounds.iter().any(Option::is_some));
+                assert!(solution.faces.rows.iter().all(|on| *on), "{lambda}");
+                let corrected = problem.corrected(&solution.faces, &solution.q, lambda);
+                assert_eq!(corrected, solution.faces);
+            }
+        }
     }
 }
