@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all.
+//! Files that are written whole or not at all, and tables as their text.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -27,4 +27,14 @@ pub fn prepared(path: &Path, text: &str) -> io::Result<NamedTempFile> {
     file.write_all(text.as_bytes())?;
     file.flush()?;
     Ok(file)
+}
+
+/// Lines of cells as CSV, the names of the columns first; every line has as many cells.
+pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in std::iter::once(header).chain(lines) {
+        // Memory takes whatever is written to it.
+        let _ = writer.write_record(line);
+    }
+    writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
 }

@@ -1,13 +1,13 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
 mod check;
-mod closing;
 mod compare;
 mod compensate;
 mod completions;
 mod diagnostic;
 mod identify;
 mod input;
+mod loop_command;
 mod man;
 mod outcome;
 mod output;
@@ -51,7 +51,7 @@ enum Command {
     /// Rank the effects that the residual points to; changes nothing.
     Trace(trace::Arguments),
     /// Find the effects that a problem lacks and add them, until nothing is left to find.
-    Loop(closing::Arguments),
+    Loop(loop_command::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
@@ -82,7 +82,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
-        Command::Loop(arguments) => closing::run(&arguments),
+        Command::Loop(arguments) => loop_command::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),

@@ -4,7 +4,7 @@
 //! derivatives of a position over its σ (3 rows a pose), P = diag(1/σ²) of the priors; C = M⁻¹ is the covariance to expect.
 //! Positions need not be measured for that.
 
-mod candidates;
+mod candidate_poses;
 mod check;
 mod criterion;
 mod error;
@@ -17,7 +17,7 @@ mod sensitivity;
 mod separate;
 mod site;
 
-pub use candidates::Extremes;
+pub use candidate_poses::Extremes;
 pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
 pub use criterion::Criterion;
 pub use error::DesignError;

@@ -1,13 +1,14 @@
 //! The best of several exchanges, beside poses drawn at random.
 
+use rand::Rng;
 use rand::seq::SliceRandom as _;
-use rand::{Rng, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site};
 use crate::measurement::{Measurements, different};
+use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
+use crate::random;
 
 /// Candidates drawn from ranges, evenly and with a liking for the ends.
 pub(super) const DRAWN: [usize; 2] = [500, 2000];
@@ -230,14 +231,17 @@ impl Plan {
     /// 1 σ of parameter k after random poses, the median of the draws, SI; `None` where most of them say nothing.
     pub fn random_error(&self, k: usize) -> Option<f64> {
         let errors = self.random.iter().map(|forecast| forecast.expected[k].std_error);
-        Some(median(errors.map(|error| error.unwrap_or(f64::INFINITY)))).filter(|error| error.is_finite())
+        median(errors.map(|error| error.unwrap_or(f64::INFINITY))).filter(|error| error.is_finite())
     }
 
     /// The arm's parameters that random poses identify to 90 % or more (median of the draws), by their numbers.
     pub fn meaningful(&self) -> Vec<usize> {
         let share = |k: usize| median(self.random.iter().map(|forecast| forecast.expected[k].identified));
         let arm = |k: &usize| !self.planned.expected[*k].is_placement;
-        (0..self.planned.expected.len()).filter(arm).filter(|&k| share(k) >= Forecast::WELL).collect()
+        (0..self.planned.expected.len())
+            .filter(arm)
+            .filter(|&k| share(k).is_some_and(|share| share >= Forecast::WELL))
+            .collect()
     }
 
     /// By what factor the plan's standard errors are smaller than those of random poses: the geometric mean over these
@@ -253,19 +257,10 @@ impl Plan {
 
 /// `count` of `all` numbers (all of them, if there are fewer), in random order.
 pub(super) fn choose(all: usize, count: usize, seed: u64, stream: u64) -> Vec<usize> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    shuffled(all, count, &mut random)
+    shuffled(all, count, &mut random::stream(seed, stream))
 }
 
 fn shuffled(all: usize, count: usize, random: &mut impl Rng) -> Vec<usize> {
     let mut numbers: Vec<usize> = (0..all).collect();
     numbers.partial_shuffle(random, count.min(all)).0.to_vec()
-}
-
-/// The middle one of an odd number of values.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::criterion::{Size, Yardstick, part};
+use crate::numeric::bisected;
 
 /// Candidates multiplied together.
 const TOGETHER: usize = 256;
@@ -160,12 +161,7 @@ fn largest(values: &DVector<f64>, w: &DMatrixView<f64>, s: &Matrix3<f64>, least:
     if !is_below(limit) {
         return f64::INFINITY;
     }
-    let (mut low, mut high) = (0.0, limit);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if is_below(middle) { high = middle } else { low = middle }
-    }
-    high.ln()
+    bisected(|t| !is_below(t), (0.0, limit), HALVINGS).1.ln()
 }
 
 /// Number of positive eigenvalues of S − Yᵀ(Λ − t)⁻¹Y.

@@ -6,6 +6,7 @@ use super::plan::{DRAWN, DRAWS, EVENLY, FIRST_DRAW, choose};
 use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
 use crate::diagnose::{Separation, separation};
 use crate::measurement::Measurements;
+use crate::numeric::median;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Two effects to tell apart, and a problem that declares both.
@@ -113,6 +114,6 @@ pub fn separate(
 impl Separated {
     /// The median over random poses of something about a separation; infinite where most of them say nothing.
     pub fn random(&self, of: impl Fn(&Separation) -> Option<f64>) -> f64 {
-        super::plan::median(self.random.iter().map(|own| of(own).unwrap_or(f64::INFINITY)))
+        median(self.random.iter().map(|own| of(own).unwrap_or(f64::INFINITY))).unwrap_or(f64::NAN)
     }
 }

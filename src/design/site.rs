@@ -1,10 +1,6 @@
 //! The arm where it is to be measured.
 
-use std::f64::consts::TAU;
-
 use nalgebra::DVector;
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::{DesignError, Sensitivity};
@@ -13,6 +9,7 @@ use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::model::parameter::{BeamField, Parameter, Slot};
 use crate::problem::Problem;
+use crate::random;
 
 /// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter \[kg\].
 const PROBE_MASS: f64 = 1.0;
@@ -67,11 +64,10 @@ impl<'a> Site<'a> {
 
     /// The same about `count` arms drawn from the priors; parameters without one stay nominal, and arms that do not come to
     /// rest in all of the poses are left out.
-    pub(super) fn arms(&self, table: &Measurements, count: usize, (seed, stream): (u64, u64)) -> Vec<Sensitivity> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(stream);
+    pub(super) fn arms(&self, table: &Measurements, count: usize, stream: (u64, u64)) -> Vec<Sensitivity> {
+        let mut random = random::stream(stream.0, stream.1);
         let mut draw = |parameter: &Parameter| {
-            let number = normal(&mut random) * parameter.sigma.unwrap_or(0.0);
+            let number = random::normal(&mut random) * parameter.sigma.unwrap_or(0.0);
             number.clamp(parameter.lower, parameter.upper)
         };
         let n = self.model.parameters.len();
@@ -100,10 +96,4 @@ impl<'a> Site<'a> {
         let rows: Vec<usize> = (0..all.len()).filter(|&row| all.is_finite(row)).collect();
         if rows.len() == all.len() { (table.clone(), all) } else { (table.select(&rows), all.select(&rows)) }
     }
-}
-
-/// A standard normal number (Box and Muller).
-fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let (u, v): (f64, f64) = (random.random(), random.random());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
 }

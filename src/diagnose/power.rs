@@ -3,6 +3,7 @@
 use statrs::function::beta::beta_reg;
 
 use super::rules::SelectionRules;
+use crate::numeric::bisected;
 
 /// Halvings of the interval in which a noncentrality is sought.
 const HALVINGS: usize = 24;
@@ -32,7 +33,8 @@ impl ScanTest {
         if k == 0 || left < 0.5 {
             return None;
         }
-        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > SelectionRules::DEFAULT.level / tries, (0.0, 1.0));
+        let level = SelectionRules::DEFAULT.level / tries;
+        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > level, (0.0, 1.0));
         let better = -(-(k as f64 * freedom.ln() + 2.0 * tries.ln()) / freedom).exp_m1();
         Some(Self { new, left, threshold: chance.max(better) })
     }
@@ -73,12 +75,9 @@ impl ScanTest {
     }
 }
 
-/// Where `is_below` turns false.
-fn halved(is_below: impl Fn(f64) -> bool, (mut low, mut high): (f64, f64)) -> f64 {
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if is_below(middle) { low = middle } else { high = middle }
-    }
+/// The middle of the interval in which `is_below` turns false.
+fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
+    let (low, high) = bisected(is_below, range, HALVINGS);
     0.5 * (low + high)
 }
 

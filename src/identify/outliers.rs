@@ -7,6 +7,7 @@ use super::stage::Stage;
 use crate::error::Location;
 use crate::least_squares::residual_vector;
 use crate::measurement::Measurements;
+use crate::numeric::median;
 
 /// Probability that noise alone makes any pose an outlier.
 const BY_CHANCE: f64 = 0.01;
@@ -47,7 +48,9 @@ impl Lengths {
         let least = if noise_is_declared { 1.0 } else { 0.0 };
         // Three degrees of freedom are a distribution.
         let Ok(squares) = ChiSquared::new(3.0) else { return Self { values, scatter: 1.0, limit: f64::INFINITY } };
-        let scatter = median(&values) / squares.inverse_cdf(0.5).sqrt() / freedom.clamp(0.01, 1.0).sqrt();
+        let scatter = median(values.iter().copied()).unwrap_or(0.0)
+            / squares.inverse_cdf(0.5).sqrt()
+            / freedom.clamp(0.01, 1.0).sqrt();
         let limit = squares.inverse_cdf(1.0 - BY_CHANCE / values.len().max(1) as f64).sqrt();
         Self { values, scatter: scatter.max(least), limit }
     }
@@ -69,17 +72,5 @@ impl Lengths {
             Some(Outlier { row, location: measurements.location(row), distance, error })
         };
         rows.iter().zip(&self.values).zip(errors).filter_map(outlier).collect()
-    }
-}
-
-/// Middle value, 0 of none.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let upper = sorted.len() / 2;
-    match sorted.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => sorted[upper],
-        _ => 0.5 * (sorted[upper - 1] + sorted[upper]),
     }
 }

@@ -38,7 +38,7 @@ impl Model {
         Self {
             nominal: arm,
             driven: self.commands(x.as_slice()).into_driven(),
-            observation: self.observed(x.as_slice()),
+            instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             parameters,

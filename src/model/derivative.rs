@@ -10,7 +10,7 @@ use super::Model;
 use super::driven::Commands;
 use super::elastic::Elastic;
 use super::inputs::inputs;
-use super::observation::Observation;
+use super::instrument::Instrument;
 use super::pose::Pose;
 use super::rigid::Rigid;
 use super::rows::Rows;
@@ -23,7 +23,7 @@ use crate::spatial::{Frame, rotation_axes};
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
     commands: Commands,
-    observation: Observation,
+    instrument: Instrument,
     /// Columns of what the measurement does: scale, and shifts by axis and driver.
     scale: Option<usize>,
     shifts: Vec<(usize, Driver, usize)>,
@@ -88,8 +88,8 @@ impl Linearised {
             Inner::Rigid(Rigid::new(&arm, inputs))
         };
         let commands = model.commands(x.as_slice());
-        let observation = model.observed(x.as_slice());
-        Self { commands, observation, scale, shifts, bases, targets, inner }
+        let instrument = model.instrument_at(x.as_slice());
+        Self { commands, instrument, scale, shifts, bases, targets, inner }
     }
 
     /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros.
@@ -99,7 +99,7 @@ impl Linearised {
         let setup = self.commands.apply(&pose.setup);
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
-        let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.observation.scale) };
+        let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
         let Some(last) = self.inner.write(&pose.setup, &setup, base, target, &mut rows) else {
             rows.put(last_column, &Vector3::from_element(f64::NAN));
             return;
@@ -121,7 +121,7 @@ impl Linearised {
         for &(axis, driver, column) in &self.shifts {
             rows.put(column, &Vector3::ith(axis, driver.value(&pose.setup)));
         }
-        let seen = self.observation.of(&predicted, &pose.setup);
+        let seen = self.instrument.of(&predicted, &pose.setup);
         rows.put(last_column, &(seen - pose.measured));
     }
 }

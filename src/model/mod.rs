@@ -9,7 +9,7 @@ pub mod effect;
 mod elastic;
 mod enter;
 mod inputs;
-mod observation;
+mod instrument;
 pub mod parameter;
 mod pose;
 mod poses;
@@ -30,7 +30,7 @@ use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use driven::{Commands, Driven};
-use observation::Observation;
+use instrument::Instrument;
 
 /// What predicts positions, as a function of the free parameters.
 #[derive(Debug, Clone)]
@@ -38,7 +38,7 @@ pub struct Model {
     nominal: Arm<f64>,
     /// What drives joints beyond their commands without being free.
     driven: Vec<Driven>,
-    observation: Observation,
+    instrument: Instrument,
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
@@ -64,7 +64,7 @@ impl Model {
             constraints: constrain(problem, bases, targets, effects, &parameters)?,
             nominal,
             driven: Vec::new(),
-            observation: Observation::default(),
+            instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
             parameters,
@@ -128,8 +128,8 @@ impl Model {
     }
 
     /// What the instrument makes of positions at the full parameter vector `x`.
-    fn observed(&self, x: &[f64]) -> Observation {
-        self.observation.with(&self.parameters, x)
+    fn instrument_at(&self, x: &[f64]) -> Instrument {
+        self.instrument.with(&self.parameters, x)
     }
 
     /// Base poses in the measuring frame: translation \[m\] and rotation vector \[rad\].

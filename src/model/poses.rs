@@ -76,7 +76,7 @@ impl<'a> PoseResiduals<'a> {
         let arm = self.model.arm(|k| full[k]);
         let bases = self.model.base_frames(full.as_slice());
         let targets = self.model.target_positions(full.as_slice());
-        let observation = self.model.observed(full.as_slice());
+        let instrument = self.model.instrument_at(full.as_slice());
         let mut commands = self.model.commands(full.as_slice());
         let mut ws = Workspace::default();
         let mut rest = Equilibrated::default();
@@ -84,7 +84,7 @@ impl<'a> PoseResiduals<'a> {
             let predicted = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
                 Ok(()) => {
                     let position = bases[pose.base].point(&rest.frame.point(&targets[pose.target]));
-                    observation.of(&position, &pose.setup)
+                    instrument.of(&position, &pose.setup)
                 }
                 Err(_) => Vector3::from_element(f64::NAN),
             };

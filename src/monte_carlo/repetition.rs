@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{DVector, Vector3};
-use rand::{Rng as _, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng as _;
 
 use super::study::{Cell, Source, Study};
 use super::tally::{Fitted, ParameterScore, Score};
@@ -12,6 +11,7 @@ use crate::identify::{Estimate, Identification, IdentifyError, Options, Placemen
 use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
+use crate::random::stream;
 use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
 
 /// Measurements whose truth is known.
@@ -68,9 +68,7 @@ fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
 
 /// A seed of its own for each repetition.
 fn seed_of(study: &Study, repetition: usize) -> u64 {
-    let mut random = ChaCha8Rng::seed_from_u64(study.seed);
-    random.set_stream(repetition as u64);
-    random.next_u64()
+    stream(study.seed, repetition as u64).next_u64()
 }
 
 /// Positions that the model predicts for an arm as declared \[m\].

@@ -3,6 +3,7 @@
 use super::study::{Cell, Study};
 use super::tally::{ParameterTally, Tally};
 use crate::model::parameter::Parameter;
+use crate::numeric::median;
 
 /// A finished study.
 #[derive(Debug, Clone)]
@@ -102,11 +103,9 @@ impl CellResult {
 
     /// How long the fits took.
     pub fn timing(&self) -> Timing {
-        let mut sorted = self.seconds.clone();
-        sorted.sort_by(f64::total_cmp);
-        let at = |index: usize| sorted.get(index).copied().unwrap_or(0.0);
-        let median = 0.5 * (at(sorted.len() / 2) + at(sorted.len().saturating_sub(1) / 2));
-        Timing { median, slowest: at(sorted.len().saturating_sub(1)), total: sorted.iter().sum() }
+        let seconds = || self.seconds.iter().copied();
+        let median = median(seconds()).unwrap_or(0.0);
+        Timing { median, slowest: seconds().fold(0.0, f64::max), total: seconds().sum() }
     }
 }
 

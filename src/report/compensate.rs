@@ -7,6 +7,7 @@ use super::json::{object, to_text};
 use super::quantity::{fixed, mm};
 use super::render::text;
 use super::table;
+use crate::files::csv;
 use crate::identify::Command;
 use crate::measurement::Measurements;
 use crate::problem::Problem;
@@ -82,5 +83,5 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         cells.push(command.is_reached().to_string());
         cells
     };
-    table::csv(header, commands.iter().map(line))
+    csv(header, commands.iter().map(line))
 }

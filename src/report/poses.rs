@@ -1,7 +1,8 @@
 //! Poses to measure, as a table.
 
 use super::quantity::fixed;
-use super::table::{commands, csv, sessions, word};
+use super::table::{commands, sessions, word};
+use crate::files::csv;
 use crate::measurement::Measurements;
 use crate::problem::{HeldOut, Problem};
 

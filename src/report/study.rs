@@ -7,6 +7,7 @@ use super::json::{object, to_text};
 use super::quantity::{number, or_dash};
 use super::render::text;
 use super::table;
+use crate::files;
 use crate::monte_carlo::{CellResult, ParameterResult, Results, Source, Study, Tally};
 
 /// First columns of every table.
@@ -223,5 +224,5 @@ fn plain(value: Option<f64>) -> String {
 }
 
 fn csv(header: &str, lines: impl Iterator<Item = Vec<String>>) -> String {
-    table::csv(table::names(&format!("{CELL},{header}")), lines)
+    files::csv(table::names(&format!("{CELL},{header}")), lines)
 }

@@ -5,16 +5,6 @@ use std::f64::consts::PI;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, Problem};
 
-/// Lines of cells as CSV, the names of the columns first; every line has as many cells.
-pub(super) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for line in std::iter::once(header).chain(lines) {
-        // Memory takes whatever is written to it.
-        let _ = writer.write_record(line);
-    }
-    writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
-}
-
 /// Names of columns.
 pub(super) fn names(names: &str) -> Vec<String> {
     names.split(',').map(str::to_owned).collect()

@@ -1,10 +1,8 @@
 //! Measurements of the true arm in poses drawn at random.
 
-use std::f64::consts::TAU;
-
 use nalgebra::Vector3;
+use rand::RngExt;
 use rand::seq::SliceRandom;
-use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
@@ -13,6 +11,7 @@ use super::truth::Truth;
 use super::{NoRest, Rig};
 use crate::problem::pattern::matches;
 use crate::problem::{HeldOut, Joint, JointKind, PoseConditions, Problem};
+use crate::random::{normal, stream};
 
 /// Streams of random numbers of one seed, so that none shifts when another is used more.
 const DEVIATIONS: u64 = 0;
@@ -116,18 +115,6 @@ pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Re
         rows,
         split_column,
     })
-}
-
-fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    random
-}
-
-/// A standard normal number (Box and Muller).
-fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let (u, v): (f64, f64) = (random.random(), random.random());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
 }
 
 fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {

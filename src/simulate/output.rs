@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
+use crate::files::csv;
 use crate::problem::{Joint, JointKind};
 
 #[derive(Serialize)]
@@ -33,12 +34,7 @@ impl Simulation {
     /// `measurements.csv`.
     pub fn csv(&self) -> String {
         let rows = self.rows.iter().enumerate().map(|(index, row)| self.cells(index + 1, row));
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        for cells in std::iter::once(self.header()).chain(rows) {
-            // Writing to memory cannot fail, and every row has the cells of the header.
-            let _ = writer.write_record(cells);
-        }
-        String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+        csv(self.header(), rows)
     }
 
     /// Joints that take a q: index, and whether they turn.

@@ -20,15 +20,18 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("quantity", &[]),
     ("spatial", &[&["scalar"]]),
     ("error", &[]),
-    // Files written whole or not at all.
+    // Files written whole or not at all, and tables.
     ("files", &[]),
+    // Small methods: medians, bisection, random numbers.
+    ("numeric", &[]),
+    ("random", &[]),
     ("problem", &[&["quantity", "error", "spatial"]]),
     ("measurement", &[&["quantity", "error", "problem"]]),
     // Least squares knows no arms.
     ("least_squares", &[&["scalar", "error"]]),
     // The physics knows no sensors; the test rig shares no physics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
-    ("simulate", &[&["scalar", "spatial", "quantity", "error", "problem"]]),
+    ("simulate", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
     ("model", &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]]),
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
@@ -38,7 +41,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),
     // Many fits to what model or rig measure.
     ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate", "files"]]),
-    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo"]]),
+    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "files"]]),
     (
         "cli",
         &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "files"]],
@@ -48,7 +51,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
         &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "cli"]],
     ),
 ];
-const BELOW_IDENTIFY: &[&str] = &["mechanics", "model", "paper", "least_squares"];
+const BELOW_IDENTIFY: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
 
 /// Rooms that read no files.
 const WITHOUT_FILES: &[&str] = &["scalar", "spatial", "quantity", "least_squares", "mechanics", "model"];

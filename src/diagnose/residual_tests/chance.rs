@@ -2,6 +2,8 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
+use crate::numeric::bisected;
+
 /// Draws that must reach a value for their share to be its probability; else the tail is that of a gamma distribution.
 const ENOUGH: usize = 10;
 /// Least skewness of the gamma distribution; with less it is normal.
@@ -125,14 +127,5 @@ fn anderson_darling_p(statistic: f64) -> f64 {
 
 /// The value that is reached with probability `level`, by bisection.
 fn anderson_darling_upper(level: f64) -> f64 {
-    let (mut low, mut high) = (0.0, LARGEST);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if anderson_darling_p(middle) > level {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    bisected(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
 }

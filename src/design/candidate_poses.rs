@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use rand::{RngExt as _, SeedableRng as _};
+use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use super::DesignError;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, PoseRanges, Problem};
+use crate::random;
 
 /// Angles are commanded in steps of this [°].
 const ANGLE_STEP: f64 = 1e-4;
@@ -50,7 +51,7 @@ impl PoseRanges {
     /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by
     /// itself; positions are zero.
     pub fn draw(&self, problem: &Problem, count: usize, extremes: Extremes, seed: u64, stream: u64) -> Measurements {
-        let (mut random, mut apart) = (stream_of(seed, stream), stream_of(seed, APART + stream));
+        let (mut random, mut apart) = (random::stream(seed, stream), random::stream(seed, APART + stream));
         let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
             let (kind, within) = (random.random::<f64>(), random.random::<f64>());
             match extremes {
@@ -81,7 +82,7 @@ impl PoseRanges {
         reach: f64,
         (seed, stream): (u64, u64),
     ) -> Measurements {
-        let mut random = stream_of(seed, stream);
+        let mut random = random::stream(seed, stream);
         let mut drawn = Table::new(self, problem.joints.len());
         for row in 0..poses.len() {
             let own = Draft::of(self, poses, row);
@@ -108,12 +109,6 @@ impl PoseRanges {
         }
         drawn.finish()
     }
-}
-
-fn stream_of(seed: u64, stream: u64) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    random
 }
 
 /// A pose as it is drawn.

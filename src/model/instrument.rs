@@ -1,4 +1,4 @@
-//! From positions to what is measured of them.
+//! What the measuring instrument makes of a position.
 
 use nalgebra::Vector3;
 
@@ -7,25 +7,25 @@ use crate::problem::PoseView;
 
 /// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Observation {
+pub(super) struct Instrument {
     /// s.
     pub scale: f64,
     /// Axis, driver and size [m per unit of the driver].
     shifts: Vec<(usize, Driver, f64)>,
 }
 
-impl Observation {
+impl Instrument {
     /// The same with the free parameters at the full parameter vector `x`.
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
-        let mut observation = self.clone();
+        let mut instrument = self.clone();
         for (parameter, &x) in parameters.iter().zip(x) {
             match parameter.slot {
-                Slot::Scale => observation.scale += x,
-                Slot::Shift { axis } => observation.shifts.push((axis, parameter.driver, x)),
+                Slot::Scale => instrument.scale += x,
+                Slot::Shift { axis } => instrument.shifts.push((axis, parameter.driver, x)),
                 _ => {}
             }
         }
-        observation
+        instrument
     }
 
     /// What is measured of a position, measuring frame \[m\].

@@ -1,0 +1,37 @@
+//! Small numerical methods that several rooms need.
+
+/// The median of some values, the mean of the two in the middle of an even number; `None` of none.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().collect();
+    sorted.sort_by(f64::total_cmp);
+    let upper = *sorted.get(sorted.len() / 2)?;
+    Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
+}
+
+/// The interval in which `is_below` turns false, after so many halvings.
+pub(crate) fn bisected(is_below: impl Fn(f64) -> bool, (mut low, mut high): (f64, f64), halvings: usize) -> (f64, f64) {
+    for _ in 0..halvings {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) { low = middle } else { high = middle }
+    }
+    (low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_of_few_values() {
+        assert_eq!(median([]), None);
+        assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median([1.0, f64::INFINITY, f64::INFINITY, 2.0]), Some(f64::INFINITY));
+    }
+
+    #[test]
+    fn a_root_is_bracketed() {
+        let (low, high) = bisected(|x| x * x < 2.0, (0.0, 2.0), 40);
+        assert!(low < 2.0_f64.sqrt() && 2.0_f64.sqrt() <= high && high - low < 1e-11);
+    }
+}
