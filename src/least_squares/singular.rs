@@ -1,52 +1,49 @@
 //! Singular values by one-sided Jacobi rotations: slow for large matrices, exact and never failing for ours.
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 
 use super::kernel::dot;
 
 /// Sweeps over all pairs of columns; five are usual.
 const SWEEPS: usize = 60;
 
-/// One singular triplet of B = U Σ Vᵀ, with what U makes of a constant c.
+/// B = U Σ Vᵀ, with what U makes of a constant c; in no order.
 #[derive(Debug, Clone)]
-pub(super) struct Triplet {
+pub(super) struct Decomposition {
+    /// σᵢ vᵢ as columns.
+    pub columns: DMatrix<f64>,
     /// σᵢ.
-    pub singular: f64,
+    pub singular: Vec<f64>,
     /// `uᵢᵀc`.
-    pub projected: f64,
-    /// vᵢ; zero where σᵢ is.
-    pub direction: DVector<f64>,
+    pub projected: DVector<f64>,
 }
 
-/// The triplets of B in no order; without `constant` nothing is projected.
-///
-/// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they become σᵢ Pᵀvᵢ, and the same
-/// rotations turn Qᵀc into Uᵀc.                                                   [Hestenes 1958; Drmač & Veselić 2008]
-///
-/// The last rows of R, all together shorter than `cut`·σ₁/8, are left out before: they add no more than the square of that
-/// to any σ², and would be the slowest to rotate.
-pub(super) fn triplets(matrix: &DMatrix<f64>, constant: Option<&DVector<f64>>, cut: f64) -> Vec<Triplet> {
-    let n = matrix.ncols();
-    let qr = matrix.clone().col_piv_qr();
-    let triangle = qr.r();
-    // No row from k on is longer than √n |Rₖₖ|.
-    let least = cut / (8.0 * n as f64) * triangle.get((0, 0)).map_or(0.0, |first| first.abs());
-    let rank = (0..triangle.nrows()).take_while(|&k| triangle[(k, k)].abs() > least).count();
-    let mut columns = triangle.rows(0, rank).transpose();
-    let mut projected = DVector::zeros(rank);
-    if let Some(constant) = constant {
-        let mut rotated = constant.clone();
-        qr.q_tr_mul(&mut rotated);
-        projected.copy_from(&rotated.rows(0, rank));
+impl Decomposition {
+    /// Of B and c; without `constant` nothing is projected.
+    ///
+    /// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they become σᵢ Pᵀvᵢ, and the same
+    /// rotations turn Qᵀc into Uᵀc.                                               [Hestenes 1958; Drmač & Veselić 2008]
+    ///
+    /// The last rows of R, all together shorter than `cut`·σ₁/8, are left out before: they add no more than the square of that
+    /// to any σ², and would be the slowest to rotate.
+    pub fn new(matrix: &DMatrix<f64>, constant: Option<&DVector<f64>>, cut: f64) -> Self {
+        let qr = matrix.clone().col_piv_qr();
+        let triangle = qr.r();
+        // No row from k on is longer than √n |Rₖₖ|.
+        let least = cut / (8.0 * matrix.ncols() as f64) * triangle.get((0, 0)).map_or(0.0, |first| first.abs());
+        let rank = (0..triangle.nrows()).take_while(|&k| triangle[(k, k)].abs() > least).count();
+        let mut columns = triangle.rows(0, rank).transpose();
+        let mut projected = DVector::zeros(rank);
+        if let Some(constant) = constant {
+            let mut rotated = constant.clone();
+            qr.q_tr_mul(&mut rotated);
+            projected.copy_from(&rotated.rows(0, rank));
+        }
+        orthogonalise(&mut columns, &mut projected);
+        qr.p().inv_permute_rows(&mut columns);
+        let singular = columns.column_iter().map(|column| column.norm()).collect();
+        Self { columns, singular, projected }
     }
-    orthogonalise(&mut columns, &mut projected);
-    let triplet = |(column, &projected): (DVectorView<f64>, &f64)| {
-        let singular = column.norm();
-        let mut direction = if singular.is_normal() { column / singular } else { DVector::zeros(n) };
-        qr.p().inv_permute_rows(&mut direction);
-        Triplet { singular, projected, direction }
-    };
-    columns.column_iter().zip(projected.iter()).map(triplet).collect()
 }
 
 /// Singular values of a matrix and the directions that belong to them.
@@ -62,11 +59,13 @@ impl SingularValues {
     /// Of a matrix with at least as many rows as columns.
     pub fn of(matrix: &DMatrix<f64>) -> Self {
         let n = matrix.ncols();
-        let mut found = triplets(matrix, None, 0.0);
-        found.sort_by(|a, b| b.singular.total_cmp(&a.singular));
-        let values = found.iter().map(|own| own.singular).chain(std::iter::repeat(0.0)).take(n).collect();
-        let mut right = DMatrix::zeros(n, n);
-        right.column_iter_mut().zip(&found).for_each(|(mut column, own)| column.copy_from(&own.direction));
+        let Decomposition { columns, singular, .. } = Decomposition::new(matrix, None, 0.0);
+        let mut order: Vec<usize> = (0..singular.len()).collect();
+        order.sort_by(|&a, &b| singular[b].total_cmp(&singular[a]));
+        let mut values: Vec<f64> = order.iter().map(|&k| singular[k]).collect();
+        values.resize(n, 0.0);
+        let right =
+            DMatrix::from_fn(n, n, |i, j| if values[j].is_normal() { columns[(i, order[j])] / values[j] } else { 0.0 });
         Self { values, right }
     }
 }

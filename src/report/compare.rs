@@ -1,13 +1,14 @@
 //! What `compare` says and writes: the paper's tables 2 and 3 for the problem at hand, every strategy and every ablation.
 
+use serde::{Serialize, Serializer};
+
 use super::document::{Block, Headline, Table, code};
 use super::figures::{Figure, PlotData};
 use super::identify::{change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
 use super::json::{Both, object, to_text};
-use super::quantity::{mm, number};
+use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
-use crate::least_squares::solver::Termination;
 use crate::model::Ablation;
 use crate::problem::Problem;
 
@@ -43,79 +44,70 @@ const ROWS: [&str; 9] =
 const TIME: usize = 7;
 
 /// One fit among others.
-pub(super) struct Fit<'a> {
+#[derive(Debug, Serialize)]
+struct Row<'a> {
     strategy: &'a str,
     solver: &'a str,
+    #[serde(flatten, serialize_with = "both")]
     errors: &'a Errors,
-    steps: u64,
+    iterations: u64,
     evaluations: u64,
     seconds: f64,
-    termination: Termination,
+    termination: &'a str,
     trusted: bool,
-    chi2: Option<f64>,
-    condition: Option<f64>,
+    reduced_chi2: Option<f64>,
+    condition_number: Option<f64>,
 }
 
-impl<'a> From<&'a Identification> for Fit<'a> {
+impl<'a> From<&'a Identification> for Row<'a> {
     fn from(own: &'a Identification) -> Self {
         Self {
             strategy: own.strategy.as_str(),
             solver: own.solver.as_str(),
             errors: &own.fitted,
-            steps: own.iterations,
+            iterations: own.iterations,
             evaluations: own.evaluations,
             seconds: own.seconds,
-            termination: own.termination,
+            termination: own.termination.as_str(),
             trusted: own.is_trusted(),
-            chi2: own.reduced_chi2,
-            condition: Some(own.identifiability.condition_number()),
+            reduced_chi2: own.reduced_chi2,
+            condition_number: Some(own.identifiability.condition_number()),
         }
     }
 }
 
-impl<'a> From<&'a Baseline> for Fit<'a> {
+impl<'a> From<&'a Baseline> for Row<'a> {
     fn from(own: &'a Baseline) -> Self {
         Self {
             strategy: own.strategy(),
             solver: SolverChoice::PseudoInverse.as_str(),
             errors: &own.errors,
-            steps: own.iterations,
+            iterations: own.iterations,
             evaluations: own.evaluations,
             seconds: own.seconds,
-            termination: own.termination,
+            termination: own.termination.as_str(),
             trusted: own.termination.converged(),
-            chi2: None,
-            condition: None,
+            reduced_chi2: None,
+            condition_number: None,
         }
     }
 }
 
+fn both<S: Serializer>(errors: &Errors, serializer: S) -> Result<S::Ok, S::Error> {
+    Both::of(errors).serialize(serializer)
+}
+
 /// Every strategy and solver, the paper's own last.
-fn fits(comparison: &Comparison) -> Vec<Fit<'_>> {
-    comparison.strategies.iter().map(Fit::from).chain(comparison.paper.iter().map(Fit::from)).collect()
+fn fits(comparison: &Comparison) -> Vec<Row<'_>> {
+    comparison.strategies.iter().map(Row::from).chain(comparison.paper.iter().map(Row::from)).collect()
 }
 
 object! {
     Document<'a>(problem: &'a Problem, comparison: &'a Comparison) {
         problem: &'a str = &problem.name,
         registered: Both = Both::of(&comparison.joint.registered),
-        rows: Vec<Row<'a>> = fits(comparison).iter().map(Row::of).collect(),
+        rows: Vec<Row<'a>> = fits(comparison),
         ablations: Vec<Ablated<'a>> = comparison.ablations.iter().map(Ablated::of).collect(),
-    }
-}
-object! {
-    Row<'a>(fit: &Fit<'a>) {
-        strategy: &'a str = fit.strategy,
-        solver: &'a str = fit.solver,
-        #[serde(flatten)]
-        errors: Both = Both::of(fit.errors),
-        iterations: u64 = fit.steps,
-        evaluations: u64 = fit.evaluations,
-        seconds: f64 = fit.seconds,
-        termination: &'a str = fit.termination.as_str(),
-        trusted: bool = fit.trusted,
-        reduced_chi2: Option<f64> = fit.chi2,
-        condition_number: Option<f64> = fit.condition,
     }
 }
 object! {
@@ -124,7 +116,7 @@ object! {
         elasticity: &'a str = own.0.as_str(),
         parameters: usize = own.1.unknowns.len(),
         #[serde(flatten)]
-        row: Row<'a> = Row::of(&Fit::from(&own.1)),
+        row: Row<'a> = Row::from(&own.1),
     }
 }
 
@@ -197,7 +189,7 @@ fn strategies(comparison: &Comparison) -> Table {
 fn in_full(comparison: &Comparison) -> Table {
     let mut table = untimed(strategies(comparison));
     table.header.extend(["fitted mean", "held out, largest"]);
-    for (row, Fit { errors, .. }) in table.rows.iter_mut().zip(fits(comparison)) {
+    for (row, Row { errors, .. }) in table.rows.iter_mut().zip(fits(comparison)) {
         row.extend([errors.identification.mean.norm, errors.held_out.max.norm].map(|error| mm(error, 4)));
     }
     table
@@ -221,18 +213,18 @@ fn untimed(mut table: Table) -> Table {
     Table { left: vec![0, 1, 8], ..table }
 }
 
-fn cells(name: &str, fit: &Fit) -> Vec<String> {
+fn cells(name: &str, fit: &Row) -> Vec<String> {
     vec![
         name.to_owned(),
         fit.solver.to_owned(),
         mm(fit.errors.held_out.mean.norm, 4),
         mm(fit.errors.held_out.rms.norm, 4),
         mm(fit.errors.identification.rms.norm, 4),
-        fit.steps.to_string(),
+        fit.iterations.to_string(),
         fit.evaluations.to_string(),
         number(fit.seconds * 1e3, 1),
-        fit.condition.map_or_else(|| "–".to_owned(), |condition| format!("{condition:.1e}")),
-        fit.termination.as_str().to_owned(),
+        or_dash(fit.condition_number, |condition| format!("{condition:.1e}")),
+        fit.termination.to_owned(),
     ]
 }
 

@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interior_point_and_polish_agree_on_a_badly_scaled_box() {
+    fn interior_point_and_polish_agree_on_a_badly_scaled_box_and_polyhedron() {
         let n = 8;
         let spread = |j: usize| 10.0_f64.powf(0.75 * j as f64);
         let matrix =
@@ -173,23 +173,25 @@ mod tests {
         let upper = DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 / spread(j) });
         lower[2] = f64::NEG_INFINITY;
         let bounds = Bounds::new(lower, upper).unwrap();
-        // Without rows, and with one that the box alone would leave.
         let row = DMatrix::from_fn(1, n, |_, j| spread(j));
-        let limited = Inequalities::new(row, DVector::from_element(1, -0.2), DVector::from_element(1, f64::INFINITY));
-        for rows in [Inequalities::none(n), limited.unwrap()] {
-            let polyhedron = Polyhedron::around(&DVector::zeros(n), &bounds, &rows, &DVector::from_element(n, 1.0));
-            for lambda in [0.0, 1e-3, 10.0] {
-                let mut problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
-                let interior = interior_point(&factor, lambda, &polyhedron.half_spaces()).unwrap();
-                let solution = problem.solve(lambda);
-                let cost =
-                    |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
-                assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
-                assert!(solution.faces.bounds.iter().any(Option::is_some));
-                assert!(solution.faces.rows.iter().all(|on| *on), "{lambda}");
-                let corrected = problem.corrected(&solution.faces, &solution.q, lambda);
-                assert_eq!(corrected, solution.faces);
-            }
+        let check = |rows: &Inequalities, lambda: f64| {
+            let polyhedron = Polyhedron::around(&DVector::zeros(n), &bounds, rows, &DVector::from_element(n, 1.0));
+            let mut problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+            let interior = interior_point(&factor, lambda, &polyhedron.half_spaces()).unwrap();
+            let solution = problem.solve(lambda);
+            let cost =
+                |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
+            assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
+            assert!(solution.faces.bounds.iter().any(Option::is_some));
+            assert_eq!(problem.corrected(&solution.faces, &solution.q, lambda), solution.faces);
+            solution
+        };
+        for lambda in [0.0, 1e-3, 10.0] {
+            let boxed = check(&Inequalities::none(n), lambda);
+            // A row that the minimiser in the box leaves.
+            let limit = DVector::from_element(1, 0.5 * (&row * &boxed.q)[0].abs());
+            let solution = check(&Inequalities::new(row.clone(), -&limit, limit).unwrap(), lambda);
+            assert_eq!(solution.faces.rows.iter().filter(|on| **on).count(), 1, "{lambda}");
         }
     }
 }

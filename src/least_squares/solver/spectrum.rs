@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::settings::RADIUS_SLACK;
-use crate::least_squares::singular::{Triplet, triplets};
+use crate::least_squares::singular::Decomposition;
 
 /// Newton steps allowed to the secular equation.
 const SECULAR_ITERATIONS: usize = 50;
@@ -11,20 +11,40 @@ const SECULAR_ITERATIONS: usize = 50;
 /// The seen part of min ‖B q + c‖ with B = U Σ Vᵀ.
 #[derive(Debug, Clone)]
 pub(super) struct Spectrum {
-    terms: Vec<Triplet>,
+    terms: Vec<Term>,
 }
 
-/// Length of −q(λ) along vᵢ, written so that λ = 0 needs no σ².
-fn length(term: &Triplet, lambda: f64) -> f64 {
-    term.projected / (term.singular + lambda / term.singular)
+/// One singular triplet.
+#[derive(Debug, Clone)]
+struct Term {
+    /// σᵢ.
+    singular: f64,
+    /// `−uᵢᵀc`.
+    projected: f64,
+    /// vᵢ.
+    direction: DVector<f64>,
+}
+
+impl Term {
+    /// Length of q(λ) along vᵢ, written so that λ = 0 needs no σ².
+    fn length(&self, lambda: f64) -> f64 {
+        self.projected / (self.singular + lambda / self.singular)
+    }
 }
 
 impl Spectrum {
     /// Decomposes B and drops σ ≤ `cut`·σ₁.
     pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, cut: f64) -> Self {
-        let mut terms = triplets(matrix, Some(constant), cut);
-        let largest = terms.iter().map(|term| term.singular).fold(0.0, f64::max);
-        terms.retain(|term| term.singular > cut * largest && term.singular.is_normal());
+        let Decomposition { columns, singular, projected } = Decomposition::new(matrix, Some(constant), cut);
+        let largest = singular.iter().copied().fold(0.0, f64::max);
+        let terms = (0..singular.len())
+            .filter(|&i| singular[i] > cut * largest && singular[i].is_normal())
+            .map(|i| Term {
+                singular: singular[i],
+                projected: -projected[i],
+                direction: columns.column(i) / singular[i],
+            })
+            .collect();
         Self { terms }
     }
 
@@ -32,7 +52,7 @@ impl Spectrum {
     pub(super) fn solution(&self, lambda: f64, n: usize) -> DVector<f64> {
         let mut q = DVector::zeros(n);
         for term in &self.terms {
-            q.axpy(-length(term, lambda), &term.direction, 1.0);
+            q.axpy(term.length(lambda), &term.direction, 1.0);
         }
         q
     }
@@ -45,7 +65,7 @@ impl Spectrum {
         for _ in 0..SECULAR_ITERATIONS {
             let (mut squares, mut slope) = (0.0, 0.0);
             for term in &self.terms {
-                let square = length(term, lambda).powi(2);
+                let square = term.length(lambda).powi(2);
                 squares += square;
                 slope += square / (term.singular * term.singular + lambda);
             }

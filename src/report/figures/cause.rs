@@ -8,7 +8,7 @@ use plotters::prelude::*;
 
 use super::arm::{Arm, LEAST_LEVER, Poses};
 use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, INK, WIDTH, chart, every, figure, legend, line, px, radius, range, thinned,
+    ACCENT, Axis, Drawing, FAINT, INK, Mark, WIDTH, chart, every, figure, legend, line, radius, range, thinned,
     with_margin,
 };
 use crate::diagnose::{Covariate, Unexplained};
@@ -361,10 +361,10 @@ impl Cause {
         let (x, y) = (with_margin(x, 0.04), with_margin(y, 0.06));
         let svg = figure((WIDTH, HEIGHT), &self.title, |area| {
             let held_out = points.iter().any(|(_, held_out)| *held_out);
-            let entries = [("fitted pose", FAINT, true), ("held-out pose", INK, true), (law, ACCENT, true)];
-            let kept: Vec<_> = entries.into_iter().filter(|(name, ..)| held_out || *name != "held-out pose").collect();
-            legend(area, &kept)?;
-            let (_, body) = area.split_vertically(px(20));
+            let dots = [("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)];
+            let dots = dots.into_iter().take(if held_out { 2 } else { 1 });
+            let entries: Vec<_> = dots.chain([(law, ACCENT, Mark::Line)]).collect();
+            let body = legend(area, 20, &entries)?;
             let mut chart = chart(&body, &Axis::linear(x, &self.across.label), &Axis::linear(y, &self.up.label))?;
             if y.0 < 0.0 && y.1 > 0.0 {
                 chart.draw_series([PathElement::new(vec![(x.0, 0.0), (x.1, 0.0)], line(FAINT, 1.0))])?;

@@ -5,8 +5,8 @@ use plotters::prelude::*;
 
 use super::data::{PlotData, Stage, StageErrors};
 use super::frame::{
-    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, WIDTH, chart, every, figure, left_out, legend, line, px,
-    radius, range, thinned,
+    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, Mark, WIDTH, chart, every, figure, left_out, legend, line,
+    radius, range, stacked, thinned,
 };
 use crate::report::quantity::number;
 
@@ -51,24 +51,22 @@ pub fn errors(data: &PlotData) -> Drawing {
     let floor = (FLOOR * typical * 1e3).log10();
     let most = range(states.iter().flat_map(|state| &state.errors).map(|error| error.norm() * 1e3)).1;
     let extent = (floor, most.log10() + 0.1);
-    let entries: Vec<(&str, RGBColor, bool)> = states
+    let mark = |place: usize| if place > 0 { Mark::Dot } else { Mark::Ring };
+    let entries: Vec<(&str, RGBColor, Mark)> = states
         .iter()
         .enumerate()
-        .map(|(place, state)| (stage_name(state.stage), colour(place, states.len()), place > 0))
+        .map(|(place, state)| (stage_name(state.stage), colour(place, states.len()), mark(place)))
         .collect();
     let svg = figure(size, "Error of each held-out pose in x, y, z and norm", |area| {
-        legend(area, &entries)?;
-        let (_, body) = area.split_vertically(px(22));
-        let mut rest = body;
-        for (axis, label) in ["|Δx| [mm]", "|Δy| [mm]", "|Δz| [mm]", "norm [mm]"].into_iter().enumerate() {
+        let panels = stacked(&legend(area, 22, &entries)?, &[PANEL, PANEL, PANEL, PANEL + 34]);
+        let labels = ["|Δx| [mm]", "|Δy| [mm]", "|Δz| [mm]", "norm [mm]"];
+        for (axis, (label, panel)) in labels.into_iter().zip(&panels).enumerate() {
             let last = axis == 3;
-            let (panel, below) = rest.split_vertically(px(if last { PANEL + 34 } else { PANEL }));
-            rest = below;
             let bottom =
                 Axis::linear((0.0, states[0].errors.len() as f64 + 1.0), if last { "held-out pose" } else { "" })
                     .numbers(if last { 8 } else { 0 });
             let left = Axis::logarithmic(extent, label).numbers(4);
-            draw(&panel, &bottom, &left, states, (axis, step))?;
+            draw(panel, &bottom, &left, states, (axis, step))?;
         }
         Ok(())
     });

@@ -23,15 +23,15 @@ pub const BELOW: i32 = 40;
 /// The backend writes text smaller than asked by this.
 const POINTS: f64 = 1.24;
 
-/// Lines and text that matter.
+/// Lines and text that matter; held-out poses.
 pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
 /// Axes and their numbers.
 pub const MUTED: RGBColor = RGBColor(0x59, 0x63, 0x6E);
-/// What is there to compare with.
+/// What is there to compare with; fitted poses.
 pub const FAINT: RGBColor = RGBColor(0xA3, 0xAD, 0xB8);
 /// Grid.
 pub const GRID: RGBColor = RGBColor(0xE4, 0xE8, 0xEC);
-/// What to look at.
+/// What to look at: the best, a law, what noise alone does.
 pub const ACCENT: RGBColor = RGBColor(0x0B, 0x6B, 0xCB);
 /// Its opposite: negative, failed.
 pub const WARM: RGBColor = RGBColor(0xC2, 0x52, 0x1B);
@@ -306,16 +306,56 @@ pub fn chart<'a, 'b>(area: &'a Area<'b>, x: &Axis, y: &Axis) -> Result<Chart<'a,
     Ok(chart)
 }
 
-/// Entries of a legend, from left to right along the top of an area.
-pub fn legend(area: &Area, entries: &[(&str, RGBColor, bool)]) -> Result<(), Failure> {
+/// How something is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    Dot,
+    Ring,
+    Line,
+    Bar,
+    /// Pale, behind what is drawn on it.
+    Band,
+}
+
+/// Opacity of a band.
+const PALE: f64 = 0.16;
+
+/// The colour of a band.
+pub fn band(colour: RGBColor) -> ShapeStyle {
+    colour.mix(PALE).filled()
+}
+
+/// Entries of a legend, from left to right along the top of an area, each with the mark that it stands for, and the area
+/// from `height` on.
+pub fn legend<'a>(area: &Area<'a>, height: i32, entries: &[(&str, RGBColor, Mark)]) -> Result<Area<'a>, Failure> {
     let mut at = LEFT;
-    for (name, colour, filled) in entries {
-        let style = if *filled { colour.filled() } else { line(*colour, 1.2) };
-        area.draw(&Circle::new((px(at + 4), px(10)), radius(3.2), style))?;
-        write(area, name, (at + 12, 10), MUTED, HPos::Left)?;
-        at += 26 + i32::try_from(name.chars().count()).unwrap_or_default() * 6;
+    for &(name, colour, mark) in entries {
+        let middle = (px(at + 4), px(10));
+        let corners = |reach: i32| [(px(at), px(10 - reach)), (px(at + 8), px(10 + reach))];
+        match mark {
+            Mark::Dot => area.draw(&Circle::new(middle, radius(3.2), colour.filled())),
+            Mark::Ring => area.draw(&Circle::new(middle, radius(3.2), line(colour, 1.2))),
+            Mark::Line => {
+                area.draw(&PathElement::new(vec![(px(at - 2), px(10)), (px(at + 9), px(10))], line(colour, 2.2)))
+            }
+            Mark::Bar => area.draw(&Rectangle::new(corners(4), colour.filled())),
+            Mark::Band => area.draw(&Rectangle::new(corners(4), band(colour))),
+        }?;
+        write(area, name, (at + 13, 10), MUTED, HPos::Left)?;
+        at += 27 + i32::try_from(name.chars().count()).unwrap_or_default() * 6;
     }
-    Ok(())
+    Ok(area.split_vertically(px(height)).1)
+}
+
+/// Parts of an area below each other, of these heights as shown.
+pub fn stacked<'a>(area: &Area<'a>, heights: &[i32]) -> Vec<Area<'a>> {
+    let mut rest = area.clone();
+    let part = |height: &i32| {
+        let (part, below) = rest.split_vertically(px(*height));
+        rest = below;
+        part
+    };
+    heights.iter().map(part).collect()
 }
 
 /// Every how many of `count` are drawn so that there are no more than `most`.

@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::data::PlotData;
-use super::frame::{ACCENT, Axis, Drawing, FAINT, WIDTH, chart, figure, legend, line, px};
+use super::frame::{ACCENT, Axis, Drawing, FAINT, Mark, WIDTH, chart, figure, legend, line};
 
 const HEIGHT: i32 = 280;
 /// Least that the axis reaches \[σ\]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
@@ -33,8 +33,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let tallest = counts.iter().map(|count| *count as f64).fold(normal(0.0), f64::max) * 1.08;
     let beyond = values.iter().filter(|value| value.abs() > reach).count();
     let svg = figure((WIDTH, HEIGHT), "Histogram of the residuals", |area| {
-        legend(area, &[("residuals", FAINT, true), ("noise alone", ACCENT, true)])?;
-        let (_, body) = area.split_vertically(px(20));
+        let body = legend(area, 20, &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)])?;
         let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);
         let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "coordinates [1]"))?;
         let bars = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(|(k, count)| {

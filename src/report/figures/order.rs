@@ -4,8 +4,8 @@ use plotters::prelude::*;
 
 use super::data::{PlotData, PoseError};
 use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, GRID, WIDTH, chart, every, figure, left_out, legend, line, px, radius, range,
-    thinned, with_margin,
+    ACCENT, Axis, Drawing, FAINT, Mark, WIDTH, band, chart, every, figure, left_out, legend, line, radius, range,
+    stacked, thinned, with_margin,
 };
 
 /// Poses that are drawn at most.
@@ -33,20 +33,17 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let sigma = shown.iter().map(|residual| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
     let most = shown.iter().map(|residual| residual.error.amax() * 1e3).fold(2.2 * sigma, f64::max) * 1.08;
     let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "Residuals in order", |area| {
-        legend(area, &[("fitted pose", ACCENT, true), ("±2 σ of the measurement", FAINT, true)])?;
-        let (_, body) = area.split_vertically(px(20));
-        let mut rest = body;
-        for (axis, name) in ["x [mm]", "y [mm]", "z [mm]"].into_iter().enumerate() {
+        let entries = [("fitted pose", FAINT, Mark::Dot), ("noise alone: ±2 σ of the measurement", ACCENT, Mark::Band)];
+        let panels = stacked(&legend(area, 20, &entries)?, &[PANEL, PANEL, PANEL + 36]);
+        for (axis, (name, panel)) in ["x [mm]", "y [mm]", "z [mm]"].into_iter().zip(&panels).enumerate() {
             let last = axis == 2;
-            let (panel, below) = rest.split_vertically(px(if last { PANEL + 36 } else { PANEL }));
-            rest = below;
             let bottom = Axis::linear(across, if last { label } else { "" }).numbers(if last { 7 } else { 0 });
-            let mut chart = chart(&panel, &bottom, &Axis::linear((-most, most), name).numbers(5))?;
-            let band = Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], GRID.filled());
-            chart.draw_series([band])?;
+            let mut chart = chart(panel, &bottom, &Axis::linear((-most, most), name).numbers(5))?;
+            let noise = Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], band(ACCENT));
+            chart.draw_series([noise])?;
             chart.draw_series([PathElement::new(vec![(across.0, 0.0), (across.1, 0.0)], line(FAINT, 1.0))])?;
             let at = |residual: &&PoseError| (residual.time * factor, residual.error[axis] * 1e3);
-            chart.draw_series(shown.iter().map(|residual| Circle::new(at(residual), radius(2.0), ACCENT.filled())))?;
+            chart.draw_series(shown.iter().map(|residual| Circle::new(at(residual), radius(2.0), FAINT.filled())))?;
         }
         Ok(())
     });

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::frame::{ACCENT, Axis, Drawing, FAINT, WARM, WIDTH, chart, figure, legend, line, px, radius};
+use super::frame::{ACCENT, Axis, Drawing, FAINT, Mark, WARM, WIDTH, chart, figure, legend, line, radius};
 use crate::least_squares::Identifiability;
 
 const HEIGHT: i32 = 280;
@@ -18,9 +18,8 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
     let lowest = values.iter().map(|at| at.1).fold(0.0, f64::min).floor().min(-2.0);
     let blind = found.blind.len();
     let svg = figure((WIDTH, HEIGHT), "Singular values", |area| {
-        let entries = [("identifiable", ACCENT, true), ("not identifiable", WARM, true)];
-        legend(area, if blind > 0 { &entries } else { &entries[..1] })?;
-        let (_, body) = area.split_vertically(px(20));
+        let entries = [("identifiable", ACCENT, Mark::Dot), ("not identifiable", WARM, Mark::Dot)];
+        let body = legend(area, 20, if blind > 0 { &entries } else { &entries[..1] })?;
         let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best identified first");
         let y = Axis::logarithmic((lowest, 0.3), "relative singular value [1]");
         let mut chart = chart(&body, &x, &y)?;

@@ -3,7 +3,9 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::frame::{ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, WIDTH, figure, legend, line, px, radius, write};
+use super::frame::{
+    ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, write,
+};
 use crate::identify::{Comparison, Errors};
 use crate::report::quantity::{decimals, number};
 
@@ -77,7 +79,8 @@ fn rows(entries: &[Entry], label: &str) -> String {
     let place = |value: f64| px(NAMES) + ((value - low) / (high - low) * room).round() as i32;
     let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
     figure((WIDTH, bottom + BELOW), label, |area| {
-        legend(area, &[("fitted poses", FAINT, true), ("held-out poses", INK, true), ("best", ACCENT, true)])?;
+        let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
+        legend(area, TOP, &marks.map(|(name, colour)| (name, colour, Mark::Dot)))?;
         for decade in -6..=6 {
             for part in [1.0_f64, 2.0, 5.0] {
                 let value = f64::from(decade) + part.log10();

@@ -5,8 +5,8 @@ use plotters::style::text_anchor::HPos;
 
 use super::data::{PlotData, PoseError};
 use super::frame::{
-    ACCENT, Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, WIDTH, chart, every, figure, left_out, legend, line,
-    px, radius, range, thinned, with_margin, write,
+    Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, Mark, WIDTH, chart, every, figure, left_out, legend, line,
+    px, radius, range, stacked, thinned, with_margin, write,
 };
 use crate::report::quantity::number;
 
@@ -40,17 +40,14 @@ pub fn vectors(data: &PlotData) -> Drawing {
     let larger = LONG * (across.1 - across.0) / bar;
     let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
     let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
-        legend(area, &[("fitted", FAINT, true), ("held out", ACCENT, true)])?;
+        let body = legend(area, 22, &[("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)])?;
         let length = radius(LONG * width);
         let end = px(WIDTH - 12);
         area.draw(&PathElement::new(vec![(end - length, px(10)), (end, px(10))], line(INK, 1.6)))?;
         write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
-        let (_, body) = area.split_vertically(px(22));
-        let mut rest = body;
-        for view in &views {
-            let (panel, below) = rest.split_vertically(px(view.height + BELOW + 8));
-            rest = below;
-            view.draw(&panel, across, &shown, larger)?;
+        let panels = stacked(&body, &views.each_ref().map(|view| view.height + BELOW + 8));
+        for (view, panel) in views.iter().zip(&panels) {
+            view.draw(panel, across, &shown, larger)?;
         }
         Ok(())
     });
@@ -116,7 +113,7 @@ impl View {
         let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
         let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;
         for residual in shown {
-            let colour = if residual.held_out { ACCENT } else { FAINT };
+            let colour = if residual.held_out { INK } else { FAINT };
             let from = (residual.position.x, residual.position[self.axis]);
             let end = (from.0 + larger * residual.error.x, from.1 + larger * residual.error[self.axis]);
             // A stroke that would leave the view ends at its edge.

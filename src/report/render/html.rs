@@ -4,6 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::markdown::markdown;
 use super::style;
+use super::text::marked;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
 use crate::report::figures::{Drawing, Figure};
@@ -135,7 +136,7 @@ fn item(point: &Point) -> Markup {
     });
     html! {
         li class=[class] {
-            (words(&point.text))
+            (words(&marked(point)))
             @if !point.details.is_empty() { ul { @for detail in &point.details { li { (words(detail)) } } } }
         }
     }

@@ -25,12 +25,12 @@ fn hex(colour: RGBColor) -> String {
 }
 
 /// The variables of both themes; paper is always light.
-fn themes(root: &str) -> String {
-    let mut text = format!("{root}{{color-scheme:light dark;--paper:{LIGHT_PAPER}");
+fn themes() -> String {
+    let mut text = format!(":root{{color-scheme:light dark;--paper:{LIGHT_PAPER}");
     for (light, name, _) in COLOURS {
         let _ = write!(text, ";--{name}:{}", hex(light));
     }
-    let _ = write!(text, "}}\n@media screen and (prefers-color-scheme:dark){{{root}{{--paper:{DARK_PAPER}");
+    let _ = write!(text, "}}\n@media screen and (prefers-color-scheme:dark){{:root{{--paper:{DARK_PAPER}");
     for (_, name, dark) in COLOURS {
         let _ = write!(text, ";--{name}:{dark}");
     }
@@ -39,25 +39,29 @@ fn themes(root: &str) -> String {
 }
 
 /// What the drawings' own colours become.
-fn exchanged() -> String {
+fn exchanged(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
-    for (light, name, _) in COLOURS {
-        let light = hex(light);
-        let _ = writeln!(text, "[fill=\"{light}\"]{{fill:var(--{name})}}[stroke=\"{light}\"]{{stroke:var(--{name})}}");
+    for (light, name, dark) in COLOURS {
+        let (light, colour) = (hex(light), colour(name, dark));
+        let _ = writeln!(text, "[fill=\"{light}\"]{{fill:{colour}}}[stroke=\"{light}\"]{{stroke:{colour}}}");
     }
     text
 }
 
 /// The style sheet of a page.
 pub(super) fn sheet() -> String {
-    format!("{}{LAYOUT}{}", themes(":root"), exchanged())
+    format!("{}{LAYOUT}{}", themes(), exchanged(|name, _| format!("var(--{name})")))
 }
 
-/// A figure that stands alone: with its own themes.
+/// A figure that stands alone: drawn on paper, its colours written out where it is dark, and light for who reads no styles.
 pub(super) fn alone(svg: &str) -> String {
-    let style = format!("<style>{}svg{{background:var(--paper)}}\n{}</style>\n", themes("svg"), exchanged());
+    let style = format!(
+        "<style>@media screen and (prefers-color-scheme:dark){{\n[fill=\"{LIGHT_PAPER}\"]{{fill:{DARK_PAPER}}}\n{}}}</style>",
+        exchanged(|_, dark| dark.to_owned())
+    );
+    let paper = format!("<rect x=\"-50%\" width=\"200%\" height=\"100%\" fill=\"{LIGHT_PAPER}\"/>");
     match svg.split_once('>') {
-        Some((head, body)) => format!("{head}>\n{style}{}\n", body.trim_start()),
+        Some((head, body)) => format!("{head}>\n{style}\n{paper}\n{}\n", body.trim_start()),
         None => svg.to_owned(),
     }
 }
