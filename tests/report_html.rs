@@ -60,6 +60,17 @@ fn check(page: &Report) {
         assert!(report::is_figure(name), "{name}");
         assert_eq!(badly_nested(figure), None, "{name}");
         assert!(figure.starts_with("<svg ") && figure.contains("aria-label=\""), "{name}");
+        // The file needs nothing of the page: paper of its own, colours written out, others where it is dark.
+        assert!(!figure.contains("var(") && figure.contains("fill=\"#ffffff\""), "{name}");
+        assert!(figure.contains("prefers-color-scheme:dark"), "{name}");
+        // The same poses have the same colour in every legend.
+        for (kind, colour) in [("\nfitted pose", "\"#A3ADB8\""), ("\nheld-out pose", "\"#1F2328\"")] {
+            for (before, _) in figure.match_indices(kind).map(|(at, _)| figure.split_at(at)) {
+                let mark = before.rsplit('<').nth(1).unwrap();
+                let is_mark = mark.starts_with("circle") || mark.starts_with("rect");
+                assert!(!is_mark || mark.contains(colour), "{name}: {mark} for {kind}");
+            }
+        }
         // Labels carry their units; places on a map of residuals and states are words.
         let labelled =
             figure.matches('[').count() - figure.matches("[fill=").count() - figure.matches("[stroke=").count();
@@ -125,7 +136,12 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     // Every check with its verdict, on the page and in Markdown.
     assert!(shown.findings.tests.len() > 5);
     for check in &shown.findings.tests {
-        assert!(page.html.contains(&check.to_string().replace('&', "&amp;")), "{check}");
+        let verdict = match (&check.outcome, check.failed()) {
+            (Err(_), _) => "",
+            (Ok(_), true) => "failed: ",
+            (Ok(_), false) => "passed: ",
+        };
+        assert!(page.html.contains(&format!(">{verdict}{check}<").replace('&', "&amp;")), "{check}");
     }
     let told = report::identification_report(&problem, &found, &shown).markdown;
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
