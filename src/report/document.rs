@@ -123,6 +123,13 @@ pub(super) fn code(words: &str) -> String {
     format!("{}{words}{}", CODE.0, CODE.1)
 }
 
+/// The first `most` of some words, and where the others are.
+pub(super) fn first_of(words: impl IntoIterator<Item = String>, most: usize, file: &str) -> Vec<String> {
+    let (mut shown, more) = some_of(words, most);
+    shown.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    shown
+}
+
 /// The first `most` of some words, and how many more there are.
 pub(super) fn some_of(words: impl IntoIterator<Item = String>, most: usize) -> (Vec<String>, usize) {
     let mut all: Vec<String> = words.into_iter().collect();

@@ -2,7 +2,7 @@
 
 use serde_json::value::{RawValue, to_raw_value};
 
-use super::document::{Block, Headline, Table, some_of};
+use super::document::{Block, Headline, Table, first_of};
 use super::errors::{NOMINAL, row, unpredicted};
 use super::figures::{Figure, PlotData};
 use super::findings;
@@ -304,8 +304,7 @@ fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> 
     let point = |own: &Outlier| {
         format!("{}: {} mm, {} σ of the scatter", own.location, mm(own.error.norm(), 3), number(own.distance, 1))
     };
-    let (mut points, more) = some_of(found.outliers.iter().map(point), SHOWN_OUTLIERS);
-    points.extend((more > 0).then(|| format!("and {more} more in estimate.json")));
+    let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
     let words = format!("{n} of {poses} poses are too far off to be noise ({treatment}):");
     (n > 0).then_some(Block::Lines(words, points))
 }

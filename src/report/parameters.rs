@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::document::{Bar, Block, Table, some_of};
+use super::document::{Bar, Block, Table, first_of};
 use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash};
 use crate::identify::{Estimate, Identification};
@@ -178,9 +178,7 @@ pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str
         blind.len(),
         unknowns.len()
     );
-    let (mut points, more) = some_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN);
-    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
-    Block::Lines(words, points)
+    Block::Lines(words, first_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN, file))
 }
 
 /// Those that [`blind`] leaves out, on the page.
@@ -224,8 +222,7 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
         let sign = if correlation < 0.0 { '−' } else { '+' };
         format!("{a} and {b}: {sign}{:.3}", correlation.abs())
     });
-    let (mut points, more) = some_of(pairs, SHOWN);
-    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    let points = first_of(pairs, SHOWN, file);
     let words = match points.as_slice() {
         [] => "No two other parameters are correlated by more than 0.9.",
         _ => "Correlated by more than 0.9 (their sum or difference is known better than each):",

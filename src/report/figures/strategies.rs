@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::frame::{
-    ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, write,
+    ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
 };
 use crate::identify::{Comparison, Errors};
 use crate::report::quantity::{decimals, number};
@@ -70,8 +70,7 @@ fn rows(entries: &[Entry], label: &str) -> String {
     let of = |entry: &Entry| {
         [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm].map(|e| (e * 1e3).max(1e-9).log10())
     };
-    let finite = entries.iter().flat_map(of).filter(|value| value.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = range(entries.iter().flat_map(of));
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
     let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
     let room = f64::from(px(WIDTH - NAMES - NUMBERS));
