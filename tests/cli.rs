@@ -303,14 +303,22 @@ fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
 #[test]
 fn figures_of_an_older_page_go_and_other_files_stay() {
     let bench = Bench::new();
-    fs::create_dir_all(bench.path("out/figures")).unwrap();
-    for name in ["effect-1.svg", "ranking.svg", "effect-mine.svg", "mine.svg", "ranking.txt"] {
-        fs::write(bench.path(&format!("out/figures/{name}")), "").unwrap();
-    }
-    bench.identify(&["--out", "out"]).success();
+    let flexcal = |command: &str| {
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        flexcal.current_dir(bench.folder.path()).args([command, ".", "--out", "out"]).assert()
+    };
     let there = |name: &str| bench.path(&format!("out/figures/{name}")).exists();
-    assert!(!there("effect-1.svg") && !there("ranking.svg"));
+    flexcal("compare").success();
+    assert!(there("strategies.svg") && there("ablations.svg"));
+    let write = |name: &str| fs::write(bench.path(&format!("out/figures/{name}")), "mine").unwrap();
+    ["effect-mine.svg", "mine.svg", "ranking.txt"].into_iter().for_each(write);
+    flexcal("identify").success();
+    assert!(!there("strategies.svg") && !there("ablations.svg"));
     assert!(["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there));
+    // One that some page may have and that is not flexcal's keeps all of them away, before any work is done.
+    write("effect-1.svg");
+    let error = text(&flexcal("identify").code(2).get_output().stderr);
+    assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");
 }
 
 #[test]
@@ -322,11 +330,11 @@ fn the_readme_shows_what_is_printed() {
         after.split_once("\n```").unwrap().0.to_owned()
     };
     let folder = tempfile::tempdir().unwrap();
-    let printed = |command: &str, problem: &Path| {
+    let printed = |command: &str, problem: &Path, more: &[&str]| {
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).output().unwrap().stdout)
+        text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).args(more).output().unwrap().stdout)
     };
-    assert_eq!(shown("loop"), printed("loop", &root.join("problems/lunar-sampler")).trim_end());
+    assert_eq!(shown("loop"), printed("loop", &root.join("problems/lunar-sampler"), &[]).trim_end());
     let drawn = fs::read_to_string(folder.path().join("out/lunar-sampler/figures/effect-1.svg")).unwrap();
     if std::env::var_os("FLEXCAL_REFILL").is_some() {
         fs::write(root.join("docs/effect.svg"), &drawn).unwrap();
@@ -335,7 +343,7 @@ fn the_readme_shows_what_is_printed() {
     let shapes = |svg: &str| svg.replace(|c: char| c.is_ascii_digit() || c == '.', "");
     let kept = fs::read_to_string(root.join("docs/effect.svg")).unwrap();
     assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
-    let identified = printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"));
+    let identified = printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"), &["--out", "out/closed"]);
     // The third line ends in the time it took.
     let timeless = |text: &str| -> Vec<String> {
         text.trim_end().lines().enumerate().filter(|(k, _)| *k != 2).map(|(_, line)| line.to_owned()).collect()

@@ -43,7 +43,7 @@ impl CustomEffect for Creep {
     }
 
     fn describe(&self) -> String {
-        format!("the motor of joint {} creeps and sags", self.joint)
+        format!("the motor of joint {} creeps\nand = [sags", self.joint)
     }
 
     fn untestable(&self, _: &Problem, data: &DataCoverage) -> Option<&'static str> {
@@ -133,7 +133,12 @@ fn trace_and_loop_find_it() {
     assert!(traced.ranking[0].p_value < 1e-6);
     let closure = close(&problem, &data, &options).unwrap();
     assert!(closure.effects.iter().any(|found| found.effect == creep(3)), "{:?}", closure.effects);
-    assert_eq!(closure.before.describe(&creep(3)), "the motor of joint 3 creeps and sags");
+    assert_eq!(closure.before.describe(&creep(3)), "the motor of joint 3 creeps\nand = [sags");
+    // What it says of itself stays a comment of the closed problem, in however many lines it does.
+    let text = std::fs::read_to_string(common::arms::golden("problem.toml")).unwrap();
+    let closed = flexcal::report::closed_problem(&text, &problem, &closure, &[]).unwrap();
+    assert!(closed.contains("\n# Found by flexcal loop: the motor of joint 3 creeps and = [sags, p-value"), "{closed}");
+    assert!(Problem::parse(&closed, std::path::Path::new("problem.closed.toml")).is_ok(), "{closed}");
     let (before, after) = (&closure.before.fit.fitted.held_out, &closure.after.fitted.held_out);
     assert!(after.rms.norm < 0.5 * before.rms.norm);
 }

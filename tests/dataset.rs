@@ -33,6 +33,11 @@ fn arrays_that_do_not_fit_are_told() {
     assert_eq!(wrong(three().time(vec![0.0, f64::NAN, 1.0])), DatasetError::NotFinite { column: "time", row: 1 });
     assert_eq!(wrong(three().held_out([3])), DatasetError::NoSuchRow { row: 3, rows: 3 });
     assert!(matches!(wrong(three().sigma(vec![1.0, 0.0, 1.0])), DatasetError::OutOfRange { row: 1, .. }));
+    assert!(matches!(
+        wrong(three().approach([[1.0], [0.5], [0.0]])),
+        DatasetError::OutOfRange { column: "approach", row: 1, .. }
+    ));
+    assert!(matches!(wrong(three().temperature(vec![1e160; 3])), DatasetError::OutOfRange { row: 0, .. }));
     let ragged = Dataset::builder([vec![0.1, 0.2], vec![0.3]], vec![Vector3::zeros(); 2]);
     assert_eq!(wrong(ragged), DatasetError::Joints { row: 1, expected: 2, found: 1 });
     let positions = Dataset::builder([[0.1]], Vec::new());

@@ -269,6 +269,30 @@ fn a_fraction_keeps_rows_of_one_configuration_together() {
 }
 
 #[test]
+fn a_fraction_does_not_depend_on_the_order_of_rows() {
+    let problem = parse("name = 'arm'\n[[joint]]\n[data]\nheld_out = { fraction = 0.3, seed = 1 }\n");
+    for columns in ["", ",pose", ",time_s", ",session"] {
+        let row = |k: i32| match columns {
+            "" => format!("{},{k},0,0\n", k / 2),
+            ",session" => format!("{},{k},0,0,{}\n", k / 2, ["A", "B"][usize::from(k > 50)]),
+            _ => format!("{},{k},0,0,{}\n", k / 2, 100 - k),
+        };
+        let held_out = |order: &dyn Fn(i32) -> i32| {
+            let rows: String = (0..101).map(|k| row(order(k))).collect();
+            let measurements = read(&problem, &[&format!("q1_deg,x_m,y_m,z_m{columns}\n{rows}")]).unwrap().0;
+            let rows = Split::new(&problem, &measurements).unwrap().held_out;
+            let mut positions: Vec<f64> = rows.iter().map(|&row| measurements.positions[row].x).collect();
+            positions.sort_by(f64::total_cmp);
+            positions
+        };
+        let plain = held_out(&|k| k);
+        assert!((31..=32).contains(&plain.len()), "{columns}: {plain:?}");
+        assert_eq!(held_out(&|k| 100 - k), plain, "{columns}");
+        assert_eq!(held_out(&|k| k * 37 % 101), plain, "{columns}");
+    }
+}
+
+#[test]
 fn a_column_split_is_used_where_nothing_is_said() {
     let problem = parse("name = 'arm'\n[[joint]]\n");
     let table = "q1_deg,x_m,y_m,z_m,split\n1,2,3,4,validation\n1,2,3,4,identification\n";

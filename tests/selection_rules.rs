@@ -1,9 +1,14 @@
 //! docs/selection.md has every number of the search, and each as it is.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 use std::fs;
 use std::path::Path;
 
-use flexcal::diagnose::SelectionRules;
+use flexcal::diagnose::{SelectionRules, close_by, trace_by};
+use flexcal::identify::Options;
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
 
 #[test]
 fn the_page_has_every_number() {
@@ -18,4 +23,32 @@ fn the_page_has_every_number() {
     }
     // Every field has one colon.
     assert_eq!(told.len(), rules.matches(": ").count());
+}
+
+#[test]
+fn rules_that_make_no_sense_are_refused() {
+    let problem = Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler")).unwrap();
+    let (data, _) = Dataset::read(&problem).unwrap();
+    let change: [(&str, fn(&mut SelectionRules)); 9] = [
+        ("resamples", |rules| rules.resamples = 0),
+        ("blocks", |rules| rules.blocks = 0),
+        ("level", |rules| rules.level = f64::NAN),
+        ("leaving_level", |rules| rules.leaving_level = 1e-9),
+        ("spline_intervals", |rules| rules.spline_intervals = [0, 1, 2]),
+        ("shape_widths", |rules| rules.shape_widths[0] = 0.0),
+        ("covered", |rules| rules.covered = 1.0),
+        ("weighed_poses", |rules| rules.weighed_poses = 0),
+        ("time_step", |rules| rules.time_step = f64::INFINITY),
+    ];
+    assert!(SelectionRules::DEFAULT.check().is_ok());
+    for (name, change) in change {
+        let mut rules = SelectionRules::default();
+        change(&mut rules);
+        let options = Options::default();
+        let traced = trace_by(&problem, &data, &options, &rules).map(|_| ());
+        let closed = close_by(&problem, &data, &options, &rules).map(|_| ());
+        for error in [traced, closed].map(|outcome| outcome.unwrap_err().to_string()) {
+            assert!(error.contains(&format!("the rule {name} of the search")), "{error}");
+        }
+    }
 }

@@ -135,6 +135,58 @@ fn names_with_a_comma_stay_one_cell() {
 }
 
 #[test]
+fn declared_effects_are_drawn_and_found_again() {
+    let bench = Bench::new();
+    let effects = "[[effect]]\ngear-ratio = { joint = 2 }\n[[effect]]\njoint-harmonic = { joint = 3, orders = [1, 3] }\n[parameters]";
+    bench.edit("problem.toml", "[parameters]", effects);
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 40");
+    bench.edit("STUDY.toml", "identification_poses = [8]", "identification_poses = [30]");
+    bench.edit("STUDY.toml", "position_sigma_mm = [0.05, 0.2]", "position_sigma_mm = [0.05]");
+    for source in ["model", "rig"] {
+        bench.edit("STUDY.toml", "\n[poses]", &format!("\ndata = '{source}'\n[poses]"));
+        bench.flexcal(&["study", ".", "--out", source, "--quiet"]).success();
+        bench.edit("STUDY.toml", &format!("\ndata = '{source}'"), "");
+        let mut table = csv::Reader::from_path(bench.path(source).join("parameters.csv")).unwrap();
+        let header = table.headers().unwrap().clone();
+        let place = |name: &str| header.iter().position(|own| own == name).unwrap();
+        let mut seen = 0;
+        for row in table.records().map(Result::unwrap) {
+            let name = &row[place("parameter")];
+            if !name.contains('[') {
+                continue;
+            }
+            let number = |column: &str| row[place(column)].parse::<f64>().unwrap();
+            // Drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses knows better, and how much.
+            let (fits, rms, coverage) = (number("fits"), number("rms_error"), number("coverage"));
+            assert!(fits > 35.0 && rms > 0.0 && rms < 9e-4 && coverage > 0.8, "{source} {name}: {row:?}");
+            seen += 1;
+        }
+        assert_eq!(seen, 2 * 5, "{source}: five parameters of effects by two solvers");
+    }
+    // What the poses cannot show is a mistake at the effect.
+    bench.edit("problem.toml", "gear-ratio = { joint = 2 }", "joint-thermal-drift = { joint = 2 }");
+    bench.edit("problem.toml", "[data]", "[data]\nreference_temperature_C = 20");
+    let error = text_of_error(&bench.flexcal(&["study", "."]).code(2));
+    assert!(error.contains("problem.toml:") && error.contains("temperature_C = [from, to] in [poses]"), "{error}");
+}
+
+fn text_of_error(assert: &assert_cmd::assert::Assert) -> String {
+    text(&assert.get_output().stderr)
+}
+
+#[test]
+fn folders_to_merge_from_are_there() {
+    let bench = Bench::new();
+    bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
+    bench.flexcal(&["study", ".", "--out", "one", "--quiet"]).success();
+    let merge =
+        |more: &[&str]| bench.flexcal(&[&["study", "merge", ".", "--out", "all", "--from", "one"], more].concat());
+    merge(&[]).success();
+    let error = text_of_error(&merge(&["tow"]).code(2));
+    assert!(error.contains("--from tow: no such folder"), "{error}");
+}
+
+#[test]
 fn threads_shares_and_order_change_nothing() {
     let bench = Bench::new();
     let study = bench.study();

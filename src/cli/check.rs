@@ -50,14 +50,15 @@ enum PosesError {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(&common.problem)?;
+    let results = common.results("check", &problem, &arguments.source.files(), &["check.json"])?;
     let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
     let json = report::check_json(&problem, &check);
-    let path = output::write(&common.folder(&problem), "check.json", &json)?;
+    results.write(&[("check.json", &json)])?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::check_text(&problem, &check))?;
-        output::print(&format!("\nWritten to {}\n", path.display()))?;
+        output::print(&format!("\nWritten to {}\n", results.path("check.json").display()))?;
     }
     if check.suffices() {
         return Ok(Outcome::Done);

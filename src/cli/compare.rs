@@ -8,6 +8,7 @@ use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
+use super::output::REPORT;
 use super::progress::Line;
 use super::{diagnostic, output};
 
@@ -24,7 +25,7 @@ pub struct Arguments {
 /// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data } = common.read()?;
+    let Input { problem, data, results } = common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
     let line = common.talks().then(Line::new);
     let sink = line.as_ref().map(Line::sink);
     let result = identify::compare(&problem, &data, sink.as_ref());
@@ -33,15 +34,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let comparison = result?;
     let json = report::compare_json(&problem, &comparison);
-    let folder = common.folder(&problem);
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
-    output::write_report(&folder, &[("compare.json", &json)], &told)?;
+    results.write_report(&[("compare.json", &json)], &told)?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::compare_text(&problem, &comparison))?;
-        output::print(&format!("\nWritten to {}: compare.json, report.md, report.html\n", folder.display()))?;
+        output::print(&format!("\nWritten to {}: compare.json, report.md, report.html\n", results.folder.display()))?;
     }
     Ok(diagnostic::judged(&comparison.joint, common.quiet))
 }

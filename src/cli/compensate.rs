@@ -1,11 +1,12 @@
 //! `flexcal compensate`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::error::Error;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use flexcal::files::at_most;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -32,6 +33,11 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
 }
+
+/// Largest estimate.json that is read [MiB].
+const LARGEST_MIB: u64 = 256;
+/// Largest value: its square is a number as well.
+const GREATEST: f64 = 1e150;
 
 #[derive(Debug, Deserialize)]
 struct Estimates {
@@ -66,6 +72,14 @@ enum EstimateError {
     OtherArm { file: PathBuf },
     #[error("{}: {name} was identified, but is not free in the problem; identify again", file.display())]
     NotFree { file: PathBuf, name: String },
+    #[error("{}: {name} stands there twice; keep one of the two", file.display())]
+    Twice { file: PathBuf, name: String },
+    #[error("{}: {name} has a value larger than 1e150, the largest number that can be reckoned with", file.display())]
+    TooGreat { file: PathBuf, name: String },
+    #[error("{}: larger than {LARGEST_MIB} MiB; is it the right file?", file.display())]
+    TooLarge { file: PathBuf },
+    #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
+    NotUtf8 { file: PathBuf },
     #[error("no targets; name them with --data")]
     NoTargets,
 }
@@ -79,6 +93,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut problem = Problem::read(&common.problem)?;
     // Targets are not split: every row is one.
     problem.data.held_out = None;
+    let results =
+        common.results("compensate", &problem, std::slice::from_ref(&arguments.estimate), &["commands.csv"])?;
     let (targets, warnings) = Measurements::read(&common.data, &problem)?;
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
@@ -93,13 +109,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .vector_of(|name| values.get(name).copied())
         .map_err(|name| EstimateError::Missing { file: arguments.estimate.clone(), name })?;
     let commands = identify::compensate(&problem, &model, &x, &targets)?;
-    let folder = common.folder(&problem);
-    let path = output::write(&folder, "commands.csv", &report::commands_csv(&problem, &targets, &commands))?;
+    results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
     if common.json {
-        output::print(&report::commands_json(&problem, &commands))?;
+        output::print_json(&report::commands_json(&problem, &commands))?;
     } else if common.talks() {
         output::print(&report::commands_text(&problem, &targets, &commands))?;
-        output::print(&format!("\nWritten to {}\n", path.display()))?;
+        output::print(&format!("\nWritten to {}\n", results.path("commands.csv").display()))?;
     }
     let all = commands.iter().all(identify::Command::is_reached);
     Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
@@ -108,10 +123,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// Estimates by name, once they are known to be of this problem, and whether they are to be trusted.
 fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String, f64>, bool), EstimateError> {
     let file = file.to_owned();
-    let text = match fs::read_to_string(&file) {
+    let text = match at_most(&file, LARGEST_MIB << 20) {
         Ok(text) => text,
+        Err(source) if source.kind() == io::ErrorKind::FileTooLarge => return Err(EstimateError::TooLarge { file }),
         Err(source) => return Err(EstimateError::Unreadable { file, source }),
     };
+    let Ok(text) = String::from_utf8(text) else { return Err(EstimateError::NotUtf8 { file }) };
     let estimates: Estimates = match serde_json::from_str(&text) {
         Ok(estimates) => estimates,
         Err(source) => return Err(EstimateError::Syntax { file, source }),
@@ -119,7 +136,14 @@ fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String
     if estimates.problem != problem.name {
         return Err(EstimateError::OtherProblem { file, found: estimates.problem, expected: problem.name.clone() });
     }
+    let mut names = HashSet::new();
     for entry in &estimates.parameters {
+        if !names.insert(entry.name.as_str()) {
+            return Err(EstimateError::Twice { file, name: entry.name.clone() });
+        }
+        if !(entry.estimate.abs() <= GREATEST && entry.nominal.abs() <= GREATEST) {
+            return Err(EstimateError::TooGreat { file, name: entry.name.clone() });
+        }
         let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name) else {
             // Sessions that the targets do not use.
             if entry.name.starts_with("base[") || entry.name.starts_with("tool[") {

@@ -5,7 +5,7 @@ use std::io::Write as _;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
-use flexcal::error::{InputError, InputErrorKind, Location, Warning};
+use flexcal::error::{InputError, InputErrorKind, Location, Warning, one_line, veiled};
 use flexcal::identify::{Identification, IdentifyError};
 use flexcal::report;
 
@@ -83,13 +83,14 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
 }
 
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
+    let (message, path) = (one_line(message), location.map(|location| one_line(&location.file.display().to_string())));
     let title = level.primary_title(message);
     let excerpt = location.and_then(|location| Some((location, location.excerpt.as_ref()?)));
     let group = match excerpt {
-        Some((location, excerpt)) => title.element(
-            Snippet::source(&*excerpt.text)
+        Some((_, excerpt)) => title.element(
+            Snippet::source(veiled(&excerpt.text))
                 .line_start(excerpt.first_line)
-                .path(location.file.display().to_string())
+                .path(path)
                 .annotation(AnnotationKind::Primary.span(excerpt.span.clone())),
         ),
         None => Group::with_title(title),

@@ -9,6 +9,7 @@ use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
+use super::output::REPORT;
 use super::progress::Line;
 use super::{diagnostic, output};
 
@@ -44,7 +45,7 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
 /// Identifies, writes `estimate.json`, `report.md` and `report.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data } = common.read()?;
+    let Input { problem, data, results } = common.read("identify", &["estimate.json", REPORT[0], REPORT[1]])?;
     let line = common.talks().then(Line::new);
     let options = Options::default()
         .with_strategy(arguments.strategy)
@@ -56,15 +57,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let identification = result?;
     let json = report::estimate_json(&problem, &identification);
-    let folder = common.folder(&problem);
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    output::write_report(&folder, &[("estimate.json", &json)], &told)?;
+    results.write_report(&[("estimate.json", &json)], &told)?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::estimate_text(&problem, &identification))?;
-        output::print(&format!("\nWritten to {}: estimate.json, report.md, report.html\n", folder.display()))?;
+        output::print(&format!("\nWritten to {}: estimate.json, report.md, report.html\n", results.folder.display()))?;
     }
     Ok(diagnostic::judged(&identification, common.quiet))
 }

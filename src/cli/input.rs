@@ -1,5 +1,6 @@
 //! Arguments that every command takes, and the input they name.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,6 +9,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
 use super::diagnostic;
+use super::output::{Results, WriteError};
 
 /// Problem, data, and where results go.
 #[derive(Debug, Args)]
@@ -20,6 +22,9 @@ pub struct Common {
     /// Folder for results [default: out/<name of the problem>]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    #[arg(long)]
+    pub force: bool,
     /// Print the result as JSON on standard output, and nothing else
     #[arg(long)]
     pub json: bool,
@@ -32,18 +37,39 @@ pub struct Common {
 pub struct Input {
     pub problem: Problem,
     pub data: Dataset,
+    pub results: Results,
 }
 
 impl Common {
-    /// Reads the problem and its measurements.
-    pub fn read(&self) -> Result<Input, InputError> {
+    /// Reads the problem and its measurements, once `command` may write the results called `names`.
+    pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
         let problem = Problem::read(&self.problem)?;
-        let (measurements, warnings) = Measurements::read(self.files(&problem), &problem)?;
+        let results = self.results(command, &problem, &[], names)?;
+        let data = self.measurements(&problem)?;
+        Ok(Input { problem, data, results })
+    }
+
+    /// Reads the measurements of a problem.
+    pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
+        let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
+        warnings.extend(measurements.repeated_rows());
         if !self.quiet {
             diagnostic::print_warnings(&warnings);
         }
-        let data = Dataset::of(&problem, measurements)?;
-        Ok(Input { problem, data })
+        Dataset::of(problem, measurements)
+    }
+
+    /// Where `command` writes the results called `names`; besides problem and data it reads `others`.
+    pub fn results(
+        &self,
+        command: &'static str,
+        problem: &Problem,
+        others: &[PathBuf],
+        names: &[&str],
+    ) -> Result<Results, WriteError> {
+        let own = [self.problem_file()];
+        let inputs = [&own, others, &problem.data.files, &self.data].concat();
+        Results::claim(command, self.folder(problem), inputs, names, (self.force, self.quiet))
     }
 
     /// The measurement files.
@@ -57,7 +83,7 @@ impl Common {
     }
 
     /// Folder for the results of `problem`.
-    pub fn folder(&self, problem: &Problem) -> PathBuf {
+    fn folder(&self, problem: &Problem) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name))
     }
 

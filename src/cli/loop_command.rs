@@ -7,10 +7,12 @@ use std::{fs, io};
 use clap::Args;
 use flexcal::diagnose;
 use flexcal::identify::Options;
+use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData};
 
-use super::input::{Common, Input};
+use super::input::Common;
 use super::outcome::Outcome;
+use super::output::{REPORT, WriteError};
 use super::progress::Line;
 use super::{diagnostic, output};
 
@@ -31,8 +33,11 @@ pub struct Arguments {
 /// Closes the loop, writes `loop.json`, `problem.closed.toml` and both reports, and prints the story.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data } = common.read()?;
-    let text = fs::read_to_string(common.problem_file())?;
+    let (problem, text) = Problem::read_with_text(&common.problem)?;
+    common.files(&problem).iter().try_for_each(|file| nameable(file))?;
+    let names = ["loop.json", "problem.closed.toml", REPORT[0], REPORT[1]];
+    let results = common.results("loop", &problem, &[], &names)?;
+    let data = common.measurements(&problem)?;
     let line = common.talks().then(Line::new);
     let options = Options::default().with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::close(&problem, &data, &options);
@@ -41,23 +46,50 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let closure = result?;
     let json = report::loop_json(&problem, &closure);
-    let folder = output::folder(&common.folder(&problem))?;
-    let files = common.files(&problem).iter().map(|file| seen_from(&folder, file)).collect::<Result<Vec<_>, _>>()?;
+    fs::create_dir_all(&results.folder).map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
+    let files =
+        common.files(&problem).iter().map(|file| seen_from(&results.folder, file)).collect::<Result<Vec<_>, _>>()?;
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
-    let results = [
+    let texts = [
         ("loop.json", json.as_str()),
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
     ];
     let told = report::loop_report(&problem, &closure, &shown);
-    output::write_report(&folder, &results, &told)?;
+    results.write_report(&texts, &told)?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::loop_text(&problem, &closure))?;
         let names = "loop.json, problem.closed.toml, report.md, report.html";
-        output::print(&format!("\nWritten to {}: {names}\n", folder.display()))?;
+        output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))
+}
+
+/// Data that a closed problem cannot name.
+#[derive(Debug, thiserror::Error)]
+enum NoName {
+    #[error("{}: loop names its data in problem.closed.toml, and this is no file that can be read again; save it as one", file.display())]
+    Passing { file: PathBuf },
+    #[error("{}: loop names its data in problem.closed.toml, and the name of this file is not UTF-8; give it another", file.display())]
+    NotUtf8 { file: PathBuf },
+}
+
+/// Whether a closed problem can name a file: pipes and standard input cannot be read again.
+fn nameable(file: &Path) -> Result<(), NoName> {
+    let name = || file.to_owned();
+    match file.canonicalize() {
+        // One that is not there is a mistake of its own.
+        Err(_) if file.symlink_metadata().is_err() => Ok(()),
+        Ok(real) if real.is_file() || real.is_dir() => {
+            if real.to_str().is_some() {
+                Ok(())
+            } else {
+                Err(NoName::NotUtf8 { file: name() })
+            }
+        }
+        _ => Err(NoName::Passing { file: name() }),
+    }
 }
 
 /// A file as seen from a folder; absolute where no relative path leads there.

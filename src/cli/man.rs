@@ -7,7 +7,7 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 
 use super::outcome::Outcome;
-use super::output;
+use super::output::{self, Results};
 
 /// Arguments of `flexcal man`.
 #[derive(Debug, Args)]
@@ -15,6 +15,9 @@ use super::output;
   flexcal man | man -l -
   flexcal man --out ~/.local/share/man/man1")]
 pub struct Arguments {
+    /// Replace pages that flexcal did not write
+    #[arg(long, requires = "out")]
+    force: bool,
     /// Write the page of every command to this folder (flexcal.1, flexcal-identify.1, …), and print nothing
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -25,14 +28,17 @@ pub fn run(arguments: &Arguments, flexcal: Command) -> Result<Outcome, Box<dyn E
     let mut flexcal = flexcal.disable_help_subcommand(true);
     flexcal.build();
     let Some(folder) = &arguments.out else {
-        output::print(&page(flexcal)?)?;
+        output::print_all(&page(flexcal)?)?;
         return Ok(Outcome::Done);
     };
+    let mut pages = Vec::new();
     for command in flexcal.get_subcommands() {
         let name = format!("flexcal-{}", command.get_name());
-        output::write(folder, &format!("{name}.1"), &page(command.clone().display_name(name))?)?;
+        pages.push((format!("{name}.1"), page(command.clone().display_name(name))?));
     }
-    output::write(folder, "flexcal.1", &page(flexcal)?)?;
+    pages.push(("flexcal.1".to_owned(), page(flexcal)?));
+    let pages: Vec<(&str, &str)> = pages.iter().map(|(name, page)| (name.as_str(), page.as_str())).collect();
+    Results::claim("man", folder.clone(), Vec::new(), &[], (arguments.force, true))?.write(&pages)?;
     Ok(Outcome::Done)
 }
 

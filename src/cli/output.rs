@@ -2,89 +2,197 @@
 
 use std::fs;
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use flexcal::files;
+use flexcal::error::{is_hidden, visible};
+use flexcal::files::{Ready, Record, same_file};
 use flexcal::report::{Report, is_figure};
+
+use super::diagnostic;
+
+/// Names of the files of a report, and of the folder of its figures.
+pub const REPORT: [&str; 2] = ["report.md", "report.html"];
+const FIGURES: &str = "figures";
 
 /// A result that could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {source}", path.display())]
-pub struct WriteError {
-    path: PathBuf,
-    source: io::Error,
+pub enum WriteError {
+    #[error("cannot write {}: {source}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("cannot write {}: {why}", path.display())]
+    InTheWay { path: PathBuf, why: &'static str },
+    #[error(
+        "{} is an input of this command; name another folder with --out, or replace it with --force", path.display()
+    )]
+    Input { path: PathBuf },
+    #[error(
+        "{} is there and not as flexcal wrote it; name another folder with --out, or replace it with --force", path.display()
+    )]
+    Foreign { path: PathBuf },
 }
 
-/// Makes a folder for results, with those above it.
-pub fn folder(path: &Path) -> Result<PathBuf, WriteError> {
-    fs::create_dir_all(path).map_err(|source| WriteError { path: path.to_owned(), source })?;
-    Ok(path.to_owned())
+/// Where the results of a command go, and which files they may replace: those that flexcal wrote there, unless they are read.
+pub struct Results {
+    pub folder: PathBuf,
+    command: &'static str,
+    /// Files that the command or its problem reads.
+    inputs: Vec<PathBuf>,
+    force: bool,
+    quiet: bool,
 }
 
-/// Writes `text` to `folder`/`name`, whole or not at all: to a temporary file beside it, then renamed.
-pub fn write(folder: &Path, name: &str, text: &str) -> Result<PathBuf, WriteError> {
-    write_all(folder, &[(name, text)])?;
-    Ok(folder.join(name))
-}
+impl Results {
+    /// The results of `command` in `folder`, once nothing stands in the way of those called `names`; a later one of
+    /// [`write`](Self::write) may have more.
+    pub fn claim(
+        command: &'static str,
+        folder: PathBuf,
+        inputs: Vec<PathBuf>,
+        names: &[&str],
+        (force, quiet): (bool, bool),
+    ) -> Result<Self, WriteError> {
+        let claimed = Self { folder, command, inputs, force, quiet };
+        let record = claimed.record()?;
+        names.iter().try_for_each(|name| claimed.check(&record, name))?;
+        if names.contains(&REPORT[0]) {
+            claimed.figures().iter().try_for_each(|name| claimed.check(&record, name))?;
+        }
+        Ok(claimed)
+    }
 
-/// Writes texts by name, each whole or not at all, and none before all of them are on the disk.
-pub fn write_all(folder: &Path, texts: &[(&str, &str)]) -> Result<(), WriteError> {
-    keep(texts.iter().map(|(name, text)| (folder.join(name), *text)).collect())
-}
+    /// Files that are there under names of figures, of which nobody knows yet which a page will have.
+    fn figures(&self) -> Vec<String> {
+        let Ok(entries) = fs::read_dir(self.folder.join(FIGURES)) else { return Vec::new() };
+        let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        names.filter(|name| is_figure(name)).map(|name| format!("{FIGURES}/{name}")).collect()
+    }
 
-/// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where those of an older page go.
-pub fn write_report(folder: &Path, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
-    let drawn = folder.join("figures");
-    let texts =
-        texts.iter().copied().chain([("report.md", report.markdown.as_str()), ("report.html", report.html.as_str())]);
-    let mut files: Vec<(PathBuf, &str)> = texts.map(|(name, text)| (folder.join(name), text)).collect();
-    files.extend(report.figures.iter().map(|(name, figure)| (drawn.join(name), figure.as_str())));
-    keep(files)?;
-    forget(&drawn, report).map_err(|source| WriteError { path: drawn, source })
-}
+    /// Path of a result.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
 
-/// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its place.
-fn keep(texts: Vec<(PathBuf, &str)>) -> Result<(), WriteError> {
-    for (path, _) in &texts {
-        let above = path.ancestors().skip(1).find(|above| above.exists());
-        let source = match above {
-            _ if path.is_dir() => "a folder of that name is in the way",
-            Some(above) if !above.is_dir() => "a file is in the way of its folder",
-            _ => continue,
+    /// Writes texts by name, each whole or not at all, and none before all of them are on the disk.
+    pub fn write(&self, texts: &[(&str, &str)]) -> Result<(), WriteError> {
+        self.keep(texts, |_| false)
+    }
+
+    /// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where those of an older page go.
+    pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
+        let drawn: Vec<(String, &str)> =
+            report.figures.iter().map(|(name, figure)| (format!("{FIGURES}/{name}"), figure.as_str())).collect();
+        let told = REPORT.into_iter().zip([report.markdown.as_str(), report.html.as_str()]);
+        let figures = drawn.iter().map(|(name, figure)| (name.as_str(), *figure));
+        let texts: Vec<(&str, &str)> = texts.iter().copied().chain(told).chain(figures).collect();
+        let is_older = |name: &str| {
+            let figure = name.strip_prefix("figures/").is_some_and(is_figure);
+            figure && drawn.iter().all(|(own, _)| own != name)
         };
-        return Err(WriteError { path: path.clone(), source: io::Error::other(source) });
+        self.keep(&texts, is_older)
     }
-    let mut ready = Vec::with_capacity(texts.len());
-    for (path, text) in texts {
-        match files::prepared(&path, text) {
-            Ok(file) => ready.push((file, path)),
-            Err(source) => return Err(WriteError { path, source }),
+
+    /// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its
+    /// place. Files of the record of which `is_older` says so are removed.
+    fn keep(&self, texts: &[(&str, &str)], is_older: impl Fn(&str) -> bool) -> Result<(), WriteError> {
+        let mut record = self.record()?;
+        texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
+        let others = self.others(&record);
+        let older: Vec<String> = record.names().filter(|name| is_older(name)).map(str::to_owned).collect();
+        let older: Vec<_> = older.iter().filter(|name| record.writer(&self.folder, name).is_some()).collect();
+        let mut ready = Vec::with_capacity(texts.len());
+        for (name, text) in texts {
+            let path = self.path(name);
+            match Ready::new(&path, text) {
+                Ok(file) => ready.push((file, path)),
+                Err(source) => return Err(WriteError::Io { path, source }),
+            }
+            record.add(self.command, name, text);
         }
+        // Before the files, with what stands in their place now: they are known whenever this is interrupted.
+        self.write_record(&record)?;
+        for (file, path) in ready {
+            file.put().map_err(|source| WriteError::Io { path, source })?;
+        }
+        for name in &older {
+            let path = self.path(name);
+            fs::remove_file(&path).map_err(|source| WriteError::Io { path, source })?;
+        }
+        record.settle(|name| older.iter().any(|older| *older == name));
+        self.write_record(&record)?;
+        if let (Some(other), false) = (others, self.quiet) {
+            diagnostic::warn(&format!("the report of {other} in the same folder is replaced; --out keeps both"));
+        }
+        Ok(())
     }
-    for (file, path) in ready {
-        file.persist(&path).map_err(|error| WriteError { path, source: error.error })?;
+
+    /// The other command that wrote the report that is there.
+    fn others(&self, record: &Record) -> Option<String> {
+        let writer = REPORT.iter().find_map(|name| record.writer(&self.folder, name))?;
+        (writer != self.command).then(|| writer.to_owned())
     }
-    Ok(())
+
+    fn record(&self) -> Result<Record, WriteError> {
+        Record::of(&self.folder).map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+    }
+
+    fn write_record(&self, record: &Record) -> Result<(), WriteError> {
+        record.write(&self.folder).map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+    }
+
+    /// Whether a result may take its name.
+    fn check(&self, record: &Record, name: &str) -> Result<(), WriteError> {
+        let path = self.path(name);
+        let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
+        if path.is_dir() {
+            return why("a folder of that name is in the way");
+        }
+        match path.ancestors().skip(1).find(|above| above.symlink_metadata().is_ok()) {
+            Some(above) if !above.is_dir() && !above.as_os_str().is_empty() => {
+                return why("a file is in the way of its folder");
+            }
+            Some(above) if above != self.folder && above.starts_with(&self.folder) && above.is_symlink() => {
+                return why("its folder is a symbolic link, which is not followed");
+            }
+            _ => {}
+        }
+        if self.force || path.symlink_metadata().is_err() {
+            return Ok(());
+        }
+        if self.inputs.iter().any(|input| same_file(input, &path)) {
+            return Err(WriteError::Input { path });
+        }
+        if record.writer(&self.folder, name).is_none() {
+            return Err(WriteError::Foreign { path });
+        }
+        Ok(())
+    }
 }
 
-/// Removes figures from a folder that are not on the page; files that are no figures of flexcal stay.
-fn forget(drawn: &Path, report: &Report) -> io::Result<()> {
-    for entry in fs::read_dir(drawn)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        let is_old = |name: &str| is_figure(name) && report.figures.iter().all(|(own, _)| own != name);
-        if name.to_str().is_some_and(is_old) && entry.file_type()?.is_file() {
-            fs::remove_file(entry.path())?;
-        }
-    }
-    Ok(())
-}
-
-/// Prints to standard output; a closed pipe ends the printing quietly.
+/// Prints to standard output what people read, without characters that do something to their terminal; a closed pipe ends the
+/// printing quietly.
 pub fn print(text: &str) -> Result<(), WriteError> {
+    print_all(&visible(text))
+}
+
+/// Prints JSON to standard output: such characters stand in its texts alone, and are escaped there.
+pub fn print_json(json: &str) -> Result<(), WriteError> {
+    let mut text = String::with_capacity(json.len());
+    for character in json.chars() {
+        if is_hidden(character) && character != '\n' {
+            let mut halves = [0; 2];
+            text.extend(character.encode_utf16(&mut halves).iter().map(|half| format!("\\u{half:04x}")));
+        } else {
+            text.push(character);
+        }
+    }
+    print_all(&text)
+}
+
+/// Prints a text as it is, for other programs.
+pub fn print_all(text: &str) -> Result<(), WriteError> {
     match anstream::stdout().write_all(text.as_bytes()) {
         Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
-            Err(WriteError { path: PathBuf::from("standard output"), source })
+            Err(WriteError::Io { path: PathBuf::from("standard output"), source })
         }
         _ => Ok(()),
     }

@@ -77,6 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let declared = Problem::read(&common.problem)?;
     let pair = pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
+    let results = common.results("plan", &problem, &source.files(), &["plan.csv", "plan.json"])?;
     let candidates = match source.table(&problem, common.quiet)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
@@ -114,17 +115,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (plan, separated) = result?;
     let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
-    let folder = common.folder(&problem);
     let json = report::plan_json(&problem, criterion, source.seed, &plan, separated.as_ref());
     let table = report::poses_csv(&problem, &plan.poses);
-    output::write_all(&folder, &[("plan.csv", &table), ("plan.json", &json)])?;
+    results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::plan_text(&problem, criterion, &plan, separated.as_ref()))?;
         output::print(&format!(
             "\nWritten to {}, what it promises to plan.json beside it\n",
-            folder.join("plan.csv").display()
+            results.path("plan.csv").display()
         ))?;
     }
     if plan.suffices {

@@ -26,6 +26,13 @@ pub struct Source {
 }
 
 impl Source {
+    /// The files that are named.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let truth =
+            self.truth.iter().map(|truth| if truth.is_dir() { truth.join("TRUTH.toml") } else { truth.clone() });
+        self.candidates.iter().cloned().chain(truth).collect()
+    }
+
     /// The table of candidates, if one is named.
     pub fn table(&self, problem: &Problem, quiet: bool) -> Result<Option<Measurements>, InputError> {
         if self.candidates.is_empty() {

@@ -8,6 +8,7 @@ use flexcal::problem::{HeldOut, Problem};
 use flexcal::simulate::{Simulation, Truth, simulate};
 
 use super::outcome::Outcome;
+use super::output::Results;
 use super::{diagnostic, output};
 
 /// Arguments of `flexcal simulate`.
@@ -30,6 +31,9 @@ pub struct Arguments {
     /// Folder for results [default: out/<name of the problem>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    #[arg(long)]
+    force: bool,
     /// Print what is true as JSON on standard output, and nothing else
     #[arg(long)]
     json: bool,
@@ -42,15 +46,19 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
     let truth = Truth::read(&arguments.truth, &problem)?;
-    let simulation = simulate(&problem, &truth, arguments.poses as usize, arguments.seed)?;
+    let inside = |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
+    let own = [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
+    let inputs = [&own[..], &problem.data.files].concat();
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name));
-    let json = simulation.truth_json();
-    let table = output::write(&folder, "measurements.csv", &simulation.csv())?;
-    output::write(&folder, "truth.json", &json)?;
+    let (force, quiet) = (arguments.force, arguments.quiet);
+    let results = Results::claim("simulate", folder, inputs, &["measurements.csv", "truth.json"], (force, quiet))?;
+    let simulation = simulate(&problem, &truth, arguments.poses as usize, arguments.seed)?;
+    let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
+    results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is divided by whoever reads the rows.
     let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. })) || simulation.held_out() > 0;
     if arguments.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if !arguments.quiet {
         output::print(&summary(&simulation, &table))?;
         if divided {

@@ -8,7 +8,7 @@ use flexcal::monte_carlo::{self, CellResult, Shard, Store, Study};
 use flexcal::report;
 
 use super::outcome::Outcome;
-use super::output;
+use super::output::{self, Results, WriteError};
 use super::progress::FitBar;
 
 /// Arguments of `flexcal study`.
@@ -50,6 +50,9 @@ struct Common {
     /// Folder for results [default: out/<name of the study>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    #[arg(long)]
+    force: bool,
     /// Print the result as JSON on standard output, and nothing else
     #[arg(long)]
     json: bool,
@@ -58,9 +61,21 @@ struct Common {
     quiet: bool,
 }
 
+/// A folder of shares that is not there.
+#[derive(Debug, thiserror::Error)]
+#[error("--from {}: no such folder", folder.display())]
+struct NoFolder {
+    folder: PathBuf,
+}
+
+/// The results.
+const NAMES: [&str; 4] = ["study.json", "parameters.csv", "timing.csv", "study.csv"];
+
 impl Common {
-    fn folder(&self, study: &Study) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| Path::new("out").join(&study.name))
+    /// Where the results go.
+    fn results(&self, study: &Study) -> Result<Results, WriteError> {
+        let folder = self.out.clone().unwrap_or_else(|| Path::new("out").join(&study.name));
+        Results::claim("study", folder, study.files.clone(), &NAMES, (self.force, self.quiet))
     }
 
     /// Whether people read along.
@@ -74,22 +89,25 @@ impl Common {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
-        let folder = common.folder(&study);
-        let stores =
-            if from.is_empty() { vec![Store::new(&folder)] } else { from.iter().map(|f| Store::new(f)).collect() };
-        return finish(common, &study, &folder, &stores);
+        let results = common.results(&study)?;
+        if let Some(folder) = from.iter().find(|folder| !folder.is_dir()) {
+            return Err(NoFolder { folder: folder.clone() }.into());
+        }
+        let folders = if from.is_empty() { std::slice::from_ref(&results.folder) } else { from.as_slice() };
+        let stores: Vec<Store> = folders.iter().map(|folder| Store::new(folder)).collect();
+        return finish(common, &study, &results, &stores);
     }
     // Without a subcommand clap asks for these.
     let Some(common) = &arguments.common else { return Ok(Outcome::Done) };
     let study = Study::read(&common.study)?;
-    let folder = common.folder(&study);
-    let store = Store::new(&folder);
+    let results = common.results(&study)?;
+    let store = Store::new(&results.folder);
     fit(common, &study, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
     if arguments.shard.is_none() {
-        return finish(common, &study, &folder, &[store]);
+        return finish(common, &study, &results, &[store]);
     }
     if common.talks() {
-        let (file, folder) = (common.study.display(), folder.display());
+        let (file, folder) = (common.study.display(), results.folder.display());
         output::print(&format!("Share done. After the last: flexcal study merge {file} --out {folder}\n"))?;
     }
     Ok(Outcome::Done)
@@ -106,25 +124,25 @@ fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<()
     Ok(done?)
 }
 
-fn finish(common: &Common, study: &Study, folder: &Path, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
-    let results = monte_carlo::collect(study, stores)?;
-    let json = report::study_json(study, &results);
+fn finish(common: &Common, study: &Study, results: &Results, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
+    let found = monte_carlo::collect(study, stores)?;
+    let json = report::study_json(study, &found);
     let texts = [
-        ("study.json", json.as_str()),
-        ("parameters.csv", &report::study_parameters_csv(study, &results)),
-        ("timing.csv", &report::study_timing_csv(&results)),
-        ("study.csv", &report::study_csv(study, &results)),
+        (NAMES[0], json.as_str()),
+        (NAMES[1], &report::study_parameters_csv(study, &found)),
+        (NAMES[2], &report::study_timing_csv(&found)),
+        (NAMES[3], &report::study_csv(study, &found)),
     ];
-    output::write_all(folder, &texts)?;
+    results.write(&texts)?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
-        output::print(&report::study_text(study, &results))?;
+        output::print(&report::study_text(study, &found))?;
         output::print(&format!(
             "\nWritten to {}, each parameter to parameters.csv beside it\n",
-            folder.join("study.csv").display()
+            results.path("study.csv").display()
         ))?;
     }
     let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
-    Ok(if results.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })
+    Ok(if found.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })
 }

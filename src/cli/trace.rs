@@ -25,7 +25,7 @@ pub struct Arguments {
 /// Fits, traces what is left, writes `trace.json`, and prints the ranking.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data } = common.read()?;
+    let Input { problem, data, results } = common.read("trace", &["trace.json"])?;
     let line = common.talks().then(Line::new);
     let options = Options::default().with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::trace(&problem, &data, &options);
@@ -34,12 +34,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let trace = result?;
     let json = report::trace_json(&problem, &trace);
-    let path = output::write(&common.folder(&problem), "trace.json", &json)?;
+    results.write(&[("trace.json", &json)])?;
     if common.json {
-        output::print(&json)?;
+        output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::trace_text(&problem, &trace))?;
-        output::print(&format!("\nWritten to {}\n", path.display()))?;
+        output::print(&format!("\nWritten to {}\n", results.path("trace.json").display()))?;
     }
     Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

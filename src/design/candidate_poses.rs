@@ -203,6 +203,7 @@ impl<'a> Table<'a> {
             time: (0_u32..).take(count).map(f64::from).collect(),
             time_measured: false,
             approach: self.ranges.approach.then_some(self.approach),
+            pose: None,
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },
             target: None,
             marked_held_out: None,

@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use crate::identify::IdentifyError;
+
 /// What decides which effects are found and what is said of them.
 ///
 /// Parts are parts of 1, criteria are differences of ν ln(squares) + k ln ν + 2 ln(tries), −2 ln of the odds [Schwarz 1978].
@@ -181,6 +183,60 @@ impl SelectionRules {
         near_orders: 60,
         seed: 20_211_206,
     };
+
+    /// Whether every number makes sense: the first that does not is an error.
+    ///
+    /// # Errors
+    /// A probability or part that is none, a length or number that is not above zero, an empty range.
+    pub fn check(&self) -> Result<(), IdentifyError> {
+        let part = |value: f64| value > 0.0 && value < 1.0;
+        let size = |value: f64| value > 0.0 && value.is_finite();
+        let rules = [
+            ("level", part(self.level)),
+            ("leaving_level", part(self.leaving_level) && self.leaving_level >= self.level),
+            ("beyond_doubt", size(self.beyond_doubt)),
+            ("rival", size(self.rival)),
+            ("overwhelming", part(self.overwhelming)),
+            ("as_much", part(self.as_much)),
+            ("impossible", size(self.impossible)),
+            ("absorbed", part(self.absorbed)),
+            ("rounding", part(self.rounding)),
+            ("round_work", size(self.round_work)),
+            ("blocks", self.blocks >= 2),
+            ("least_side", self.least_side >= 1),
+            ("range_parts", self.range_parts >= 2),
+            (
+                "prior_scales",
+                !self.prior_scales.is_empty() && self.prior_scales.clone().all(|power| power.abs() < 1000),
+            ),
+            ("spline_intervals", self.spline_intervals.iter().all(|&number| (1..=1000).contains(&number))),
+            ("poses_per_spline", self.poses_per_spline >= 1),
+            ("shape_centres", (1..=10_000).contains(&self.shape_centres)),
+            ("shape_widths", self.shape_widths.iter().all(|&width| size(width))),
+            ("shape_steps", size(self.shape_steps.0) && part(self.shape_steps.1) && self.shape_steps.0 < 1.0),
+            ("placing_poses", self.placing_poses >= 1),
+            ("worthwhile", part(self.worthwhile)),
+            ("alike", size(self.alike)),
+            ("telling_poses", self.telling_poses >= 1),
+            ("power", part(self.power)),
+            ("time_step", size(self.time_step)),
+            ("resamples", (1..=10_000_000).contains(&self.resamples)),
+            ("covered", part(self.covered)),
+            ("weighed_poses", self.weighed_poses >= 1),
+            ("unknown_law", size(self.unknown_law)),
+            ("displacements", self.displacements.iter().all(|&size_of| size(size_of))),
+            ("trust_declared", size(self.trust_declared)),
+            ("trust_estimated", size(self.trust_estimated)),
+            ("together", self.together >= 1),
+            ("extended", self.extended >= 1),
+            ("extending", self.extending >= 1),
+            ("hopeless", size(self.hopeless)),
+            ("smooth_lengths", self.smooth_lengths.iter().all(|&length| size(length))),
+            ("surface_length", size(self.surface_length)),
+            ("slow_length", size(self.slow_length)),
+        ];
+        rules.into_iter().find(|(_, holds)| !holds).map_or(Ok(()), |(rule, _)| Err(IdentifyError::Rule { rule }))
+    }
 }
 
 impl Default for SelectionRules {

@@ -80,6 +80,7 @@ pub fn trace_by(
     options: &Options,
     rules: &SelectionRules,
 ) -> Result<Trace, IdentifyError> {
+    rules.check()?;
     let data = Data::new(data, rules).with_candidates(&options.candidates);
     let fitted = Fitted::new(problem.clone(), &data, options)?;
     Ok(Trace { evidence: weigh(&fitted, &data), ..trace_fit(&fitted, &data) })

@@ -30,6 +30,12 @@ pub enum InputErrorKind {
     GivenFileMissing,
     #[error("cannot be read: {source}")]
     Unreadable { source: io::Error },
+    #[error("larger than {most} MiB; is it the right file?")]
+    FileTooLarge { most: u64 },
+    #[error("the line is longer than {most} KiB; is it a table with its rows on lines of their own?")]
+    LineTooLong { most: u64 },
+    #[error("{found} {what}; at most {most}")]
+    TooMany { what: &'static str, found: usize, most: usize },
     #[error("not UTF-8 text; save the file as UTF-8")]
     NotUtf8,
     #[error("the header is not UTF-8 text; save the file as UTF-8")]
@@ -58,6 +64,12 @@ pub enum InputErrorKind {
     // Values.
     #[error("{value} is not a finite number")]
     NotFinite { value: String },
+    #[error("{value} is larger than 1e150, the largest number that can be reckoned with")]
+    TooGreat { value: String },
+    #[error(
+        "holds a character that is not seen (U+{code:04X}: a control character, or a mark of writing direction); leave it out"
+    )]
+    Hidden { code: u32 },
     #[error("{value} is not a whole number of at least {least}")]
     NotWhole { value: String, least: u64 },
     #[error("{value} is too large; at most {most}")]
@@ -199,7 +211,7 @@ pub enum InputErrorKind {
     EmptyList,
     #[error("the study says how many poses there are; leave it out")]
     PosesOfStudy,
-    #[error("the model makes no measurements with effects; write data = \"rig\"")]
+    #[error("the model makes no measurements with effects that the problem does not declare; write data = \"rig\"")]
     NeedsRig,
     #[error("{solver} does not keep the bounds and constraints of the problem; write bounded or auto")]
     SolverIgnoresBounds { solver: &'static str },
@@ -273,10 +285,16 @@ pub enum WarningKind {
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]
     UnitIgnored { write: String },
+    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", more(*rows))]
+    RowsRepeated { rows: usize, first: String },
     #[error(
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
     )]
     BeyondLimits { rows: usize, worst: String, limits: String },
+}
+
+fn more(rows: usize) -> String {
+    if rows > 1 { format!(", and {} further rows repeat others", rows - 1) } else { String::new() }
 }
 
 fn plural(count: usize) -> &'static str {

@@ -2,6 +2,7 @@
 
 mod kind;
 mod near;
+mod plain;
 
 use std::fmt;
 use std::ops::Range;
@@ -10,6 +11,7 @@ use std::sync::Arc;
 
 pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::nearest;
+pub use plain::{is_hidden, one_line, veiled, visible};
 
 /// How UTF-16 text begins, in either order of its bytes.
 pub(crate) const BYTE_ORDER_MARKS: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
@@ -86,7 +88,7 @@ impl fmt::Display for Location {
             write!(f, ":{line}")?;
         }
         if let Some(key) = &self.key {
-            write!(f, ": {}", one_line(key))?;
+            write!(f, ": {}", one_line(&shortened(key, KEY)))?;
         }
         Ok(())
     }
@@ -130,20 +132,18 @@ impl fmt::Display for Warning {
     }
 }
 
+/// Longest key that is shown [characters].
+const KEY: usize = 200;
+
+/// The beginning of a text, with an ellipsis where more follows.
+pub(crate) fn shortened(text: &str, longest: usize) -> String {
+    match text.char_indices().nth(longest) {
+        Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default()),
+        None => text.to_owned(),
+    }
+}
+
 /// Number of lines that a text has begun.
 pub(crate) fn lines(text: &[u8]) -> usize {
     text.split(|&byte| byte == b'\n').count()
-}
-
-/// Text on one line: line breaks and other control characters are written as escapes.
-fn one_line(text: &str) -> String {
-    let mut line = String::with_capacity(text.len());
-    for character in text.chars() {
-        if character.is_control() {
-            line.extend(character.escape_default());
-        } else {
-            line.push(character);
-        }
-    }
-    line
 }

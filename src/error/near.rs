@@ -5,8 +5,14 @@ use strsim::normalized_damerau_levenshtein;
 /// How alike two words must be for one to be meant by the other: 1 is the same word, 0 has nothing in common.
 const ALIKE: f64 = 0.6;
 
+/// Longer words are not compared: no known one is near [bytes].
+const LONGEST: usize = 80;
+
 /// The known word that `word` is most like, if it is like one at all; of equals the first.
 pub(crate) fn nearest<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> Option<T> {
+    if word.len() > LONGEST {
+        return None;
+    }
     let word = word.to_lowercase();
     let mut best: Option<(f64, T)> = None;
     for candidate in known {

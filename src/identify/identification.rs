@@ -122,6 +122,14 @@ pub enum IdentifyError {
         /// The strategy that was asked for.
         strategy: &'static str,
     },
+    /// A rule of the search for effects has a value that makes no sense.
+    #[error(
+        "the rule {rule} of the search for effects has a value that makes no sense; docs/selection.md says what it stands for"
+    )]
+    Rule {
+        /// Its name.
+        rule: &'static str,
+    },
     /// Data have a configuration of another length than the arm.
     #[error("configurations of {found} joints for an arm of {joints}")]
     JointCount {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 
 use super::{Dataset, Labels, Measurements, Split};
+use crate::problem::item::GREATEST;
 
 /// Arrays that make no data set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -235,11 +236,23 @@ impl DatasetBuilder {
             temperature: one("temperature", self.temperature)?,
             time_measured: time.is_some(),
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
-            approach: self.approach.map(|approach| flat("approach", &approach)).transpose()?,
+            approach: self.approach.map(|approach| directions(flat("approach", &approach)?, joints)).transpose()?,
+            pose: None,
             session: words("session", self.session)?.unwrap_or_else(unnamed),
             target: words("target", self.target)?,
             marked_held_out: None,
         })
+    }
+}
+
+/// Directions −1, 0 and +1, so many of each row.
+fn directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError> {
+    match values.iter().position(|value| ![-1.0, 0.0, 1.0].contains(value)) {
+        Some(place) => {
+            let (column, row) = ("approach", place / joints.max(1));
+            Err(DatasetError::OutOfRange { column, row, rule: "none of −1, 0 and +1" })
+        }
+        None => Ok(values),
     }
 }
 
@@ -252,5 +265,9 @@ fn length(column: &'static str, found: usize, expected: usize) -> Result<(), Dat
 }
 
 fn finite(column: &'static str, row: usize, values: &[f64]) -> Result<(), DatasetError> {
-    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(DatasetError::NotFinite { column, row }) }
+    if !values.iter().all(|value| value.is_finite()) {
+        return Err(DatasetError::NotFinite { column, row });
+    }
+    let reckoned_with = values.iter().all(|value| value.abs() <= GREATEST);
+    if reckoned_with { Ok(()) } else { Err(DatasetError::OutOfRange { column, row, rule: "larger than 1e150" }) }
 }

@@ -26,6 +26,9 @@ pub(super) enum Role {
     Pose,
 }
 
+/// Unknown columns of which is asked what they are meant to be; who has more means none.
+const ASKED: usize = 100;
+
 /// Columns without a unit.
 const PLAIN: [(&str, Role); 4] =
     [("split", Role::Split), ("session", Role::Session), ("target", Role::Target), ("pose", Role::Pose)];
@@ -78,6 +81,7 @@ impl Columns {
             Some(_) => None,
         };
         let numbering = Numbering::of(&table.header, problem);
+        let there: BTreeSet<&str> = table.header.iter().map(|name| split_unit(name).0).collect();
         let mut found: BTreeMap<Role, &str> = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut columns = Self { read: Vec::new(), marked: None };
@@ -102,7 +106,9 @@ impl Columns {
                 Meaning::Ignored(kind) => warnings.push(Warning { location: table.column(name), kind }),
                 Meaning::Unknown => {
                     unknown.push(name.as_str());
-                    let kind = WarningKind::ColumnIgnored { meant: numbering.meant(name, table, problem) };
+                    let asked = unknown.len() <= ASKED;
+                    let meant = asked.then(|| numbering.meant(name, &there, problem)).flatten();
+                    let kind = WarningKind::ColumnIgnored { meant };
                     warnings.push(Warning { location: table.column(name), kind });
                 }
             }
@@ -191,7 +197,7 @@ impl Numbering {
     }
 
     /// The column that an unknown name is meant to be, of those that the table does not have.
-    fn meant(&self, name: &str, table: &Table, problem: &Problem) -> Option<String> {
+    fn meant(&self, name: &str, there: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
         let joints = problem.joints.iter().enumerate().filter_map(|(index, joint)| Some((index, unit_of(joint.kind)?)));
         let joints = joints.map(|(index, unit)| (self.number(index), unit));
         let plain = PLAIN.iter().map(|(name, _)| (*name).to_owned());
@@ -199,8 +205,8 @@ impl Numbering {
         let measured = MEASURED.iter().map(|&(base, _, unit, _)| (base.to_owned(), unit));
         let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
         let measured = measured.flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
-        let there = |name: &String| table.header.iter().any(|own| split_unit(own).0 == split_unit(name).0);
-        nearest(name, plain.chain(approach).chain(measured).filter(|name| !there(name)))
+        let lacking = |name: &String| !there.contains(split_unit(name).0);
+        nearest(name, plain.chain(approach).chain(measured).filter(lacking))
     }
 
     /// What the name of a column means.

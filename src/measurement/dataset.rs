@@ -54,7 +54,8 @@ impl Dataset {
     /// # Errors
     /// The first mistake found in the files or in their division.
     pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
-        let (measurements, warnings) = Measurements::read(files, problem)?;
+        let (measurements, mut warnings) = Measurements::read(files, problem)?;
+        warnings.extend(measurements.repeated_rows());
         Ok((Self::of(problem, measurements)?, warnings))
     }
 }

@@ -3,6 +3,7 @@
 mod builder;
 mod columns;
 mod dataset;
+mod duplicates;
 mod limits;
 mod lines;
 mod read;
@@ -49,6 +50,8 @@ pub struct Measurements {
     pub time_measured: bool,
     /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints without a column.
     pub approach: Option<Vec<f64>>,
+    /// Number of each pose from the column `pose`, where every row has one and it is a number.
+    pub pose: Option<Vec<f64>>,
     /// Session of each row; one unnamed label where there is no column.
     pub session: Labels,
     /// Target of each row; `None` where there is no column.
@@ -129,6 +132,7 @@ impl Measurements {
             time: one(&self.time),
             time_measured: self.time_measured,
             approach: self.approach.as_deref().map(each),
+            pose: self.pose.as_deref().map(one),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
             marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
@@ -150,6 +154,7 @@ impl Measurements {
         all.temperature = both(&self.temperature, &other.temperature);
         all.time.extend(&other.time);
         all.approach = both(&self.approach, &other.approach);
+        all.pose = both(&self.pose, &other.pose);
         all.session.of_row.extend(&other.session.of_row);
         all
     }

@@ -10,6 +10,7 @@ use super::limits::Commands;
 use super::table::{Table, shortened};
 use super::{Labels, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, Warning};
+use crate::files::same_file;
 use crate::problem::Problem;
 
 impl Measurements {
@@ -33,7 +34,7 @@ impl Measurements {
         let mut warnings = Vec::new();
         let mut builder: Option<Builder> = None;
         for (index, file) in files.iter().enumerate() {
-            if files[..index].contains(file) {
+            if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 return Err(named_by(file, problem).error(InputErrorKind::RepeatedFile { path: file.clone() }));
             }
             let mut table = Table::open(file, || missing(file, problem))?;
@@ -135,6 +136,7 @@ impl Builder {
             time: Vec::new(),
             time_measured: columns.has(Role::Time),
             approach: approach.then(Vec::new),
+            pose: columns.has(Role::Pose).then(Vec::new),
             session: Labels::default(),
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
@@ -176,7 +178,7 @@ impl Builder {
         if !measurements.time_measured {
             measurements.time.push(row as f64);
         }
-        let mut position = Vector3::zeros();
+        let (mut position, mut pose) = (Vector3::zeros(), None);
         for column in &columns.read {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
@@ -196,15 +198,19 @@ impl Builder {
                 // Kept for later: checked, not stored.
                 Role::Orientation(_) => _ = number()?,
                 Role::Split => _ = is_validation(table, column.place)?,
-                Role::Session => self.session.push(table.word(column.place)?),
-                Role::Target => self.target.push(table.word(column.place)?),
-                Role::Pose => {}
+                Role::Session => self.session.push(table.name(column.place)?),
+                Role::Target => self.target.push(table.name(column.place)?),
+                Role::Pose => pose = table.text(column.place)?.parse().ok().filter(|number: &f64| number.is_finite()),
             }
         }
         if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
             marked.push(is_validation(table, place)?);
         }
         measurements.positions.push(position);
+        match (&mut measurements.pose, pose) {
+            (Some(poses), Some(pose)) => poses.push(pose),
+            _ => measurements.pose = None,
+        }
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Rows that repeat a pose.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeSet, HashMap};
 
 use super::Measurements;
@@ -17,9 +18,26 @@ const TEMPERATURE_STEP: f64 = 1.0;
 const SAME: f64 = 0.5;
 
 impl Measurements {
-    /// The configuration of each row, numbered in order of appearance, and how many there are.
+    /// The configuration of each row and how many there are, numbered in an order that is not that of the rows: by session, by
+    /// pose number and time where they were written down, then by what was measured.
     pub(super) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
-        numbered(&self.joint_columns(problem), self.len())
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        let keys: Vec<_> = order.iter().map(|&row| self.key(row)).collect();
+        let compare = |a: &(&str, Vec<f64>), b: &(&str, Vec<f64>)| {
+            let numbers = a.1.iter().zip(&b.1).map(|(a, b)| a.total_cmp(b));
+            a.0.cmp(b.0).then(numbers.fold(Ordering::Equal, Ordering::then))
+        };
+        order.sort_by(|&a, &b| compare(&keys[a], &keys[b]));
+        numbered(&self.joint_columns(problem), &order)
+    }
+
+    /// By what rows are ordered: session, pose number, time, configuration, position.
+    fn key(&self, row: usize) -> (&str, Vec<f64>) {
+        let session = self.session.names.get(self.session.of_row[row]).map_or("", String::as_str);
+        let pose = self.pose.as_ref().map(|poses| poses[row]);
+        let time = self.time_measured.then(|| self.time[row]);
+        let measured = self.configuration(row).iter().chain(&self.positions[row]).copied();
+        (session, pose.into_iter().chain(time).chain(measured).collect())
     }
 
     /// The pose of each row, numbered in order of appearance: rows of one pose tell the same about the arm.
@@ -47,7 +65,7 @@ impl Measurements {
             let side = |joint: usize| (0..self.len()).map(|row| approach[row * self.joints + joint]).collect();
             columns.extend((0..self.joints).map(|joint| Column { values: side(joint), step: SAME }));
         }
-        numbered(&columns, self.len()).0
+        numbered(&columns, &(0..self.len()).collect::<Vec<_>>()).0
     }
 
     fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
@@ -70,18 +88,18 @@ struct Column {
     step: f64,
 }
 
-/// The group of each row, numbered in order of appearance, and how many groups there are.
+/// The group of each row, numbered as they appear in `order`, which holds every row, and how many groups there are.
 ///
 /// A row belongs to the group of an earlier row if every column differs by at most its step. Only rows are compared whose
 /// weighted sums Σ wⱼ vⱼ/stepⱼ, in bins of Σ wⱼ, fall in the same or neighbouring bins: rows that agree always do.
-fn numbered(columns: &[Column], rows: usize) -> (Vec<usize>, usize) {
+fn numbered(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
     // Weights without a common measure, so that unlike rows seldom share a bin.
     let weights: Vec<f64> = (1..=columns.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();
     let width: f64 = weights.iter().sum();
     let mut first_rows: HashMap<i64, Vec<(usize, usize)>> = HashMap::new();
-    let mut of_row = Vec::with_capacity(rows);
+    let mut of_row = vec![0; order.len()];
     let mut count = 0;
-    for row in 0..rows {
+    for &row in order {
         let sum: f64 = columns.iter().zip(&weights).map(|(own, weight)| weight * own.values[row] / own.step).sum();
         let bin = floor(sum / width);
         let agrees = |&&(first, _): &&(usize, usize)| {
@@ -93,7 +111,7 @@ fn numbered(columns: &[Column], rows: usize) -> (Vec<usize>, usize) {
             first_rows.entry(bin).or_default().push((row, number));
             count += 1;
         }
-        of_row.push(number);
+        of_row[row] = number;
     }
     (of_row, count)
 }

@@ -7,8 +7,12 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::lines::Lines;
-use crate::error::{BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, lines};
+use super::lines::{Lines, RECORD_KIB};
+use crate::error::{BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines};
+use crate::problem::item::GREATEST;
+
+/// Most columns of a table.
+const COLUMNS: usize = 10_000;
 
 /// An open CSV file.
 pub(super) struct Table {
@@ -45,6 +49,10 @@ impl Table {
         }
         table.header_line = table.line;
         let mistake = |kind| Location::file(file).at_line(table.line).error(kind);
+        if table.record.len() > COLUMNS {
+            let found = table.record.len();
+            return Err(mistake(InputErrorKind::TooMany { what: "columns", found, most: COLUMNS }));
+        }
         if BYTE_ORDER_MARKS.iter().any(|mark| table.record.as_slice().starts_with(mark)) {
             return Err(mistake(InputErrorKind::Utf16));
         }
@@ -82,7 +90,12 @@ impl Table {
 
     fn advance(&mut self) -> Result<bool, InputError> {
         let first = self.next_line();
+        self.reader.get_mut().start_record();
         let found = self.reader.read_byte_record(&mut self.record).map_err(|error| {
+            if matches!(error.kind(), csv::ErrorKind::Io(source) if source.kind() == io::ErrorKind::FileTooLarge) {
+                let kind = InputErrorKind::LineTooLong { most: RECORD_KIB };
+                return Location::file(&self.file).at_line(first).error(kind);
+            }
             let source = io::Error::from(error);
             Location::file(&self.file).error(InputErrorKind::Unreadable { source })
         })?;
@@ -122,12 +135,24 @@ impl Table {
         if word.is_empty() { Err(self.cell_error(place, InputErrorKind::EmptyCell)) } else { Ok(word) }
     }
 
+    /// A cell of the row as a word that can be seen.
+    pub fn name(&self, place: usize) -> Result<&str, InputError> {
+        let word = self.word(place)?;
+        match word.chars().find(|&character| is_hidden(character)) {
+            Some(hidden) => Err(self.cell_error(place, InputErrorKind::Hidden { code: hidden.into() })),
+            None => Ok(word),
+        }
+    }
+
     /// A cell of the row as a finite number.
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
         let word = self.word(place)?;
         let value = || shortened(word);
         match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
+            Ok(number) if number.abs() <= GREATEST => Ok(number),
+            Ok(number) if number.is_finite() => {
+                Err(self.cell_error(place, InputErrorKind::TooGreat { value: value() }))
+            }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
             Err(_) => Err(self.cell_error(place, InputErrorKind::NotANumber { value: value() })),
         }
@@ -169,8 +194,5 @@ impl Table {
 
 /// At most 40 characters of a text.
 pub(super) fn shortened(text: &str) -> String {
-    match text.char_indices().nth(40) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
-    }
+    crate::error::shortened(text, 40)
 }

@@ -9,7 +9,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::statics::{MAX_PASSES, SETTLED};
+use super::statics::{MAX_PASSES, SETTLED, StaticsError};
 use super::tape::{Column, Each, Felt, Load, Section, Step, Tape};
 use crate::spatial::Frame;
 
@@ -37,7 +37,15 @@ impl Virtual {
 
 impl Tape {
     /// Finds Λ, then the derivatives of the position `at` \[m\] of the target with respect to all parameters.
-    pub(super) fn differentiate(&mut self, at: &Vector3<f64>) {
+    pub(super) fn differentiate(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
+        self.find_influence(at)?;
+        self.weigh_loads();
+        self.adjoint_sweep(at, Sought::Parameters);
+        Ok(())
+    }
+
+    /// Sweeps until Λ is its own image.
+    fn find_influence(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.anderson.restart();
         for _ in 0..MAX_PASSES {
             self.weigh_loads();
@@ -46,12 +54,11 @@ impl Tape {
             let largest = image.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let change = influence.iter().zip(&*image).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             if change <= SETTLED * largest {
-                break;
+                return Ok(());
             }
             anderson.advance(influence, image);
         }
-        self.weigh_loads();
-        self.adjoint_sweep(at, Sought::Parameters);
+        Err(StaticsError::NotSettled)
     }
 
     /// What a move of each load does.

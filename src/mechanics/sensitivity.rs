@@ -6,7 +6,7 @@ use num_dual::Dual64;
 use super::arm::Arm;
 use super::forward::Bend;
 use super::segment::{Segment, moment_lanes};
-use super::statics::Equilibrated;
+use super::statics::{Equilibrated, StaticsError};
 use super::tape::Tape;
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
@@ -45,7 +45,15 @@ impl Sensitivity {
     }
 
     /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame, and finds all derivatives.
-    pub fn differentiate(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
+    ///
+    /// # Errors
+    /// Λ does not settle: a little more load, and the arm would not come to rest.
+    pub fn differentiate(
+        &mut self,
+        setup: &PoseView,
+        target: &Vector3<f64>,
+        pose: &mut Equilibrated,
+    ) -> Result<(), StaticsError> {
         let Self { arms, parameters, lanes, ws, tape } = self;
         let mut moments = std::mem::take(&mut ws.moments);
         for (lane, arm) in arms.iter().enumerate() {
@@ -64,11 +72,12 @@ impl Sensitivity {
             tape.fill(lane, ws);
         }
         ws.moments = moments;
-        tape.differentiate(&pose.frame.point(target));
+        tape.differentiate(&pose.frame.point(target))?;
         pose.adjoint.clear();
         for i in 0..3 {
             pose.adjoint.extend(tape.influence.iter().skip(i).step_by(3));
         }
+        Ok(())
     }
 
     /// Derivative of the position \[m\], arm base frame, with respect to the parameter in a direction of a segment.

@@ -122,10 +122,18 @@ impl Response {
     }
 
     /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame.
-    pub fn adjoint(&mut self, setup: &PoseView, target: &Vector3<f64>, pose: &mut Equilibrated) {
+    ///
+    /// # Errors
+    /// Λ does not settle: a little more load, and the arm would not come to rest.
+    pub fn adjoint(
+        &mut self,
+        setup: &PoseView,
+        target: &Vector3<f64>,
+        pose: &mut Equilibrated,
+    ) -> Result<(), StaticsError> {
         let n = pose.moments.len();
         if n == 0 || (self.arm.is_first_order() && self.arm.mixing.is_none()) {
-            return;
+            return Ok(());
         }
         pose.position_response.resize(3 * n, 0.0);
         pose.moment_response.resize(n * n, 0.0);
@@ -148,13 +156,13 @@ impl Response {
             }
         }
         self.ws.moments = moments;
-        pose.solve_adjoint();
+        pose.solve_adjoint()
     }
 }
 
 impl Equilibrated {
     /// Λ = `P_x` + Λ `G_x` by the same contraction as the equilibrium itself.
-    fn solve_adjoint(&mut self) {
+    fn solve_adjoint(&mut self) -> Result<(), StaticsError> {
         let n = self.moments.len();
         self.adjoint.clear();
         self.adjoint.extend_from_slice(&self.position_response);
@@ -162,6 +170,7 @@ impl Equilibrated {
             let direct = &self.position_response[row * n..(row + 1) * n];
             let adjoint = &mut self.adjoint[row * n..(row + 1) * n];
             let scale = direct.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let mut settled = false;
             for _ in 0..MAX_PASSES {
                 let mut change = 0.0_f64;
                 // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything inboard.
@@ -171,11 +180,16 @@ impl Equilibrated {
                     change = change.max((next - adjoint[j]).abs());
                     adjoint[j] = next;
                 }
-                if change <= SETTLED * scale {
+                settled = change <= SETTLED * scale;
+                if settled {
                     break;
                 }
             }
+            if !settled {
+                return Err(StaticsError::NotSettled);
+            }
         }
+        Ok(())
     }
 }
 

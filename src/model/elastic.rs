@@ -78,12 +78,12 @@ impl Elastic {
         arm.equilibrate(setup, real, rest).ok()?;
         match parts {
             Some(Parts { sensitivity, inputs }) => {
-                sensitivity.differentiate(setup, target, rest);
+                sensitivity.differentiate(setup, target, rest).ok()?;
                 for (input, part, lane) in inputs {
                     rows.put_input(input, commanded, &base.vector(&sensitivity.of(*part, *lane)));
                 }
             }
-            None if !whole.is_empty() => response.adjoint(setup, target, rest),
+            None if !whole.is_empty() => response.adjoint(setup, target, rest).ok()?,
             None => {}
         }
         for Whole { arm, input } in whole {

@@ -11,18 +11,19 @@ use crate::simulate::{Cause, HeldOutRows, Shape, Truth};
 /// text of the problem file, the truth, and the numbers of the study that concern these fits.
 ///
 /// It is the SHA-256 of lines of words and numbers, numbers in SI as short as they can be read back exactly: version,
-/// source, seed, held-out poses; σ, poses, strategy, solver, first repetition and the one after the last; the truth; the
-/// text of the problem file. Numbers that do not concern these fits do not enter: a study with one more noise level keeps
+/// source, seed, held-out poses; σ, poses, strategy, solver, first repetition and the one after the last; the truth; `effects
+/// drawn` where the strengths of declared effects are; the text of the problem file. Numbers that do not concern these fits do not enter: a study with one more noise level keeps
 /// the others' parts.
 pub(super) fn key(study: &Study, part: &Part) -> String {
     let Study { problem_text, source, seed, held_out, .. } = study;
+    let drawn = if study.draws_effects && !study.problem.effects.is_empty() { "\neffects drawn" } else { "" };
     let Cell { sigma, poses, strategy, solver } = &study.cells[part.cell];
     let (version, source) = (env!("CARGO_PKG_VERSION"), source.as_str());
     let (strategy, solver) = (strategy.as_str(), solver.as_str());
     let (first, end) = (part.repetitions.start, part.repetitions.end);
     let truth = canonical(&study.truth);
     hexadecimal(&format!(
-        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}\n{problem_text}"
+        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}{drawn}\n{problem_text}"
     ))
 }
 

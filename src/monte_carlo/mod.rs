@@ -5,6 +5,7 @@
 //! same poses, and nothing depends on the order, the number of threads, or on which machine did which part. The fits of
 //! a cell are done in [`Part`]s; a finished part is kept in a [`Store`], and results are only ever made from kept parts.
 
+mod effects;
 mod key;
 mod read;
 mod repetition;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::effects;
 use super::study::{Cell, Source, Study};
 use crate::error::{InputError, InputErrorKind};
 use crate::identify::{SolverChoice, Strategy};
@@ -35,7 +36,8 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let name = name(&mut root)?;
     let title = root.text("title")?.unwrap_or(&name).to_owned();
-    let (problem, problem_text) = problem(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
+    let (problem, problem_text, problem_file) =
+        problem(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
     let model = Model::new(&problem, &[String::new()], &[String::new()])?;
     let source = source(&mut root)?;
     let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
@@ -52,11 +54,16 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
         None => vec![SolverChoice::Auto.decide(&model)],
     };
     let truth = truth(&mut root, &problem, folder)?;
-    root.finish()?;
-    if let (Source::Model, false) = (source, truth.effects.is_empty()) {
-        let place = root.peek("truth").or_else(|| root.peek("effect"));
-        return Err(place.map_or_else(|| root.error(InputErrorKind::NeedsRig), |i| i.error(InputErrorKind::NeedsRig)));
+    let draws_effects = root.peek("truth").is_none();
+    let mut files = [&[file.to_owned(), problem_file], problem.data.files.as_slice()].concat();
+    if let Some(item) = root.peek("truth") {
+        files.push(truth_file(beside(&item, folder)?));
     }
+    root.finish()?;
+    effects::check(&problem, &truth, source, || {
+        let place = root.peek("truth").or_else(|| root.peek("effect"));
+        place.map_or_else(|| root.error(InputErrorKind::NeedsRig), |item| item.error(InputErrorKind::NeedsRig))
+    })?;
     let mut cells = Vec::new();
     for &sigma in &sigmas {
         for &poses in &poses {
@@ -66,22 +73,41 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
         }
     }
     let parameters = model.parameters;
-    Ok(Study { name, title, problem, parameters, truth, source, seed, repetitions, held_out, cells, problem_text })
+    Ok(Study {
+        files,
+        name,
+        title,
+        problem,
+        parameters,
+        truth,
+        draws_effects,
+        source,
+        seed,
+        repetitions,
+        held_out,
+        cells,
+        problem_text,
+    })
 }
 
-fn problem(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem, String), InputError> {
+fn problem(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem, String, PathBuf), InputError> {
     let mut file = beside(item, folder)?;
     if file.is_dir() {
         file.push("problem.toml");
     }
     let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
-    Ok((Problem::parse(&document.text, &file)?, document.text.to_string()))
+    Ok((Problem::parse(&document.text, &file)?, document.text.to_string(), file))
 }
 
 /// A file that the study names.
 fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
     if path.exists() { Ok(path) } else { Err(item.error(InputErrorKind::StudyFileMissing { path })) }
+}
+
+/// The file that is meant by a path to it or to its folder.
+fn truth_file(path: PathBuf) -> PathBuf {
+    if path.is_dir() { path.join("TRUTH.toml") } else { path }
 }
 
 fn source(root: &mut Section<'_, '_>) -> Result<Source, InputError> {

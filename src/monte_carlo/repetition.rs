@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use nalgebra::{DVector, Vector3};
 use rand::Rng as _;
 
+use super::effects::Strengths;
 use super::study::{Cell, Source, Study};
 use super::tally::{Fitted, ParameterScore, Score};
 use crate::identify::{Estimate, Identification, IdentifyError, Options, Placement, QualityFlag, identify};
@@ -12,7 +13,7 @@ use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 use crate::random::stream;
-use crate::simulate::{self, Draw, Rig, Row, TrueParameter, Truth};
+use crate::simulate::{self, Draw, Rig, Row, TrueEffect, TrueParameter, Truth};
 
 /// Measurements whose truth is known.
 struct Data {
@@ -47,16 +48,18 @@ pub(super) fn fit(study: &Study, problem: &Problem, cell: &Cell, repetition: usi
 /// noise scaled.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     let truth = Truth { noise_sigma: cell.sigma, ..study.truth.clone() };
-    let Draw { arm, parameters, mut rows } =
-        simulate::draw(&study.problem, &truth, study.held_out + cell.poses, seed_of(study, repetition));
+    let seed = seed_of(study, repetition);
+    let Draw { arm, parameters, mut rows } = simulate::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
+    let strengths = Strengths::draw(study, seed);
     let true_x = study.parameters.iter().map(|parameter| {
         let known = |known: &&TrueParameter| known.name == parameter.name;
-        Some(parameter.deviation(parameters.iter().find(known)?.value))
+        let value = parameters.iter().find(known).map(|known| known.value).or_else(|| strengths.of(&parameter.name));
+        Some(parameter.deviation(value?))
     });
     let true_x = true_x.collect();
     let seen = match study.source {
-        Source::Model => by_model(arm, &rows)?,
-        Source::Rig => by_rig(arm, &truth, &rows)?,
+        Source::Model => by_model(arm, &strengths, &rows)?,
+        Source::Rig => by_rig(arm, [truth.effects, strengths.for_rig(study)].concat(), truth.segments, &rows)?,
     };
     for (row, seen) in rows.iter_mut().zip(seen) {
         row.position += seen;
@@ -71,20 +74,23 @@ fn seed_of(study: &Study, repetition: usize) -> u64 {
     stream(study.seed, repetition as u64).next_u64()
 }
 
-/// Positions that the model predicts for an arm as declared \[m\].
-fn by_model(mut arm: Problem, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+/// Positions that the model predicts for an arm as declared, its effects at their strengths \[m\].
+fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+    // What no rule speaks of is free where it is an effect's, and held where it is the arm's.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
     let model = Model::new(&arm, &[String::new()], &[String::new()]).ok()?;
+    let x = model.parameters.iter().map(|own| Some(own.deviation(strengths.of(&own.name)?)));
+    let x = DVector::from_vec(x.collect::<Option<Vec<f64>>>()?);
     let mut table = table(rows);
     table.positions.fill(Vector3::zeros());
     let all: Vec<usize> = (0..rows.len()).collect();
-    let errors = Placement::of(&table).position_errors(&model, &DVector::zeros(0), &table, &all);
+    let errors = Placement::of(&table).position_errors(&model, &x, &table, &all);
     errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
 }
 
 /// Positions on the virtual test rig \[m\].
-fn by_rig(arm: Problem, truth: &Truth, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
-    let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
+fn by_rig(arm: Problem, effects: Vec<TrueEffect>, segments: usize, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+    let rig = Rig::new(arm, effects).with_segments(segments);
     rows.iter().map(|row| rig.position(&row.conditions).ok()).collect()
 }
 
@@ -105,6 +111,7 @@ pub fn table(rows: &[Row]) -> Measurements {
         time: rows.iter().map(|row| row.conditions.time).collect(),
         time_measured: true,
         approach: (!approach.is_empty()).then_some(approach),
+        pose: None,
         session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
         target: None,
         marked_held_out: None,

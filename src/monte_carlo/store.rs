@@ -1,15 +1,15 @@
 //! Finished parts on disk: one small file each, written whole or not at all.
 
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::{fs, mem};
 
 use serde::{Deserialize, Serialize};
 
 use super::key::key;
 use super::study::{Part, Study};
 use super::tally::Tally;
-use crate::files::prepared;
+use crate::files::Ready;
 
 /// Digits of the key that name a part's file.
 const NAME: usize = 16;
@@ -78,10 +78,7 @@ impl Store {
     /// Keeps a finished part.
     pub(super) fn keep(&self, kept: &Kept) -> Result<(), StoreError> {
         let path = self.path(&kept.key);
-        let write = || {
-            let file = prepared(&path, &serde_json::to_string_pretty(kept)?)?;
-            file.persist(&path).map(mem::drop).map_err(|error| error.error)
-        };
+        let write = || -> io::Result<()> { Ready::new(&path, &serde_json::to_string_pretty(kept)?)?.put() };
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
 

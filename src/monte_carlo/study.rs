@@ -1,6 +1,7 @@
 //! What a study asks for, as plain data in SI units, and the parts in which it is done.
 
 use std::ops::Range;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::identify::{SolverChoice, Strategy};
@@ -14,6 +15,8 @@ const REPETITIONS: usize = 50;
 /// A study as declared in `STUDY.toml`.
 #[derive(Debug, Clone)]
 pub struct Study {
+    /// The files that it was read from: its own, that of its problem, and that of its truth where it has one.
+    pub files: Vec<PathBuf>,
     /// Short name; results go to `out/<name>` by default.
     pub name: String,
     /// One line for people.
@@ -24,6 +27,8 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// From what arms and poses are drawn; without noise.
     pub truth: Truth,
+    /// Whether true strengths of declared effects are drawn from their priors, where the truth does not give them.
+    pub draws_effects: bool,
     /// What measures.
     pub source: Source,
     /// Seed of every random number.

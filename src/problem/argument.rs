@@ -2,10 +2,14 @@
 
 use serde::Serialize;
 
+use super::quoted::quoted;
 use super::section::Section;
 use super::{Joint, JointKind};
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
+
+/// Most orders of one effect.
+const MOST_ORDERS: usize = 100;
 
 /// An argument of an effect as the files write it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,9 +31,13 @@ impl Argument {
     pub fn toml(&self) -> String {
         match self {
             Self::Joint(joint) => joint.to_string(),
-            Self::Orders(orders) => format!("{orders:?}"),
-            Self::Name(name) => format!("{name:?}"),
-            Self::Time(time) => format!("{time:?}"),
+            Self::Orders(orders) => {
+                format!("[{}]", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(", "))
+            }
+            Self::Name(name) => quoted(name),
+            // A time is a float, whatever its value.
+            Self::Time(time) if time.fract() == 0.0 => format!("{time:.1}"),
+            Self::Time(time) => time.to_string(),
         }
     }
 
@@ -132,7 +140,9 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     pub fn orders(&mut self, key: &str) -> Result<Vec<u32>, InputError> {
         let item = self.section.require(key, &format!("{key} = [1], the harmonics"))?;
         let mut orders = Vec::new();
-        for element in item.list("a list of whole numbers")? {
+        let elements = item.list("a list of whole numbers")?;
+        item.check_count("orders", elements.len(), MOST_ORDERS)?;
+        for element in elements {
             let order = u32::from(element.small()?);
             if orders.contains(&order) {
                 return Err(element.error(InputErrorKind::RepeatedOrder { order }));
@@ -186,7 +196,7 @@ impl<'s> Examples<'s> {
 
     pub fn beam(&self) -> String {
         let name = self.joints.iter().find_map(|joint| joint.beam.as_ref()).map_or("A", |beam| beam.name.as_str());
-        format!("{name:?}")
+        quoted(name)
     }
 
     #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]

@@ -6,6 +6,9 @@ use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
+/// Most files of measurements.
+const MOST_FILES: usize = 1000;
+
 /// `[data]`.
 #[derive(Debug, Clone)]
 pub struct Data {
@@ -62,7 +65,9 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let mut files_location = location.clone();
     if let Some(item) = section.get("files") {
         let folder = file.file.parent().unwrap_or(Path::new(""));
-        for element in item.list("a list of file names")? {
+        let names = item.list("a list of file names")?;
+        item.check_count("files", names.len(), MOST_FILES)?;
+        for element in names {
             files.push(folder.join(element.text()?));
         }
         files_location = item.location();

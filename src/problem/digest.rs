@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::Vector3;
 use sha2::{Digest as _, Sha256};
 
+use super::quoted::quoted;
 use super::{BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Problem, Statics, Tool};
 
 impl Problem {
@@ -105,11 +106,6 @@ fn vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
     for value in vectors.iter().flat_map(|vector| vector.iter()) {
         number(text, *value);
     }
-}
-
-/// A name in quotes, quotes and backslashes in it with a backslash before them.
-fn quoted(name: &str) -> String {
-    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 fn optional(text: &mut String, value: Option<f64>) {

@@ -1,15 +1,21 @@
 //! A value of the problem file together with its place.
 
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::{fs, io};
 
 use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
-use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, lines};
+use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, is_hidden, lines};
+use crate::files::at_most;
+
+/// Largest file of TOML that is read [MiB].
+const LARGEST_MIB: u64 = 4;
+/// Largest number that is read: its square is one as well.
+pub(crate) const GREATEST: f64 = 1e150;
 
 /// The text that is read, and its name.
 pub(crate) struct Document {
@@ -20,9 +26,10 @@ pub(crate) struct Document {
 impl Document {
     /// Reads a text file; `missing` is the mistake where there is none.
     pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
-        let bytes = fs::read(file).map_err(|source| {
+        let bytes = at_most(file, LARGEST_MIB << 20).map_err(|source| {
             Location::file(file).error(match source.kind() {
                 io::ErrorKind::NotFound => missing,
+                io::ErrorKind::FileTooLarge => InputErrorKind::FileTooLarge { most: LARGEST_MIB },
                 _ => InputErrorKind::Unreadable { source },
             })
         })?;
@@ -123,9 +130,12 @@ impl<'a, 'i> Item<'a, 'i> {
             DeValue::Integer(integer) => (integer_as_float(integer), integer.as_str()),
             _ => return Err(self.wrong_type("a number")),
         };
-        number
-            .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| self.error(InputErrorKind::NotFinite { value: written.to_owned() }))
+        let value = || written.to_owned();
+        match number.filter(|number: &f64| number.is_finite()) {
+            Some(number) if number.abs() <= GREATEST => Ok(number),
+            Some(_) => Err(self.error(InputErrorKind::TooGreat { value: value() })),
+            None => Err(self.error(InputErrorKind::NotFinite { value: value() })),
+        }
     }
 
     /// A whole number of at least `least`.
@@ -150,15 +160,24 @@ impl<'a, 'i> Item<'a, 'i> {
             .ok_or_else(|| self.error(InputErrorKind::TooLarge { value: number, most: 1000 }))
     }
 
+    /// Refuses more of something than can be meant.
+    pub fn check_count(&self, what: &'static str, found: usize, most: usize) -> Result<(), InputError> {
+        if found > most { Err(self.error(InputErrorKind::TooMany { what, found, most })) } else { Ok(()) }
+    }
+
     /// True or false.
     pub fn boolean(&self) -> Result<bool, InputError> {
         self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// Text that is not empty.
+    /// Text that is not empty and can be seen.
     pub fn text(&self) -> Result<&'a str, InputError> {
         let text = self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))?;
-        if text.trim().is_empty() { Err(self.error(InputErrorKind::Empty)) } else { Ok(text) }
+        match text.chars().find(|&character| is_hidden(character)) {
+            _ if text.trim().is_empty() => Err(self.error(InputErrorKind::Empty)),
+            Some(hidden) => Err(self.error(InputErrorKind::Hidden { code: hidden.into() })),
+            None => Ok(text),
+        }
     }
 
     /// The elements of a list, counted from 1 in messages.

@@ -15,6 +15,7 @@ pub(crate) mod item;
 mod joint;
 mod parameters;
 pub(crate) mod pattern;
+mod quoted;
 pub(crate) mod read;
 mod robust;
 pub(crate) mod section;

@@ -44,6 +44,9 @@ pub struct Quantities {
     pub relative: Option<f64>,
 }
 
+/// Most rules.
+const MOST_RULES: usize = 2000;
+
 const KINDS: [Unit; 3] = [Unit::Angle, Unit::Length, Unit::Ratio];
 /// Where the nominal value lies on the scale of each kind: no deviation, or once the nominal.
 const NOMINALS: [f64; 3] = [0.0, 0.0, 1.0];
@@ -51,6 +54,9 @@ const NOMINALS: [f64; 3] = [0.0, 0.0, 1.0];
 /// Every rule, in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, InputError> {
     let Some(section) = root.section("parameters")? else { return Ok(Vec::new()) };
+    if let Some(item) = root.peek("parameters") {
+        item.check_count("rules", section.len(), MOST_RULES)?;
+    }
     section.entries().into_iter().map(|(pattern, item)| rule(pattern, &item)).collect()
 }
 

@@ -20,8 +20,17 @@ impl Problem {
     /// # Errors
     /// The first mistake found, a file that cannot be read among them.
     pub fn read(path: &Path) -> Result<Self, InputError> {
+        Self::read_with_text(path).map(|(problem, _)| problem)
+    }
+
+    /// As [`read`](Self::read), with the text: a pipe can be read only once.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
-        problem_of(&Document::read(&file, InputErrorKind::ProblemMissing)?)
+        let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
+        Ok((problem_of(&document)?, document.text))
     }
 
     /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.

@@ -6,8 +6,11 @@ use nalgebra::Vector3;
 use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
-use crate::error::{InputError, InputErrorKind, Location, nearest};
+use crate::error::{InputError, InputErrorKind, Location, nearest, shortened};
 use crate::quantity::{Suffix, Unit};
+
+/// Most tables `[[…]]` of one name: joints, masses of a beam, effects, constraints.
+const MOST_TABLES: usize = 100;
 
 /// A table that is being read.
 pub(crate) struct Section<'a, 'i> {
@@ -100,10 +103,12 @@ impl<'a, 'i> Section<'a, 'i> {
         self.get(key).map(|item| item.section()).transpose()
     }
 
-    /// The tables of `[[key]]`, none if it is not there.
+    /// The tables of `[[key]]`, none if it is not there and no more than can be meant.
     pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, InputError> {
         let Some(item) = self.get(key) else { return Ok(Vec::new()) };
-        item.list("a list of tables, each with its header in double brackets")?.iter().map(Item::section).collect()
+        let all = item.list("a list of tables, each with its header in double brackets")?;
+        item.check_count("tables", all.len(), MOST_TABLES)?;
+        all.iter().map(Item::section).collect()
     }
 
     /// The value of the key `base` with one of the suffixes of `unit`, and that suffix.
@@ -181,7 +186,7 @@ impl<'a, 'i> Section<'a, 'i> {
         let unknown = self.entries().into_iter().find(|(key, _)| !self.asked_for(key));
         match unknown {
             Some((key, item)) => {
-                Err(item.error(InputErrorKind::UnknownKey { key: key.to_owned(), known: self.known.clone() }))
+                Err(item.error(InputErrorKind::UnknownKey { key: shortened(key, 80), known: self.known.clone() }))
             }
             None => Ok(()),
         }

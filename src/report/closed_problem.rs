@@ -7,6 +7,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString,
 use super::effect::values;
 use super::quantity::p_value;
 use crate::diagnose::{ClosedLoop, Found, HARMONICS, Trace};
+use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text
@@ -82,7 +83,7 @@ fn edited(
 fn say(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let rest = document.trailing().as_str().unwrap_or_default();
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
-    let own = effect.name_and_place();
+    let own = one_line(&effect.name_and_place());
     let more = format!("# {own} is an effect of one's own: no file declares it, only the program that defines it.\n");
     document.set_trailing(format!("{rest}\n{lines}{more}"));
 }
@@ -173,7 +174,8 @@ fn arguments(effect: &Effect) -> Value {
 fn comments(found: &Found, trace: &Trace) -> Vec<String> {
     let first =
         format!("Found by flexcal loop: {}, p-value {}.", trace.describe(&found.effect), p_value(found.p_value));
-    std::iter::once(first).chain(values(found)).collect()
+    // A custom effect may say of itself what it likes, in several lines.
+    std::iter::once(first).chain(values(found)).map(|line| one_line(&line.replace('\n', " "))).collect()
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ const DEVIATIONS: u64 = 0;
 const POSES: u64 = 1;
 const NOISE: u64 = 2;
 const SPLIT: u64 = 3;
+const EFFECTS: u64 = 4;
 
 /// A simulated measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +116,12 @@ pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Re
         rows,
         split_column,
     })
+}
+
+/// Standard normal numbers for the strengths of effects, in a stream of their own.
+pub(crate) fn standard_normals(count: usize, seed: u64) -> Vec<f64> {
+    let mut random = stream(seed, EFFECTS);
+    (0..count).map(|_| normal(&mut random)).collect()
 }
 
 fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {

@@ -28,6 +28,7 @@ use crate::problem::{Effect, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::AtRest;
 
+pub(crate) use draw::standard_normals;
 pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate};
 pub use effect::{Cause, Shape, TrueEffect, ValueCount};
 pub use parameters::TrueParameter;

@@ -20,13 +20,13 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("quantity", &[]),
     ("spatial", &[&["scalar"]]),
     ("error", &[]),
-    // Files written whole or not at all, and tables.
+    // Files up to a size, written whole or not at all, and tables.
     ("files", &[]),
     // Small methods: medians, bisection, random numbers.
     ("numeric", &[]),
     ("random", &[]),
-    ("problem", &[&["quantity", "error", "spatial"]]),
-    ("measurement", &[&["quantity", "error", "problem"]]),
+    ("problem", &[&["quantity", "error", "spatial", "files"]]),
+    ("measurement", &[&["quantity", "error", "problem", "files"]]),
     // Least squares knows no arms.
     ("least_squares", &[&["scalar", "error"]]),
     // The physics knows no sensors; the test rig shares no physics.

@@ -25,8 +25,11 @@ pub(super) enum Chance {
 }
 
 impl Chance {
-    /// Probability of `statistic` or more.
+    /// Probability of `statistic` or more; 1 where there is none.
     pub fn p_value(&self, statistic: f64) -> f64 {
+        if statistic.is_nan() {
+            return 1.0;
+        }
         let p = match self {
             Self::ChiSquared { distribution, scale } => distribution.sf(statistic / scale),
             Self::Fisher { distribution, of } => of * distribution.sf(statistic),

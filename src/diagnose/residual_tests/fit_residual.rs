@@ -47,8 +47,9 @@ impl FitResidual<'_> {
         if !shapes {
             return Err(Untestable::SizeMismatch);
         }
-        let finite = self.residual.iter().chain(self.fitted.iter()).all(|value| value.is_finite());
-        if finite { Ok(()) } else { Err(Untestable::NotFinite) }
+        let finite = self.fitted.iter().all(|value| value.is_finite());
+        // Statistics are variances of squares.
+        if finite && self.residual.norm_squared().powi(2).is_finite() { Ok(()) } else { Err(Untestable::NotFinite) }
     }
 
     /// A residual far below a declared σ is rounding.

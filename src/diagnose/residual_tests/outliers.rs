@@ -88,7 +88,7 @@ fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     let count = distances.len();
     let far = |(number, distance): (usize, &Option<Distance>)| {
         let Distance { ratio, distribution } = distance.as_ref()?;
-        (count as f64 * distribution.sf(*ratio) <= level).then_some((number, *ratio))
+        (!ratio.is_nan() && count as f64 * distribution.sf(*ratio) <= level).then_some((number, *ratio))
     };
     let mut far: Vec<(usize, f64)> = distances.iter().enumerate().filter_map(far).collect();
     far.sort_by(|a, b| b.1.total_cmp(&a.1));

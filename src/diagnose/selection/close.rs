@@ -93,6 +93,7 @@ pub fn close_by(
     options: &Options,
     rules: &SelectionRules,
 ) -> Result<ClosedLoop, IdentifyError> {
+    rules.check()?;
     let data = Data::new(data, rules).with_candidates(&options.candidates);
     let first = Fitted::new(problem.clone(), &data, options)?;
     let before = trace_fit(&first, &data);

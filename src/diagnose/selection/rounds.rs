@@ -220,9 +220,9 @@ impl<'a> Rounds<'a> {
             let tries: f64 = all_tries.by_ref().take(effect.parts().len()).sum();
             let k = fitted.parameters_of(&effect).len() as f64;
             let lost = fit.loss_without(&fitted.unknowns_of(&effect));
-            let chance = FisherSnedecor::new(k, freedom).ok().zip(lost).map_or(1.0, |(chance, lost)| {
-                chance.sf(lost / k / (fit.sums().squares / freedom)).max(f64::MIN_POSITIVE)
-            });
+            let ratio = lost.map(|lost| lost / k / (fit.sums().squares / freedom)).filter(|ratio| !ratio.is_nan());
+            let chance = FisherSnedecor::new(k, freedom).ok().zip(ratio);
+            let chance = chance.map_or(1.0, |(chance, ratio)| chance.sf(ratio).max(f64::MIN_POSITIVE));
             Retested { effect, p: (chance * tries * families as f64).min(1.0) }
         };
         own.into_iter().map(test).collect()

@@ -5,6 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::markdown::markdown;
 use super::style;
 use super::text::marked;
+use crate::error::is_hidden;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
 use crate::report::figures::{Drawing, Figure};
@@ -57,7 +58,7 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
             }
         }
     };
-    let files = figures.iter().map(|own: &Drawing| (format!("{}.svg", own.name), style::alone(&own.svg)));
+    let files = figures.iter().map(|own: &Drawing| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
     let html = printable(&page.into_string());
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
@@ -123,9 +124,9 @@ fn words(text: &str) -> Markup {
     }
 }
 
-/// Without control characters, which no page may have.
+/// Without control characters, which no page may have, and others that are not seen but do something.
 fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control() || *c == '\n').collect()
+    text.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect()
 }
 
 fn item(point: &Point) -> Markup {

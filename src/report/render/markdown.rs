@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::text::{flat, marked};
+use crate::error::is_hidden;
 use crate::report::document::{Block, CODE, Point, Table};
 
 /// Blocks below a title, ending in a line break.
@@ -72,11 +73,53 @@ fn escaped(words: &str) -> String {
     text
 }
 
+/// Words of which Markdown makes nothing: no code, emphasis, tag, entity, link, picture, address or heading.
 fn plain(text: &mut String, words: &str) {
-    for c in words.chars().filter(|c| !c.is_control() || *c == '\n') {
-        if matches!(c, '*' | '<' | '\\' | '`') {
+    let words: Vec<char> = words.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect();
+    let follows = |k: usize, word: &str| word.chars().zip(k + 1..).all(|(c, k)| words.get(k) == Some(&c));
+    for (k, &c) in words.iter().enumerate() {
+        let before = k.checked_sub(1).and_then(|k| words.get(k)).copied();
+        let in_word = |c: Option<&char>| c.is_some_and(|c| c.is_alphanumeric());
+        // Marks at the beginning of a line may begin a heading, a list, a quotation, a rule or a fence.
+        let begins = before.map_or(text.is_empty() || text.ends_with(['\n', ' ']), |before| before == '\n');
+        let marks = match c {
+            '*' | '<' | '\\' | '`' | '~' | '@' => true,
+            '_' => !(in_word(before.as_ref()) && in_word(words.get(k + 1))),
+            '&' => words.get(k + 1).is_some_and(|c| c.is_ascii_alphanumeric() || *c == '#'),
+            // A link's text, a picture's, and what a reference defines.
+            ']' => ["(", "[", ":"].iter().any(|next| follows(k, next)),
+            '!' => follows(k, "["),
+            ':' => follows(k, "//"),
+            '.' => k >= 3 && words.get(k - 3..k).is_some_and(|www| www.iter().all(|w| w.eq_ignore_ascii_case(&'w'))),
+            '#' | '>' | '=' => begins,
+            '+' | '-' => begins && words.get(k + 1).is_none_or(|next| next.is_whitespace() || *next == c),
+            _ => false,
+        };
+        if marks {
             text.push('\\');
         }
         text.push(c);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_a_name_holds_is_active() {
+        let cases = [
+            ("[x](https://a.b)", "[x\\](https\\://a.b)"),
+            ("![x][y] and [z]: u", "\\![x\\][y] and [z\\]: u"),
+            ("`code` *em* ~~s~~ <b>", "\\`code\\` \\*em\\* \\~\\~s\\~\\~ \\<b>"),
+            ("www.a.b _em_ x_mm &lt; &#60; A & B", "www\\.a.b \\_em\\_ x_mm \\&lt; \\&#60; A & B"),
+            ("# big", "\\# big"),
+            ("- item", "\\- item"),
+            ("base[A].x: −0.5 (rank 3)", "base[A].x: −0.5 (rank 3)"),
+            ("a\u{1b}[2J\u{202e}b", "a[2Jb"),
+        ];
+        for (words, expected) in cases {
+            assert_eq!(escaped(words), expected);
+        }
     }
 }

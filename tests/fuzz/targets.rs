@@ -1,0 +1,111 @@
+//! Each reader of the library on mutations of its corpus: it accepts them, or says what is wrong on one line.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use flexcal::error::{InputError, is_hidden};
+use flexcal::identify::{Options, identify};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::model::Model;
+use flexcal::monte_carlo::Study;
+use flexcal::problem::Problem;
+use flexcal::simulate::{Truth, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::arms::texts;
+use super::mutation::mutated;
+
+/// Mutations of each file of the corpus in the short run.
+const SHORT: u64 = 300;
+
+/// A reader, by the name of its folder in the corpus.
+type Target = (&'static str, fn(&[u8], &Bench) -> Result<(), InputError>);
+const TARGETS: [Target; 5] =
+    [("problem", problem), ("table", table), ("truth", truth), ("study", study), ("targets", targets)];
+
+/// A folder to put files in, and an arm for what is read against one.
+struct Bench {
+    folder: tempfile::TempDir,
+    arm: Problem,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in texts(true) {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        let arm = Problem::read(folder.path()).unwrap();
+        Self { folder, arm }
+    }
+
+    fn file(&self, name: &str, text: &[u8]) -> PathBuf {
+        let path = self.folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    }
+}
+
+fn problem(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    let problem = Problem::read(&bench.file("arm.toml", text))?;
+    let _ = (problem.digest(), Model::new(&problem, &[String::new()], &[String::new()])?);
+    Ok(())
+}
+
+fn table(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    let (data, _) = Dataset::read_files(&[bench.file("rows.csv", text)], &bench.arm)?;
+    // Whatever can be read can be fitted, or said not to be.
+    let _ = identify(&bench.arm, &data, &Options::default());
+    Ok(())
+}
+
+fn truth(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    let truth = Truth::read(&bench.file("true.toml", text), &bench.arm)?;
+    let _ = simulate(&bench.arm, &truth, 3, 1);
+    Ok(())
+}
+
+fn study(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    Study::read(&bench.file("STUDY.toml", text)).map(|_| ())
+}
+
+fn targets(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    let problem =
+        Problem { data: flexcal::problem::Data { held_out: None, ..bench.arm.data.clone() }, ..bench.arm.clone() };
+    Measurements::read(&[bench.file("targets.csv", text)], &problem).map(|_| ())
+}
+
+/// The files that a reader begins with.
+fn corpus(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
+    let mut paths: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths.into_iter().map(|path| (path.clone(), fs::read(&path).unwrap())).collect()
+}
+
+#[test]
+fn readers_stand_what_they_are_given() {
+    let rounds = std::env::var("FLEXCAL_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(SHORT);
+    let bench = Bench::new();
+    for (name, target) in TARGETS {
+        let files = corpus(name);
+        assert!(files.len() >= 3, "the corpus of {name}");
+        let mut accepted = 0;
+        for (path, text) in files {
+            let mut random = ChaCha8Rng::seed_from_u64(text.len() as u64);
+            for round in 0..=rounds {
+                let text = if round == 0 { text.clone() } else { mutated(&text, &mut random) };
+                match target(&text, &bench) {
+                    Ok(()) => accepted += 1,
+                    Err(error) => {
+                        let message = error.to_string();
+                        let clean = message.chars().all(|own| !is_hidden(own));
+                        assert!(clean && message.len() < 20_000, "{}: {message:?}", path.display());
+                    }
+                }
+            }
+        }
+        assert!(accepted > 0, "{name}: some are right");
+    }
+}
