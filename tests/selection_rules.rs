@@ -1,7 +1,5 @@
 //! docs/selection.md has every number of the search, and each as it is.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
-
 use std::fs;
 use std::path::Path;
 
@@ -25,11 +23,13 @@ fn the_page_has_every_number() {
     assert_eq!(told.len(), rules.matches(": ").count());
 }
 
+type Change = fn(&mut SelectionRules);
+
 #[test]
 fn rules_that_make_no_sense_are_refused() {
     let problem = Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler")).unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
-    let change: [(&str, fn(&mut SelectionRules)); 9] = [
+    let change: [(&str, Change); 9] = [
         ("resamples", |rules| rules.resamples = 0),
         ("blocks", |rules| rules.blocks = 0),
         ("level", |rules| rules.level = f64::NAN),

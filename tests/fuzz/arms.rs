@@ -38,11 +38,12 @@ const TARGETS: [&str; 2] = [
 pub fn texts(elastic: bool) -> Texts {
     let (problem, truth) = if elastic { (ELASTIC, ELASTIC_TRUTH) } else { (RIGID, RIGID_TRUTH) };
     let poses = &truth[truth.find("[poses]").unwrap()..];
-    let poses: String = poses
+    let poses = poses
         .lines()
         .filter(|line| !line.contains("held_out") && !line.contains("identification"))
         .map(|line| format!("{line}\n"))
-        .collect();
+        .collect::<Vec<_>>()
+        .concat();
     let owned = |text: &str| text.as_bytes().to_vec();
     vec![
         ("problem.toml", owned(problem)),

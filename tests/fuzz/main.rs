@@ -8,6 +8,7 @@
 //! Input k is made from k alone: `FLEXCAL_MUTATIONS_FROM=k` begins there. What fails is kept and said where.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::print_stderr, clippy::print_stdout, reason = "a long run says how far it is")]
 
 mod arms;
 mod commands;
