@@ -49,20 +49,31 @@
 //!
 //! `examples/` has an arm of one's own from text to estimate, an effect of one's own, and a report; `docs/` explains files,
 //! effects, plans and results.
+//!
+//! # Indices
+//!
+//! What reads input indexes nothing (`clippy::indexing_slicing` is denied there: [`error`], [`files`], [`problem`], [`quantity`],
+//! [`monte_carlo`], the readers of [`measurement`] and [`simulate`], the command line). What reckons does: its indices are those of arrays that one
+//! constructor made of one length from what was read.
 
 pub mod design;
 pub mod diagnose;
+#[deny(clippy::indexing_slicing)]
 pub mod error;
+#[deny(clippy::indexing_slicing)]
 pub mod files;
 pub mod identify;
 pub mod least_squares;
 pub mod measurement;
 pub mod mechanics;
 pub mod model;
+#[deny(clippy::indexing_slicing)]
 pub mod monte_carlo;
 mod numeric;
 pub mod paper;
+#[deny(clippy::indexing_slicing)]
 pub mod problem;
+#[deny(clippy::indexing_slicing)]
 pub mod quantity;
 mod random;
 pub mod report;

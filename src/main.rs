@@ -1,5 +1,6 @@
 //! The flexcal command line.
 
+#[deny(clippy::indexing_slicing)]
 mod cli;
 
 use std::process::ExitCode;

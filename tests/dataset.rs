@@ -34,7 +34,7 @@ fn arrays_that_do_not_fit_are_told() {
     assert_eq!(wrong(three().held_out([3])), DatasetError::NoSuchRow { row: 3, rows: 3 });
     assert!(matches!(wrong(three().sigma(vec![1.0, 0.0, 1.0])), DatasetError::OutOfRange { row: 1, .. }));
     assert!(matches!(
-        wrong(three().approach([[1.0], [0.5], [0.0]])),
+        wrong(three().approach([[1.0, 0.0], [-1.0, 0.5], [0.0, 0.0]])),
         DatasetError::OutOfRange { column: "approach", row: 1, .. }
     ));
     assert!(matches!(wrong(three().temperature(vec![1e160; 3])), DatasetError::OutOfRange { row: 0, .. }));

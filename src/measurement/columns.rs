@@ -180,8 +180,8 @@ impl Numbering {
     fn of(header: &[String], problem: &Problem) -> Self {
         let numbers: Vec<usize> = header.iter().filter_map(|name| numbered(split_unit(name).0, "q")).collect();
         let all = || (0..problem.joints.len()).collect::<Vec<_>>();
-        let moving: Vec<usize> =
-            all().into_iter().filter(|&index| problem.joints[index].kind != JointKind::Fixed).collect();
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
         let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
         let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
             && numbers.iter().all(|number| (1..=moving.len()).contains(number));
@@ -216,7 +216,8 @@ impl Numbering {
             return plain(*role);
         }
         if let Some(number) = numbered(name, "approach") {
-            return match self.joint(number).filter(|&joint| problem.joints[joint].kind != JointKind::Fixed) {
+            let moves = |&joint: &usize| problem.joints.get(joint).is_some_and(|own| own.kind != JointKind::Fixed);
+            return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
                 None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
             };
@@ -228,7 +229,7 @@ impl Numbering {
         } else {
             let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
             let joint = self.joint(number);
-            let Some((joint, unit)) = joint.and_then(|joint| Some((joint, unit_of(problem.joints[joint].kind)?)))
+            let Some((joint, unit)) = joint.and_then(|joint| Some((joint, unit_of(problem.joints.get(joint)?.kind)?)))
             else {
                 return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
             };

@@ -40,8 +40,8 @@ impl Measurements {
     /// A warning for each joint that was commanded beyond its declared range, at the row that is furthest beyond.
     pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
         let warning = |column: &Commands| {
-            let (min, max) = problem.joints[column.joint].limits;
-            let value = |row: usize| self.configuration(row)[column.joint];
+            let (min, max) = problem.joints.get(column.joint)?.limits;
+            let value = |row: usize| self.configuration(row).get(column.joint).copied().unwrap_or(0.0);
             let beyond = |row: usize| (min - value(row)).max(value(row) - max);
             let rows: Vec<usize> = (0..self.len()).filter(|&row| beyond(row) > ROUNDING).collect();
             // The first of equals.

@@ -37,7 +37,7 @@ impl<R: BufRead> Read for Lines<R> {
                     return Ok(0);
                 }
                 self.last = b'\n';
-                out[0] = b'\n';
+                out.iter_mut().take(1).for_each(|first| *first = b'\n');
                 return Ok(1);
             }
             let mut read = 0;

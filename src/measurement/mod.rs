@@ -1,14 +1,20 @@
 //! Measured poses, as columns in SI units.
 
 mod builder;
+#[deny(clippy::indexing_slicing)]
 mod columns;
 mod dataset;
+#[deny(clippy::indexing_slicing)]
 mod duplicates;
+#[deny(clippy::indexing_slicing)]
 mod limits;
+#[deny(clippy::indexing_slicing)]
 mod lines;
+#[deny(clippy::indexing_slicing)]
 mod read;
 mod repeats;
 mod split;
+#[deny(clippy::indexing_slicing)]
 mod table;
 
 use std::collections::HashMap;

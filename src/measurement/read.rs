@@ -141,14 +141,14 @@ impl Builder {
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
         };
-        let columns = columns.read.iter().map(|column| (*column, table.header[column.place].clone())).collect();
+        let columns = columns.read.iter().map(|column| (*column, table.name_of(column.place).to_owned())).collect();
         Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), columns }
     }
 
     /// Whether a file has the columns of the first one; `pose` alone may come and go.
     fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
-            let other = self.measurements.files[0].clone();
+            let other = self.measurements.files.first().cloned().unwrap_or_default();
             Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
         };
         for (column, name) in self.columns.iter().filter(|(column, _)| column.role != Role::Pose) {
@@ -158,7 +158,7 @@ impl Builder {
         }
         for column in columns.read.iter().filter(|column| column.role != Role::Pose) {
             if !self.columns.iter().any(|(own, _)| own.role == column.role) {
-                return differ(&table.header[column.place], false);
+                return differ(table.name_of(column.place), false);
             }
         }
         Ok(())
@@ -182,8 +182,8 @@ impl Builder {
         for column in &columns.read {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
-                Role::Joint(joint) => measurements.configurations[row * joints + joint] = number()?,
-                Role::Position(axis) => position[axis] = number()?,
+                Role::Joint(joint) => set(&mut measurements.configurations, row * joints + joint, number()?),
+                Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
                 Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
                 Role::Hoist => add(&mut measurements.hoist, number()?),
@@ -192,7 +192,7 @@ impl Builder {
                 Role::Approach(joint) => {
                     let direction = direction(table, column)?;
                     if let Some(approach) = &mut measurements.approach {
-                        approach[row * joints + joint] = direction;
+                        set(approach, row * joints + joint, direction);
                     }
                 }
                 // Kept for later: checked, not stored.
@@ -224,6 +224,13 @@ impl Builder {
         }
         measurements.target = measurements.target.map(|_| target.labels);
         (measurements, columns)
+    }
+}
+
+/// Gives a place of a list, which is there, its value.
+fn set(list: &mut [f64], place: usize, value: f64) {
+    if let Some(own) = list.get_mut(place) {
+        *own = value;
     }
 }
 

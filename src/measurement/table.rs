@@ -158,9 +158,14 @@ impl Table {
         }
     }
 
+    /// Name of a column.
+    pub fn name_of(&self, place: usize) -> &str {
+        self.header.get(place).map_or("", String::as_str)
+    }
+
     /// A mistake in a cell of the row.
     pub fn cell_error(&self, place: usize, kind: InputErrorKind) -> InputError {
-        let name = self.header.get(place).map_or("", String::as_str);
+        let name = self.name_of(place);
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
     }
 

@@ -266,3 +266,28 @@ impl<S: Scalar> Arm<S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two moments, each of which makes the other `factor` times itself.
+    fn pose(factor: f64) -> Equilibrated {
+        Equilibrated {
+            moments: vec![0.0; 2],
+            position_response: vec![1.0; 6],
+            moment_response: vec![0.0, factor, factor, 0.0],
+            ..Equilibrated::default()
+        }
+    }
+
+    #[test]
+    fn an_adjoint_that_does_not_settle_is_an_error_of_the_pose() {
+        let mut near = pose(0.5);
+        assert_eq!(near.solve_adjoint(), Ok(()));
+        assert!(near.adjoint.iter().all(|own| (own - 2.0).abs() < 1e-12), "1 / (1 − 1/2): {:?}", near.adjoint);
+        for factor in [1.0, -1.0, 2.0, f64::NAN] {
+            assert_eq!(pose(factor).solve_adjoint(), Err(StaticsError::NotSettled), "{factor}");
+        }
+    }
+}

@@ -14,10 +14,10 @@ use crate::simulate::{Cause, HeldOutRows, Shape, Truth};
 /// source, seed, held-out poses; σ, poses, strategy, solver, first repetition and the one after the last; the truth; `effects
 /// drawn` where the strengths of declared effects are; the text of the problem file. Numbers that do not concern these fits do not enter: a study with one more noise level keeps
 /// the others' parts.
-pub(super) fn key(study: &Study, part: &Part) -> String {
+pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
     let Study { problem_text, source, seed, held_out, .. } = study;
     let drawn = if study.draws_effects && !study.problem.effects.is_empty() { "\neffects drawn" } else { "" };
-    let Cell { sigma, poses, strategy, solver } = &study.cells[part.cell];
+    let Cell { sigma, poses, strategy, solver } = cell;
     let (version, source) = (env!("CARGO_PKG_VERSION"), source.as_str());
     let (strategy, solver) = (strategy.as_str(), solver.as_str());
     let (first, end) = (part.repetitions.start, part.repetitions.end);

@@ -45,7 +45,7 @@ pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, 
 /// A part cannot be kept.
 pub fn run(study: &Study, store: &Store, parts: &[Part], fitted: impl Fn() + Sync) -> Result<(), StoreError> {
     let run_part = |part: &Part| {
-        let cell = &study.cells[part.cell];
+        let cell = study.cell(part)?;
         let problem = problem_of(study, cell);
         let score = |repetition| {
             let score = fit(study, &problem, cell, repetition);
@@ -59,7 +59,7 @@ pub fn run(study: &Study, store: &Store, parts: &[Part], fitted: impl Fn() + Syn
             tally.push(score);
             seconds.push(time);
         }
-        store.keep(&Kept::new(study, part, tally, seconds))
+        store.keep(&Kept::new(study, (part, cell), tally, seconds))
     };
     parts.par_iter().try_for_each(run_part)
 }
@@ -78,12 +78,12 @@ pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
         for store in stores {
             kept = kept.or(store.find(study, part)?);
         }
-        match kept {
-            Some(kept) => {
-                cells[part.cell].tally.merge(&kept.tally);
-                cells[part.cell].seconds.extend(kept.seconds);
+        match (kept, cells.get_mut(part.cell)) {
+            (Some(kept), Some(cell)) => {
+                cell.tally.merge(&kept.tally);
+                cell.seconds.extend(kept.seconds);
             }
-            None => missing += 1,
+            _ => missing += 1,
         }
     }
     if missing > 0 {

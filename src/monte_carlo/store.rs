@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::key::key;
-use super::study::{Part, Study};
+use super::study::{Cell, Part, Study};
 use super::tally::Tally;
 use crate::files::Ready;
 
@@ -31,8 +31,18 @@ pub enum StoreError {
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{}: damaged ({source}); delete it and its fits are done again", path.display())]
     Damaged { path: PathBuf, source: serde_json::Error },
+    #[error("the study has no cell {cell}; it has {cells}, counted from 0")]
+    NoSuchCell { cell: usize, cells: usize },
     #[error("{}: belongs to other inputs; delete it and its fits are done again", path.display())]
     Foreign { path: PathBuf },
+}
+
+impl Study {
+    /// The cell of a part.
+    pub(super) fn cell(&self, part: &Part) -> Result<&Cell, StoreError> {
+        let none = StoreError::NoSuchCell { cell: part.cell, cells: self.cells.len() };
+        self.cells.get(part.cell).ok_or(none)
+    }
 }
 
 /// A finished part.
@@ -48,8 +58,7 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    pub fn new(study: &Study, part: &Part, tally: Tally, seconds: Vec<f64>) -> Self {
-        let cell = &study.cells[part.cell];
+    pub fn new(study: &Study, (part, cell): (&Part, &Cell), tally: Tally, seconds: Vec<f64>) -> Self {
         let what = format!(
             "{}: σ {} mm, {} poses, {}, {}, repetitions {} to {}",
             study.name,
@@ -60,7 +69,7 @@ impl Kept {
             part.repetitions.start + 1,
             part.repetitions.end
         );
-        Self { part: what, key: key(study, part), tally, seconds }
+        Self { part: what, key: key(study, part, cell), tally, seconds }
     }
 }
 
@@ -84,7 +93,7 @@ impl Store {
 
     /// A part, if it is finished.
     pub(super) fn find(&self, study: &Study, part: &Part) -> Result<Option<Kept>, StoreError> {
-        let key = key(study, part);
+        let key = key(study, part, study.cell(part)?);
         let path = self.path(&key);
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,
@@ -99,6 +108,6 @@ impl Store {
     }
 
     fn path(&self, key: &str) -> PathBuf {
-        self.folder.join(&key[..NAME]).with_extension("json")
+        self.folder.join(key.get(..NAME).unwrap_or(key)).with_extension("json")
     }
 }

@@ -107,7 +107,8 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     /// The number of a joint that takes a command.
     pub fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let joint = self.any_joint(key)?;
-        if let (JointKind::Fixed, Some(item)) = (self.joints[joint - 1].kind, self.section.peek(key)) {
+        let kind = self.joints.get(joint - 1).map(|own| own.kind);
+        if let (Some(JointKind::Fixed), Some(item)) = (kind, self.section.peek(key)) {
             return Err(item.error(InputErrorKind::NoCommand { joint }));
         }
         self.last = Some(joint);
@@ -170,7 +171,7 @@ impl<'s> Examples<'s> {
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
-        (1..=self.joints.len()).filter(|number| self.joints[number - 1].kind != JointKind::Fixed)
+        (1..).zip(self.joints).filter(|(_, joint)| joint.kind != JointKind::Fixed).map(|(number, _)| number)
     }
 
     fn first(&self) -> usize {
@@ -190,8 +191,8 @@ impl<'s> Examples<'s> {
     }
 
     pub fn linked_joint(&self) -> String {
-        let long = (1..=self.joints.len()).find(|number| self.joints[number - 1].a != 0.0);
-        long.unwrap_or(self.first()).to_string()
+        let long = (1..).zip(self.joints).find(|(_, joint)| joint.a != 0.0);
+        long.map_or(self.first(), |(number, _)| number).to_string()
     }
 
     pub fn beam(&self) -> String {

@@ -196,7 +196,9 @@ impl Effect {
     pub(super) fn refusal(&self, statics: Statics, joints: &[Joint], data: &Data) -> Option<InputErrorKind> {
         let hoisted = || joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
         match self {
-            Self::LinkBending { joint } if joints[joint - 1].a == 0.0 => Some(InputErrorKind::NoLink { joint: *joint }),
+            Self::LinkBending { joint } if joints.get(joint.wrapping_sub(1)).is_none_or(|own| own.a == 0.0) => {
+                Some(InputErrorKind::NoLink { joint: *joint })
+            }
             Self::DeflectedEquilibrium if statics.equilibrium == Equilibrium::Deflected => {
                 Some(InputErrorKind::InEquilibriumAlready)
             }

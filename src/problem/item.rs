@@ -37,7 +37,7 @@ impl Document {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::Utf16));
         }
         let text = String::from_utf8(bytes).map_err(|error| {
-            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let valid = error.as_bytes().get(..error.utf8_error().valid_up_to()).unwrap_or_default();
             Location::file(file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
         })?;
         Ok(Self { file: file.to_owned(), text: Arc::from(text) })

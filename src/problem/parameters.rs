@@ -90,8 +90,9 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     } else if section.len() == 0 {
         return Err(item.error(InputErrorKind::EmptyRule));
     } else {
-        for (place, nominal) in NOMINALS.into_iter().enumerate() {
-            check(nominal, sigma.0[place].as_ref(), min.0[place].as_ref(), max.0[place].as_ref())?;
+        let kinds = NOMINALS.into_iter().zip(&sigma.0).zip(&min.0).zip(&max.0);
+        for (((nominal, sigma), min), max) in kinds {
+            check(nominal, sigma.as_ref(), min.as_ref(), max.as_ref())?;
         }
         Freedom::Free { sigma: sigma.quantities(), min: min.quantities(), max: max.quantities() }
     };

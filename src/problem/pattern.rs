@@ -8,7 +8,7 @@ pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     let Some(last) = parts.pop() else { return rest.is_empty() };
     for part in parts {
         let Some(found) = rest.find(part) else { return false };
-        rest = &rest[found + part.len()..];
+        rest = rest.get(found + part.len()..).unwrap_or_default();
     }
     rest.ends_with(last)
 }

@@ -15,10 +15,14 @@ mod draw;
 mod effect;
 mod equilibrium;
 mod link;
+#[deny(clippy::indexing_slicing)]
 mod output;
 mod parameters;
+#[deny(clippy::indexing_slicing)]
 mod ranges;
+#[deny(clippy::indexing_slicing)]
 mod read;
+#[deny(clippy::indexing_slicing)]
 mod strengths;
 mod truth;
 

@@ -68,7 +68,7 @@ impl Simulation {
         let set = &row.conditions;
         let split = if row.held_out { "validation" } else { "identification" };
         let mut cells = vec![pose.to_string(), split.to_owned()];
-        cells.extend(self.moving().map(|(index, turns)| match set.configuration[index] {
+        cells.extend(self.moving().map(|(index, turns)| match set.configuration.get(index).copied().unwrap_or(0.0) {
             q if turns => format!("{:.6}", q.to_degrees()),
             q => format!("{q:.9}"),
         }));
@@ -78,7 +78,7 @@ impl Simulation {
         cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
         cells.push(format!("{:.1}", set.time));
         if let Some(approach) = &set.approach {
-            cells.extend(self.moving().map(|(index, _)| approach[index].to_string()));
+            cells.extend(self.moving().map(|(index, _)| approach.get(index).unwrap_or(&0.0).to_string()));
         }
         cells
     }
@@ -101,7 +101,9 @@ impl Simulation {
 
     /// Names of the effects at work.
     pub fn effect_names(&self) -> Vec<String> {
-        let name = |effect| described(effect, &self.joints)["effect"].as_str().unwrap_or_default().to_owned();
+        let name = |effect| {
+            described(effect, &self.joints).get("effect").and_then(Value::as_str).unwrap_or_default().to_owned()
+        };
         self.truth.effects.iter().map(name).collect()
     }
 
@@ -132,6 +134,8 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
         .zip(effect.values())
         .map(|((name, unit), value)| (format!("{name}_{}", unit.si_suffix()), json!(value)))
         .collect();
-    entry["values"] = Value::Object(values);
+    if let Some(entry) = entry.as_object_mut() {
+        entry.insert("values".to_owned(), Value::Object(values));
+    }
     entry
 }

@@ -94,7 +94,7 @@ fn deviation(name: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
     let value = match given.as_slice() {
         [] => {
             let keys: Vec<_> = units.iter().map(|unit| format!("{} = …", unit.name)).collect();
-            return Err(section.missing(units[0].name, keys.join(" or ")));
+            return Err(section.missing(units.first().map_or("", |unit| unit.name), keys.join(" or ")));
         }
         [(item, unit)] => (unit.to_si)(item.number()?),
         [(_, first), (item, _), ..] => {
@@ -120,13 +120,13 @@ fn random(pattern: &str, item: &Item<'_, '_>, known: &[TrueParameter]) -> Result
     let (angle, length, relative) = (sigma(Unit::Angle)?, sigma(Unit::Length)?, sigma(Unit::Ratio)?);
     section.finish()?;
     let matched: Vec<_> = known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
-    if matched.is_empty() {
+    let Some(first) = matched.first() else {
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known }));
-    }
+    };
     let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
     if matched.iter().all(|parameter| rule.sigma(parameter.unit).is_none()) {
-        let write = matched[0].unit.of_deviation().spelled("sigma");
+        let write = first.unit.of_deviation().spelled("sigma");
         return Err(section.missing("sigma", write));
     }
     Ok(rule)

@@ -17,7 +17,7 @@ use super::arms::texts;
 use super::mutation::mutated;
 
 /// Mutations of each file of the corpus in the short run.
-const SHORT: u64 = 300;
+const SHORT: u64 = 100;
 
 /// A reader, by the name of its folder in the corpus.
 type Target = (&'static str, fn(&[u8], &Bench) -> Result<(), InputError>);
