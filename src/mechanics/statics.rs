@@ -286,7 +286,7 @@ mod tests {
         let mut near = pose(0.5);
         assert_eq!(near.solve_adjoint(), Ok(()));
         assert!(near.adjoint.iter().all(|own| (own - 2.0).abs() < 1e-12), "1 / (1 − 1/2): {:?}", near.adjoint);
-        for factor in [1.0, -1.0, 2.0, f64::NAN] {
+        for factor in [1.0, -2.0, 2.0, f64::NAN] {
             assert_eq!(pose(factor).solve_adjoint(), Err(StaticsError::NotSettled), "{factor}");
         }
     }
