@@ -33,7 +33,7 @@ fn document<'a>(problem: &'a Problem, commands: &[Command]) -> Document<'a> {
 
 fn mean_mm(commands: &[&Command], of: impl Fn(&Command) -> f64) -> Option<f64> {
     let sum: f64 = commands.iter().map(|command| of(command)).sum();
-    (!commands.is_empty()).then(|| sum / commands.len() as f64 * 1e3)
+    (!commands.is_empty()).then(|| sum / commands.len() as f64 * 1e3).filter(|mean| mean.is_finite())
 }
 
 /// What came of it, as JSON text.
@@ -53,7 +53,12 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
         );
     }
     let point = |command: &Command| {
-        format!("out of reach: {}, nearest {} mm away", targets.location(command.row), mm(command.miss.norm(), 2))
+        let (place, miss) = (targets.location(command.row), command.miss.norm());
+        if miss.is_finite() {
+            format!("out of reach: {place}, nearest {} mm away", mm(miss, 2))
+        } else {
+            format!("out of reach: {place}, the identified arm does not come to rest there")
+        }
     };
     let points = commands.iter().filter(|command| !command.is_reached()).map(point).collect();
     text(&[Block::Lines(words, points)])
@@ -79,7 +84,10 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         cells.extend(targets.positions[row].iter().map(|x| fixed(x * 1e3, 4)));
         cells.extend([session, targets.target.as_ref()].into_iter().flatten().map(|labels| table::word(labels, row)));
         cells.extend([&targets.payload, &targets.hoist].into_iter().flatten().map(|values| fixed(values[row], 4)));
-        cells.extend([command.miss.norm(), command.seed_miss].map(|miss| fixed(miss * 1e3, 4)));
+        cells.extend(
+            [command.miss.norm(), command.seed_miss]
+                .map(|miss| if miss.is_finite() { fixed(miss * 1e3, 4) } else { String::new() }),
+        );
         cells.push(command.is_reached().to_string());
         cells
     };

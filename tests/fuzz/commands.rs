@@ -91,8 +91,10 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
         |what: &str| format!("input {k}: flexcal {}: {what}\n{:.600}\n{:.600}", arguments.join(" "), ran.err, ran.out);
     let status = match ran.status {
         Some(status @ 0..=2) => status,
-        None if ran.time >= LONGEST => return Err(said("takes too long")),
-        other => return Err(said(&format!("exit status {other:?}"))),
+        None => {
+            return Err(said(&format!("is ended from outside: more than {LONGEST} s of the processors, or aborted")));
+        }
+        Some(other) => return Err(said(&format!("exit status {other}"))),
     };
     if ran.err.contains("panicked") {
         return Err(said("panics"));
@@ -152,7 +154,8 @@ fn timeless(ran: &Ran) -> Value {
 fn not_finite(text: &str) -> Option<&'static str> {
     let is_word = |word: &str| {
         text.match_indices(word).any(|(place, _)| {
-            let letter = |c: char| c.is_alphanumeric() || c == '_';
+            // In quotes stands what a reader would have taken.
+            let letter = |c: char| c.is_alphanumeric() || "_`\"".contains(c);
             !text[..place].ends_with(letter) && !text[place + word.len()..].starts_with(letter)
         })
     };
@@ -180,6 +183,12 @@ fn run(from: u64, count: u64) {
                     tally.1 = tally.1.max(time);
                 }
                 Err(what) => {
+                    let kept = std::env::temp_dir().join(format!("flexcal-input-{k}"));
+                    let _ = fs::remove_dir_all(&kept);
+                    let what = match fs::rename(&place, &kept) {
+                        Ok(()) => format!("{what}\nkept in {}", kept.display()),
+                        Err(_) => what,
+                    };
                     eprintln!("{what}\n");
                     tally.2.push(what);
                 }

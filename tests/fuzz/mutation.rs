@@ -42,8 +42,8 @@ pub fn mutated(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     let mut text = text.to_vec();
     for _ in 0..random.random_range(1..4) {
         text = match random.random_range(0..10) {
-            0..4 => with_another_number(&text, random),
-            4..6 => with_other_lines(&text, random),
+            0..5 => with_another_number(&text, random),
+            5..7 => with_other_lines(&text, random),
             _ => with_other_bytes(text, random),
         };
     }

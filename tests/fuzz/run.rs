@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longest that a run may take.
-pub const LONGEST: Duration = Duration::from_secs(20);
+/// Most time of the processors that a run may take [s].
+pub const LONGEST: u64 = 20;
+/// Time after which it hangs, or the machine has too much to do.
+const PATIENCE: Duration = Duration::from_secs(600);
 /// Largest memory that it may ask for [KiB].
 const MEMORY: u64 = 2 << 20;
 
@@ -14,6 +16,7 @@ const MEMORY: u64 = 2 << 20;
 pub struct Ran {
     /// Exit status; none of a run that was ended from outside.
     pub status: Option<i32>,
+    /// By the clock.
     pub time: Duration,
     pub out: String,
     pub err: String,
@@ -22,7 +25,7 @@ pub struct Ran {
 /// Runs the program in a folder; what it prints goes through files beside it.
 pub fn flexcal(folder: &Path, arguments: &[&str], threads: usize) -> Ran {
     let printed = [folder.with_extension("out"), folder.with_extension("err")];
-    let limited = format!("ulimit -v {MEMORY}; exec \"$0\" \"$@\"");
+    let limited = format!("ulimit -v {MEMORY}; ulimit -t {LONGEST}; exec \"$0\" \"$@\"");
     let clock = Instant::now();
     let mut child = Command::new("sh")
         .args(["-c", &limited])
@@ -38,7 +41,7 @@ pub fn flexcal(folder: &Path, arguments: &[&str], threads: usize) -> Ran {
     let status = loop {
         match child.try_wait().unwrap() {
             Some(status) => break status.code(),
-            None if clock.elapsed() > LONGEST => {
+            None if clock.elapsed() > PATIENCE => {
                 child.kill().unwrap();
                 child.wait().unwrap();
                 break None;

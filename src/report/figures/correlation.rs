@@ -48,7 +48,8 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
                 let corners = [(px(left), px(top)), (px(left + cell) - 3, px(top + cell) - 3)];
                 let style = match value {
                     _ if i == j => GRID.filled(),
-                    v if v.abs() < LEAST => continue,
+                    // Below that, or none at all.
+                    v if v.abs() < LEAST || v.is_nan() => continue,
                     // Steps of a tenth keep the file small.
                     v if v < 0.0 => WARM.mix((-v * 10.0).ceil() / 10.0).filled(),
                     v => ACCENT.mix((v * 10.0).ceil() / 10.0).filled(),
