@@ -9,7 +9,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::statics::{MAX_PASSES, SETTLED, StaticsError};
+use super::statics::{HOVERING, MAX_PASSES, SETTLED, StaticsError};
 use super::tape::{Column, Each, Felt, Load, Section, Step, Tape};
 use crate::spatial::Frame;
 
@@ -47,6 +47,7 @@ impl Tape {
     /// Sweeps until Λ is its own image.
     fn find_influence(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.anderson.restart();
+        let mut hovers = false;
         for _ in 0..MAX_PASSES {
             self.weigh_loads();
             self.adjoint_sweep(at, Sought::Influence);
@@ -56,9 +57,10 @@ impl Tape {
             if change <= SETTLED * largest {
                 return Ok(());
             }
+            hovers = change <= HOVERING * largest && image.iter().all(|x| x.is_finite());
             anderson.advance(influence, image);
         }
-        Err(StaticsError::NotSettled)
+        if hovers { Ok(()) } else { Err(StaticsError::NotSettled) }
     }
 
     /// What a move of each load does.

@@ -25,6 +25,9 @@ pub use super::workspace::Workspace;
 pub(super) const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
 pub(super) const SETTLED: f64 = 1e-13;
+/// Λ whose last pass changed it by less than this part of the largest hovers about its fixed point: rounding keeps it from settling
+/// further, and no derivative feels it.
+pub(super) const HOVERING: f64 = 1e-9;
 /// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the arm.
 const ROUNDING: f64 = 1e-15;
 /// Why a pose has no static equilibrium.
@@ -170,9 +173,9 @@ impl Equilibrated {
             let direct = &self.position_response[row * n..(row + 1) * n];
             let adjoint = &mut self.adjoint[row * n..(row + 1) * n];
             let scale = direct.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let mut settled = false;
+            let mut change = 0.0_f64;
             for _ in 0..MAX_PASSES {
-                let mut change = 0.0_f64;
+                change = 0.0;
                 // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything inboard.
                 for j in (0..n).rev() {
                     let column = &self.moment_response[j * n..(j + 1) * n];
@@ -180,12 +183,13 @@ impl Equilibrated {
                     change = change.max((next - adjoint[j]).abs());
                     adjoint[j] = next;
                 }
-                settled = change <= SETTLED * scale;
-                if settled {
+                if change <= SETTLED * scale {
                     break;
                 }
             }
-            if !settled {
+            let largest = adjoint.iter().fold(scale, |m, x| m.max(x.abs()));
+            // No number compares with NaN.
+            if change.is_nan() || change > HOVERING * largest || adjoint.iter().any(|x| !x.is_finite()) {
                 return Err(StaticsError::NotSettled);
             }
         }
