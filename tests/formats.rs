@@ -191,7 +191,7 @@ fn fixed_joints_take_no_column() {
 fn columns_nobody_knows_are_passed_over_with_a_warning() {
     let problem = parse(MIXED);
     let (measurements, warnings) =
-        read(&problem, &["q1_deg,q2_deg,q3_mm,x_m,y_m,z_m,time,operator,paylod_kg,yy_m\n1,2,3,4,5,6,noon,Ada,1,1\n"])
+        read(&problem, &["q1_deg,q2_deg,q3_mm,x_m,y_m,z_m,time,operator,payloud_kgs,yy_m\n1,2,3,4,5,6,noon,Ada,1,1\n"])
             .unwrap();
     assert!(!measurements.time_measured);
     let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
@@ -199,7 +199,7 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
         ["q1_deg", "joint 1"],
         ["time", "time_s"],
         ["operator", "known; ignored"],
-        ["paylod_kg", "(did you mean payload_kg?); ignored"],
+        ["payloud_kgs", "(did you mean payload_kg?); ignored"],
         // A column that is there already is not meant.
         ["yy_m", "known; ignored"],
     ];

@@ -25,7 +25,7 @@ fn fit(problem: &Problem, rows: &Measurements, split: &Split) -> Identification 
 fn fit_by(strategy: Strategy, problem: &Problem, rows: &Measurements, split: &Split) -> Identification {
     let options = Options::default().with_strategy(strategy);
     let found = identify(problem, &Dataset::new(rows.clone(), split.clone()), &options).unwrap();
-    assert!(found.is_trusted(), "{:?}", found.termination);
+    assert!(found.is_trusted(), "{:?} {:?}", found.quality_flag, found.termination);
     found
 }
 
@@ -209,7 +209,8 @@ fn a_session_held_out_is_fitted_on_its_own_rows_alone() {
     for position in &mut other.positions[40..] {
         *position += Vector3::new(0.3 * position.y, 0.1, 0.2 * position.x);
     }
-    let with_other = fit(&problem, &other, &split);
+    let with_other = identify(&problem, &Dataset::new(other, split), &Options::default()).unwrap();
+    assert!(!with_other.is_trusted(), "held-out rows of another arm");
     let alone = part(&rows, 0..40);
     let split = Split { identification: (0..40).collect(), held_out: Vec::new() };
     let alone = fit(&problem, &alone, &split);

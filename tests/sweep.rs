@@ -7,6 +7,8 @@
 
 mod common;
 
+#[path = "sweep/arms.rs"]
+mod arms;
 #[path = "sweep/bench.rs"]
 mod bench;
 #[path = "sweep/families.rs"]

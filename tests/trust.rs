@@ -111,7 +111,7 @@ fn poses_measured_again_decide_nothing() {
     let (status, _, err) = one.command("identify", &[]);
     assert!(status == 1 && err.contains("3 measured coordinates for 6 parameters without a prior"), "{err}");
     // Enough of them need no word, and so do those that are measured again.
-    for all in [Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)), Bench::new(BASE, |lines| repeated(&lines, 2, 2))] {
+    for all in [Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)), Bench::new(BASE, |lines| repeated(&lines, 3, 3))] {
         let (status, _, err) = all.command("identify", &[]);
         assert!(status == 0 && !err.contains("coordinates"), "{err}");
     }
@@ -252,4 +252,73 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
     }
     let found = of("joint-coupling[3,4].factor")["estimate"].as_f64().unwrap();
     assert!((found - 0.0005).abs() < 2e-5, "{found}");
+}
+
+#[test]
+fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
+    let with = |name: &str| {
+        Bench::new(PRIORS, |lines| {
+            let cell = |row: usize| if row == 0 { name.to_owned() } else { "21".to_owned() };
+            lines.iter().enumerate().map(|(row, line)| format!("{line},{}", cell(row))).collect()
+        })
+    };
+    for (name, meant) in [("temprature_C", "temperature_C"), ("Session_", "session"), ("sgima_mm", "sigma_mm")] {
+        let (status, _, err) = with(name).command("identify", &[]);
+        let expected = format!("m.csv:1: column {name}: not a column that is known; a letter off {meant}");
+        assert!(status == 2 && err.contains(&expected), "{name}: {err}");
+    }
+    // Of another name, or of what decides nothing, it is passed over.
+    for name in ["room", "post"] {
+        let bench = with(name);
+        let (status, _, err) = bench.command("identify", &[]);
+        let expected = format!("m.csv:1: column {name}: not a column that is known");
+        assert!(status == 0 && err.contains(&expected), "{name}: {err}");
+        for file in ["report.md", "report.html"] {
+            let report = fs::read_to_string(bench.path("out").join(file)).unwrap();
+            assert!(report.contains(&format!("column {name}: not a column that is known")), "{file}: {report}");
+        }
+    }
+}
+
+#[test]
+fn nothing_that_is_printed_is_infinite() {
+    let bench = Bench::new(PRIORS, |lines| lines.into_iter().map(str::to_owned).collect());
+    assert_eq!(bench.command("identify", &[]).0, 0);
+    let numbers = |text: &str| {
+        let words = text.split(|c: char| !(c.is_alphanumeric() || "+-.".contains(c))).map(str::to_lowercase);
+        words.filter(|word| ["nan", "inf", "-inf", "+inf", "infinity"].contains(&word.as_str())).count()
+    };
+    let estimate = fs::read_to_string(bench.path("out/estimate.json")).unwrap();
+    fs::write(bench.path("targets.csv"), "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1900,100,400\n")
+        .unwrap();
+    fs::write(bench.path("far.csv"), "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1e153,100,400\n").unwrap();
+    let value: Value = serde_json::from_str(&estimate).unwrap();
+    for (huge, targets) in [("1e300", "targets.csv"), ("-1e200", "targets.csv"), ("1.0", "far.csv")] {
+        let mut edited = value.clone();
+        for parameter in edited["parameters"].as_array_mut().unwrap() {
+            parameter["estimate"] = huge.parse::<f64>().unwrap().into();
+        }
+        fs::write(bench.path("huge.json"), edited.to_string()).unwrap();
+        let (status, out, err) = bench.command("compensate", &["--estimate", "huge.json", "--data", targets]);
+        assert!(status != 0 && numbers(&out) + numbers(&err) == 0, "{huge}: {out} {err}");
+        if status == 1 {
+            let csv = fs::read_to_string(bench.path("out/commands.csv")).unwrap();
+            assert_eq!(numbers(&csv), 0, "{huge}: {csv}");
+        }
+    }
+    // Priors that say everything or nothing.
+    for sigma in ["1e-300", "1e300", "1e-12"] {
+        let rules = format!(
+            "[parameters]\n'joint*.*' = {{ sigma_deg = {sigma}, sigma_mm = {sigma} }}\n'tool.*' = {{ sigma_mm = {sigma} }}\n"
+        );
+        fs::write(bench.path("problem.toml"), format!("{ARM}{rules}{DATA}")).unwrap();
+        let (status, out, err) = bench.command("identify", &[]);
+        assert!(numbers(&out) + numbers(&err) == 0, "{sigma}: {status} {out} {err}");
+        if status < 2 {
+            for file in ["estimate.json", "report.md", "report.html"] {
+                let text = fs::read_to_string(bench.path("out").join(file)).unwrap();
+                assert_eq!(numbers(&text), 0, "{sigma}: {file}");
+            }
+        }
+    }
 }

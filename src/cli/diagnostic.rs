@@ -78,6 +78,7 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
             (true, Some(few)) => warn(&few.to_string()),
             (true, None) => {}
         }
+        fit.cautions.iter().for_each(|caution| warn(&caution.to_string()));
     }
     if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }
 }

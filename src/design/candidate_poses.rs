@@ -207,6 +207,7 @@ impl<'a> Table<'a> {
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },
             target: None,
             marked_held_out: None,
+            warnings: Vec::new(),
         }
     }
 }

@@ -50,7 +50,10 @@ impl Fitted {
         let active = DMatrix::from_fn(found.active_constraints.len(), unknowns.len(), coefficient);
         let sigma = match found.noise {
             Noise::Estimated(sigma) => sigma,
-            Noise::Declared | Noise::Unknown => placement.sigma(data.measurements, data.rows(), &problem),
+            // A σ that is too large would leave everything to the priors.
+            Noise::Declared | Noise::Unknown => {
+                found.sigma_scale * placement.sigma(data.measurements, data.rows(), &problem)
+            }
         };
         Ok(Self { problem, model, found, unknowns, active, sigma })
     }
@@ -79,7 +82,13 @@ impl Fitted {
 
     /// The poses of some rows.
     pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
-        Placement::of(data.measurements).poses(data.measurements, rows, self.sigma)
+        let mut poses = Placement::of(data.measurements).poses(data.measurements, rows, self.sigma);
+        if data.measurements.sigma.is_some() {
+            for pose in &mut poses {
+                pose.sigma *= self.found.sigma_scale;
+            }
+        }
+        poses
     }
 
     /// Residuals of some rows, measuring frame \[m\].

@@ -5,7 +5,7 @@ use super::data::Data;
 use super::evidence::{Evidence, weigh};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
-use super::residual_tests::{Findings, FitResidual, test_residual};
+use super::residual_tests::{Findings, FitResidual, Test, test_residual};
 use super::rules::SelectionRules;
 use super::telling_pose::{TellingPose, shuffled, telling_pose};
 use crate::identify::{Identification, IdentifyError, Noise, Options};
@@ -175,5 +175,11 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         setup: &data.setup,
         covariates: &data.covariates(&fitted.problem),
     };
-    test_residual(&fit, data.rules.seed)
+    let mut findings = test_residual(&fit, data.rules.seed);
+    // Against the σ declared, not the smaller one that the scatter speaks for.
+    let size = findings.tests.iter_mut().find(|own| own.test == Test::ReducedChiSquared);
+    if let Some(outcome) = size.and_then(|own| own.outcome.as_mut().ok()) {
+        outcome.statistic *= fitted.found.sigma_scale.powi(2);
+    }
+    findings
 }

@@ -243,6 +243,8 @@ pub enum InputErrorKind {
     NotCommas { found: char },
     #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
     MissingColumn { write: String, near: Option<String> },
+    #[error("not a column that is known; a letter off {meant}: write that, or a name that is not so near")]
+    MistypedColumn { meant: String },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
     #[error("{}; give every file the same columns", difference(other, *has))]

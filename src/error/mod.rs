@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use kind::{InputErrorKind, NoRows, WarningKind};
-pub(crate) use near::nearest;
+pub(crate) use near::{nearest, one_typo};
 pub use plain::{is_hidden, one_line, veiled, visible};
 
 /// How UTF-16 text begins, in either order of its bytes.

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::assumed::Assumed;
 use super::placement::HeldOutOnly;
 use super::registration::register;
 use super::stage::{Gauge, Stage, StageEnd, StageError};
@@ -34,8 +35,10 @@ pub(super) struct Fitting<'a> {
     pub progress: Option<&'a ProgressSink>,
     /// Steps after which a stage of the strategy is stopped.
     pub max_steps: Option<u64>,
-    /// 1 σ of a coordinate in rows without one of their own \[m\].
+    /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
     pub sigma: f64,
+    /// What the fit makes of each row's σ.
+    pub assumed: Assumed,
 }
 
 /// Where a fit ended.
@@ -66,10 +69,17 @@ impl<'a> Fitting<'a> {
         all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter)).map(|(k, _)| k).collect()
     }
 
-    fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+    /// A stage on some rows, with the σ that the fit takes.
+    pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+        let mut poses = self.placement.poses(self.measurements, rows, self.sigma);
+        let declared = poses.iter().map(|pose| pose.sigma).collect();
+        for pose in &mut poses {
+            pose.sigma = self.assumed.of(pose.sigma);
+        }
         Stage {
             model: self.model,
-            poses: self.placement.poses(self.measurements, rows, self.sigma),
+            poses,
+            declared,
             unknowns,
             solver: self.solver,
             max_steps: Settings::default().max_iterations,

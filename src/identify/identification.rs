@@ -5,28 +5,26 @@ use std::time::Instant;
 use nalgebra::DVector;
 
 use super::active::ActiveConstraint;
+use super::assumed::{Assumed, LEAST_NOISE};
 use super::covariance::Collected;
+use super::enough::Enough;
 use super::fitting::{FitEnd, Fitting};
+use super::judgement::Judgement;
+use super::noise::fitted;
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
-use super::quality::{QualityFlag, TooFewPoses, beyond_prior, misses, underdetermined};
+use super::quality::QualityFlag;
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::{Errors, Placement, ProgressSink, SolverChoice, Strategy};
+use super::{Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
+use crate::least_squares::solver::Termination;
 use crate::least_squares::{Identifiability, Loss};
-use crate::measurement::{Dataset, Measurements, different};
+use crate::measurement::{Dataset, Measurements};
 use crate::model::Model;
 use crate::model::effect::Columns;
 use crate::model::parameter::Parameter;
 use crate::problem::{Effect, EffectDeclaration, Problem, Robust, RobustLoss};
-
-/// An undeclared σ has settled when it changes by less than this part.
-const NOISE_SETTLED: f64 = 1e-3;
-/// Fits after which the search for an undeclared σ stops.
-const MAX_NOISE_FITS: usize = 20;
-/// Least σ that an undeclared one is taken to be: positions are not predicted more exactly than to rounding \[m\].
-const LEAST_NOISE: f64 = 1e-9;
 
 /// How to identify: [`Options::default()`] with what the `with_…` methods change.
 #[derive(Clone, Default)]
@@ -213,39 +211,26 @@ pub fn identify_model(
         progress: options.progress.as_ref(),
         max_steps: options.max_steps,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
+        assumed: Assumed::DECLARED,
     };
-    if let Some(row) = fitting.without_equilibrium() {
-        return Err(measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
-    }
-    let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
-    if strategy != Strategy::Joint && unknowns.iter().all(|parameter| parameter.slot.is_placement()) {
-        return Err(IdentifyError::NothingToFit { strategy: strategy.as_str() });
-    }
-
+    let unknowns = fitted_parameters(&fitting)?;
     let start = fitting.registered()?;
     let registered = fitting.errors(&start);
     if !noise_is_declared {
         fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
     }
     let begin = options.begin(model, &start);
-    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, noise_is_declared)?;
+    let enough = Enough::of(&fitting, problem, &unknowns, &start);
+    let judged = enough.too_few.is_none() && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
+    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
     let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
     let mut covariance = Collected::new(estimates.len());
     enter((&mut estimates, &mut covariance), &fitting.whole(), &end, &statistics);
-    let numbers = measurements.pose_numbers(problem);
-    let poses = different(&numbers, split.identification.iter().copied());
     let mut not_converged = (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
-    if let Some(stage) = fitting.held_out_stage() {
-        let placed: FitEnd = stage.run(&end.x)?.into();
-        end.iterations += placed.iterations;
-        end.evaluations += placed.evaluations;
-        not_converged = not_converged
-            .or((!placed.termination.converged()).then_some(QualityFlag::HeldOutNotConverged(placed.termination)));
-        let statistics = Statistics::of(&stage, &placed, noise_is_declared)?;
-        enter((&mut estimates, &mut covariance), &stage, &placed, &statistics);
-        end.x = placed.x;
+    if let Some(termination) = place_held_out(&fitting, &mut end, (&mut estimates, &mut covariance), noise)? {
+        not_converged = not_converged.or(Some(QualityFlag::HeldOutNotConverged(termination)));
     }
     if noise == Noise::Unknown {
         for estimate in &mut estimates {
@@ -253,19 +238,25 @@ pub fn identify_model(
         }
     }
     let fitted = fitting.errors(&end.x);
-    let squares = fitting.whole().poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>();
-    let declared_sigma = noise_is_declared.then(|| (squares / split.identification.len().max(1) as f64).sqrt());
-    let far = |of: &Errors| misses(measurements, &placement, &split.identification, &of.identification, declared_sigma);
-    // An arm that was near before the fit was driven away by a solver that did not converge.
-    let misses = far(&fitted).filter(|_| end.termination.converged() || far(&registered).is_some());
-    let parameters = unknowns.len();
-    let quality_flag = too_few_equations(&fitting, &numbers, &unknowns)
-        .or(misses)
-        .or(not_converged)
-        .or_else(|| beyond_prior(model, &end.x));
+    let whole = fitting.whole();
+    let declared_all = together(whole.declared.iter().copied());
+    let taken = together(whole.poses.iter().map(|pose| pose.sigma));
+    let judgement = Judgement {
+        fitting: &fitting,
+        start: &start,
+        end: &end,
+        errors: (&registered, &fitted),
+        outliers: &outliers,
+        sigma: (noise_is_declared.then_some(declared_all), taken),
+    };
+    let quality_flag = judgement.flag(enough.flag, not_converged, enough.poses);
+    let cautions = judgement.cautions(&whole.unknowns, &statistics.covariance);
     Ok(Identification {
         quality_flag,
-        too_few_poses: (3 * poses < parameters).then_some(TooFewPoses { poses, parameters }),
+        too_few_poses: enough.too_few,
+        poses: enough.poses,
+        several_targets: enough.several_targets,
+        cautions,
         strategy,
         solver,
         solver_reason: options.solver.reason(model),
@@ -276,7 +267,11 @@ pub fn identify_model(
         registered,
         fitted,
         reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
-        noise_factor: statistics.noise_factor,
+        chance: statistics.chance.filter(|_| noise_is_declared),
+        noise_factor: (taken / declared_all).powi(2),
+        sigma_taken: taken,
+        sigma_scale: fitting.assumed.scale,
+        weak: end.gauge.weak.clone(),
         coordinates: 3 * split.identification.len(),
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
@@ -292,40 +287,39 @@ pub fn identify_model(
     })
 }
 
-/// The whole fit, a base or a target with fewer coordinates than parameters without a prior; `numbers` are those of the poses.
-fn too_few_equations(fitting: &Fitting, numbers: &[usize], unknowns: &[&Parameter]) -> Option<QualityFlag> {
-    let Fitting { model, placement, held_out_only, split, .. } = fitting;
-    let coordinates = 3 * different(numbers, split.identification.iter().copied());
-    let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    (coordinates < without_prior)
-        .then(|| QualityFlag::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
-        .or_else(|| underdetermined(model, placement, numbers, &split.identification, |k| !held_out_only.parameters[k]))
-        .or_else(|| underdetermined(model, placement, numbers, &held_out_only.rows, |k| held_out_only.parameters[k]))
+/// What the strategy varies; a row without equilibrium and a strategy that varies nothing of its own are mistakes.
+fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, IdentifyError> {
+    if let Some(row) = fitting.without_equilibrium() {
+        return Err(fitting.measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
+    }
+    let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
+    if fitting.strategy != Strategy::Joint && unknowns.iter().all(|parameter| parameter.slot.is_placement()) {
+        return Err(IdentifyError::NothingToFit { strategy: fitting.strategy.as_str() });
+    }
+    Ok(unknowns)
 }
 
-/// Runs the strategy; where no σ is declared, again and again until the scatter about the fit is the σ assumed.
-fn fitted(
-    fitting: &mut Fitting,
-    start: &DVector<f64>,
-    noise_is_declared: bool,
-) -> Result<(FitEnd, Statistics, Noise), StageError> {
-    let mut fits = 0;
-    loop {
-        fits += 1;
-        let end = fitting.run(start)?;
-        let statistics = Statistics::of(&fitting.whole(), &end, noise_is_declared)?;
-        let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
-        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
-        if noise_is_declared || settled || fits == MAX_NOISE_FITS {
-            let noise = match statistics.reduced_chi2 {
-                _ if noise_is_declared => Noise::Declared,
-                Some(_) => Noise::Estimated(fitting.sigma),
-                None => Noise::Unknown,
-            };
-            return Ok((end, statistics, noise));
-        }
-        fitting.sigma = next;
-    }
+/// Fits bases and targets of held-out sessions to their rows, with the arm as it ended; how that ended, if it did not converge.
+fn place_held_out(
+    fitting: &Fitting,
+    end: &mut FitEnd,
+    results: (&mut [Estimate], &mut Collected),
+    noise: Noise,
+) -> Result<Option<Termination>, StageError> {
+    let Some(stage) = fitting.held_out_stage() else { return Ok(None) };
+    let placed: FitEnd = stage.run(&end.x)?.into();
+    end.iterations += placed.iterations;
+    end.evaluations += placed.evaluations;
+    let statistics = Statistics::of(&stage, &placed, (noise == Noise::Declared).then_some(fitting.assumed))?;
+    enter(results, &stage, &placed, &statistics);
+    end.x = placed.x;
+    Ok((!placed.termination.converged()).then_some(placed.termination))
+}
+
+/// Root mean square of the σ of some rows.
+fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = sigmas.len().max(1) as f64;
+    (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()
 }
 
 /// The loss that `[robust]` stands for, on the three coordinates of a position.

@@ -1,14 +1,20 @@
 //! What to fit, in which order, and what came of it.
 
 mod active;
+mod assumed;
 mod baseline;
+mod cautions;
 mod compare;
 mod compensate;
 mod constraints;
 mod covariance;
+mod enough;
 mod errors;
 mod fitting;
+mod held_out;
 mod identification;
+mod judgement;
+mod noise;
 mod outcome;
 mod outliers;
 mod placement;
@@ -16,6 +22,7 @@ mod predict;
 mod progress;
 mod quality;
 mod registration;
+mod sizes;
 mod solver_choice;
 mod stage;
 mod statistics;
@@ -23,6 +30,7 @@ mod strategy;
 
 pub use active::ActiveConstraint;
 pub use baseline::Baseline;
+pub use cautions::Caution;
 pub use compare::{Comparison, compare};
 pub use compensate::{Command, compensate};
 pub use covariance::{Correlations, Covariance};

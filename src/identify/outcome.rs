@@ -6,9 +6,9 @@ use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
-use super::{ActiveConstraint, Errors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
-use crate::least_squares::Identifiability;
+use super::{ActiveConstraint, Caution, Errors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
 use crate::least_squares::solver::{AtBound, Termination};
+use crate::least_squares::{BlindCombination, Identifiability};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
@@ -68,6 +68,12 @@ pub struct Identification {
     pub quality_flag: Option<QualityFlag>,
     /// Whether the poses are too few to say much without priors.
     pub too_few_poses: Option<TooFewPoses>,
+    /// Different poses of the arm that were fitted; several targets in one pose make one.
+    pub poses: usize,
+    /// Whether some pose of the arm shows several targets.
+    pub several_targets: bool,
+    /// What to ask about the input.
+    pub cautions: Vec<Caution>,
     /// Steps tried, over all stages.
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.
@@ -83,8 +89,17 @@ pub struct Identification {
     /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
     /// Where the loss is robust, outliers are left out of it.
     pub reduced_chi2: Option<f64>,
-    /// By how much the declared variance was raised for the standard errors, ≥ 1.
+    /// Where chance keeps `reduced_chi2`, with probability 0.999; `None` as there.
+    pub chance: Option<(f64, f64)>,
+    /// Variance that the fit took over the declared one: 1 where residual and priors do not contradict that.
     pub noise_factor: f64,
+    /// 1 σ of a coordinate that the fit took, of the identification rows together \[m\].
+    pub sigma_taken: f64,
+    /// By what the declared σ are multiplied because they are too large; 1 where they are not.
+    pub sigma_scale: f64,
+    /// Combinations of `unknowns` that the data see too weakly to be estimated, held where they were: weights in units of the
+    /// arm's size for lengths, 1 rad for angles and a factor of 100 for stiffnesses, and the σ by which that moves all data.
+    pub weak: Vec<BlindCombination>,
     /// Measured coordinates that were fitted.
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of `identifiability`.

@@ -4,22 +4,27 @@ use std::fmt;
 
 use nalgebra::{DVector, Vector3};
 
-use super::{ErrorSummary, Placement};
+use super::Placement;
+use super::sizes::largest;
 use crate::least_squares::solver::Termination;
-use crate::measurement::{Measurements, different};
 use crate::model::Model;
 use crate::model::parameter::{JointField, Parameter, Slot};
+use crate::quantity::Unit;
 
 /// A fitted arm that misses the measurements by this part of their spread describes another arm.
-const MISSES: f64 = 0.02;
+pub(super) const MISSES: f64 = 0.02;
 /// … unless the declared noise is of that size: in units of 1 σ of a position.
-const BEYOND_NOISE: f64 = 100.0;
+pub(super) const BEYOND_NOISE: f64 = 100.0;
 
-/// Parameters of an arm that describes the measured one stay within so many σ of their priors.
-const OUT_OF_PROPORTION: f64 = 20.0;
+/// Parameters of an arm that describes the measured one stay within so many σ of their priors: chance takes one in two million
+/// beyond.
+const OUT_OF_PROPORTION: f64 = 5.0;
+
+/// Sizes of what was measured and of what the nominal arm predicts that differ by more than this factor are of two arms.
+const OTHER_SIZE: f64 = 2.0;
 
 /// Points this close together say nothing about the size of an arm \[m\].
-const LEAST_SPREAD: f64 = 0.01;
+pub(super) const LEAST_SPREAD: f64 = 0.01;
 
 /// Why a fit is not to be trusted.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,12 +43,51 @@ pub enum QualityFlag {
     NotConverged(Termination),
     /// The fit of bases and targets of held-out sessions did not converge.
     HeldOutNotConverged(Termination),
-    /// A parameter of the arm's geometry is far beyond its prior.
+    /// A parameter of the arm is far beyond its prior.
     BeyondPrior {
         /// Which.
         name: String,
         /// Its change in units of the prior's σ.
         sigmas: f64,
+    },
+    /// A parameter is beyond what an arm of this size can have.
+    BeyondArm {
+        /// Which.
+        name: String,
+        /// Its change in units of the arm's size, of half a turn, or of a factor of 100.
+        sizes: f64,
+        /// What it is measured by, in words.
+        size: &'static str,
+    },
+    /// The measured points lie wider apart or closer together than any arm like the nominal one reaches.
+    OtherSize {
+        /// Root mean squared distance of the measured points from their centre \[m\].
+        measured: f64,
+        /// The same of the nominal arm's points \[m\].
+        expected: f64,
+    },
+    /// The poses of a base leave its place open, as points on a line do.
+    Undetermined {
+        /// Which base.
+        of: String,
+        /// Its different poses.
+        poses: usize,
+    },
+    /// Held-out rows are identification rows again, all of them.
+    HeldOutCopied,
+    /// Most held-out poses are missed as if they were of another arm.
+    HeldOutMisses {
+        /// Median error \[m\].
+        median: f64,
+        /// Root mean squared distance of the identification points from their centre \[m\].
+        spread: f64,
+    },
+    /// The fitted arm meets held-out poses worse than the registered nominal one.
+    HeldOutWorse {
+        /// Root mean squared error of the nominal arm \[m\].
+        before: f64,
+        /// The same of the fitted arm \[m\].
+        after: f64,
     },
     /// The fitted arm is far from the measurements.
     Misses {
@@ -73,6 +117,39 @@ impl fmt::Display for QualityFlag {
                 "{name} moved by {sigmas:.0} times the σ of its prior; check axes of the measuring frame, signs of joints, \
                  units, and the prior"
             ),
+            Self::BeyondArm { name, sizes, size } => write!(
+                f,
+                "{name} moved by {sizes:.1} times {size}: more than an arm can be off; give it a prior, or check units and the \
+                 table's columns"
+            ),
+            Self::OtherSize { measured, expected } => write!(
+                f,
+                "the measured points lie {:.1} mm from their centre, those of the nominal arm {:.1} mm; check units, and what \
+                 the columns hold",
+                measured * 1e3,
+                expected * 1e3
+            ),
+            Self::Undetermined { of, poses } => write!(
+                f,
+                "{of}: its points, of {poses} different poses, are too few or lie on a line, which leaves a turn about it open"
+            ),
+            Self::HeldOutCopied => {
+                write!(f, "all held-out rows are identification rows again: their errors judge nothing")
+            }
+            Self::HeldOutMisses { median, spread } => write!(
+                f,
+                "half of the held-out poses are missed by more than {:.1} mm, {:.0} % of the spread of the fitted ones; check \
+                 whether these rows belong together, and whether the fitted poses cover them",
+                median * 1e3,
+                100.0 * median / spread
+            ),
+            Self::HeldOutWorse { before, after } => write!(
+                f,
+                "held-out poses are met worse than by the nominal arm ({:.3} mm rms before, {:.3} mm after); more poses, fewer free \
+                 parameters or smaller priors are needed",
+                before * 1e3,
+                after * 1e3
+            ),
             Self::HeldOutNotConverged(termination) => write!(f, "the bases of held-out sessions: {termination}"),
             Self::Misses { rms, spread } => write!(
                 f,
@@ -88,90 +165,79 @@ impl fmt::Display for QualityFlag {
 /// Fewer coordinates measured in different poses than parameters: priors decide what measurements do not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooFewPoses {
-    /// Different poses.
+    /// Different poses of the arm; several targets in one pose make one.
     pub poses: usize,
+    /// What they measure: no pose of the arm has more than six coordinates, however many targets it shows.
+    pub coordinates: usize,
     /// Parameters that are fitted.
     pub parameters: usize,
 }
 
 impl fmt::Display for TooFewPoses {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { poses, parameters } = self;
+        let Self { poses, coordinates, parameters } = self;
         let noun = if *poses == 1 { "pose measures" } else { "different poses measure" };
         write!(
             f,
-            "{poses} {noun} {} coordinates, fewer than the {parameters} parameters that are fitted: priors decide most of it",
-            3 * poses
+            "{poses} {noun} {coordinates} coordinates, fewer than the {parameters} parameters that are fitted: priors decide \
+             most of it"
         )
     }
 }
 
-/// The parameter of the arm's geometry that lies furthest beyond its prior, if that is out of all proportion.
+/// The parameter of the arm that lies furthest beyond its prior, if that is out of all proportion; those of effects may.
 pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<QualityFlag> {
-    let ratio = |(k, parameter): (usize, &Parameter)| match parameter.slot {
-        Slot::Joint { field, .. } if JointField::GEOMETRY.contains(&field) && parameter.driver.is_constant() => {
-            parameter.sigma.map(|sigma| (k, x[k].abs() / sigma))
-        }
-        _ => None,
+    let declared = |slot: Slot| match slot {
+        Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field) || field == JointField::Stiffness,
+        Slot::Beam { .. } => slot.unit().is_relative(),
+        Slot::Base { .. } | Slot::Target { .. } => true,
+        _ => false,
+    };
+    let ratio = |(k, parameter): (usize, &Parameter)| {
+        let of_arm = declared(parameter.slot) && parameter.driver.is_constant();
+        Some((k, x[k].abs() / parameter.sigma.filter(|_| of_arm)?))
     };
     let ratios = model.parameters.iter().enumerate().filter_map(ratio);
     let (k, sigmas) = ratios.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (sigmas > OUT_OF_PROPORTION).then(|| QualityFlag::BeyondPrior { name: model.parameters[k].name.clone(), sigmas })
 }
 
-/// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates measured in different
-/// poses of `rows` than parameters of its own without a prior; of the parameters that are `varied` there. `numbers` are those
-/// of the poses of all rows.
-pub(super) fn underdetermined(
-    model: &Model,
-    placement: &Placement,
-    numbers: &[usize],
-    rows: &[usize],
-    varied: impl Fn(usize) -> bool,
-) -> Option<QualityFlag> {
-    let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
-        let coordinates = 3 * different(numbers, rows.iter().copied().filter(|&row| used(row)));
-        let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
-        let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
-        (0 < coordinates && coordinates < unknowns).then_some(QualityFlag::TooFewEquations {
-            of,
-            coordinates,
-            unknowns,
-        })
+/// The parameter that moved furthest beyond what any arm of this size can have, if one did.
+pub(super) fn beyond_arm(model: &Model, x: &DVector<f64>) -> Option<QualityFlag> {
+    let ratio = |(k, parameter): (usize, &Parameter)| Some((k, x[k].abs() / largest(model, parameter)?));
+    let ratios = model.parameters.iter().enumerate().filter_map(ratio);
+    let (k, sizes) = ratios.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let parameter = &model.parameters[k];
+    let size = match parameter.unit() {
+        Unit::Length => "the arm's own size",
+        Unit::Angle => "half a turn",
+        _ => "a factor of 100",
     };
-    let base = |b: usize| {
-        let alone = |t: usize| rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b);
-        let own = |slot| match slot {
-            Slot::Base { base, .. } => base == b,
-            Slot::Target { target, .. } => alone(target) && rows.iter().any(|&row| placement.target_of(row) == target),
-            _ => false,
-        };
-        check(format!("base[{}]", placement.bases[b]), &|row| placement.base_of(row) == b, &own)
-    };
-    let target = |t: usize| {
-        let own = |slot| matches!(slot, Slot::Target { target, .. } if target == t);
-        check(format!("tool[{}]", placement.targets[t]), &|row| placement.target_of(row) == t, &own)
-    };
-    let bases = (0..placement.bases.len()).find_map(base);
-    bases.or_else(|| (0..placement.targets.len()).find_map(target))
+    (sizes > 1.0).then(|| QualityFlag::BeyondArm { name: parameter.name.clone(), sizes, size })
 }
 
-/// Whether the fitted arm is far from what was measured in `rows`; `sigma` \[m\] is that of a coordinate, if it was declared.
-pub(super) fn misses(
-    measurements: &Measurements,
-    placement: &Placement,
-    rows: &[usize],
-    fitted: &ErrorSummary,
-    sigma: Option<f64>,
-) -> Option<QualityFlag> {
+/// Root mean squared distance \[m\] of some points of `rows` from the centre of those of the same base.
+pub(super) fn spread(placement: &Placement, rows: &[usize], point: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    let points: Vec<(usize, Vector3<f64>)> =
+        rows.iter().enumerate().map(|(place, &row)| (placement.base_of(row), point(place))).collect();
     let mut squares = 0.0;
     for base in 0..placement.bases.len() {
-        let own = || rows.iter().filter(|&&row| placement.base_of(row) == base).map(|&row| measurements.positions[row]);
+        let own = || points.iter().filter(|(of, _)| *of == base).map(|(_, point)| point);
         let centre = own().sum::<Vector3<f64>>() / own().count().max(1) as f64;
-        squares += own().map(|position| (position - centre).norm_squared()).sum::<f64>();
+        squares += own().map(|point| (point - centre).norm_squared()).sum::<f64>();
     }
-    let spread = (squares / rows.len().max(1) as f64).sqrt();
-    let rms = fitted.rms.norm;
+    (squares / rows.len().max(1) as f64).sqrt()
+}
+
+/// Whether the fitted arm is far from what was measured, of which `rms` \[m\] is the error and `spread` \[m\] the spread;
+/// `sigma` \[m\] is that of a coordinate, if it was declared.
+pub(super) fn misses(rms: f64, spread: f64, sigma: Option<f64>) -> Option<QualityFlag> {
     let noise = sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
     (spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise).then_some(QualityFlag::Misses { rms, spread })
+}
+
+/// Whether the points that were measured are of an arm of another size than the nominal one.
+pub(super) fn other_size(measured: f64, expected: f64) -> Option<QualityFlag> {
+    let same = (expected / OTHER_SIZE..=expected * OTHER_SIZE).contains(&measured);
+    (expected > LEAST_SPREAD && !same).then_some(QualityFlag::OtherSize { measured, expected })
 }

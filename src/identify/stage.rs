@@ -7,11 +7,14 @@ use nalgebra::{DMatrix, DVector};
 use super::SolverChoice;
 use super::active::Held;
 use super::progress::{ProgressSink, Reporter};
+use super::sizes::plausible;
 use crate::least_squares::solver::{
     self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings, Settings,
     Solution,
 };
-use crate::least_squares::{Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError};
+use crate::least_squares::{
+    BlindCombination, Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError, Steadied, Weak,
+};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
 
@@ -40,7 +43,10 @@ pub enum StageError {
 /// What a stage works on.
 pub(super) struct Stage<'a> {
     pub model: &'a Model,
+    /// With the σ that the fit takes.
     pub poses: Vec<Pose<'a>>,
+    /// 1 σ of a coordinate of each pose, as declared \[m\].
+    pub declared: Vec<f64>,
     /// Which parameters vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
@@ -61,13 +67,15 @@ pub(super) struct StageEnd {
     pub gauge: Gauge,
 }
 
-/// The combinations of a stage's unknowns that neither data nor priors see; they are held where they start.
+/// The combinations of a stage's unknowns that neither data nor priors see, or too weakly; they are held where they start.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gauge {
     /// Rows that span them, on the unknowns.
     pub rows: DMatrix<f64>,
     /// Part of each unknown outside of them, 0…1.
     pub visible: Vec<f64>,
+    /// Those that are seen too weakly, each by itself.
+    pub weak: Vec<BlindCombination>,
 }
 
 impl<'a> Stage<'a> {
@@ -78,13 +86,23 @@ impl<'a> Stage<'a> {
 
     /// Residuals of the stage about the full parameter vector `at`.
     pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
-        PoseResiduals::new(self.model, self.poses.clone(), self.unknowns.clone(), at.clone())
+        self.residuals_of(self.poses.clone(), at)
+    }
+
+    /// The same of other poses.
+    pub fn residuals_of(&self, poses: Vec<Pose<'a>>, at: &DVector<f64>) -> PoseResiduals<'a> {
+        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone())
     }
 
     /// Triangular factor R of the whitened data at `at`, priors left out.
     pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
         let residuals = self.residuals(at);
         Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
+    }
+
+    /// How far each unknown may plausibly go, where no prior says so.
+    fn sizes(&self) -> Vec<Option<f64>> {
+        self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
     }
 
     /// The same, each pose weighted as the loss does.
@@ -97,7 +115,7 @@ impl<'a> Stage<'a> {
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
-            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n] };
+            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
         }
         let data = self.data_triangle(at);
         let priors = self.priors();
@@ -109,19 +127,35 @@ impl<'a> Stage<'a> {
             i => active[i - seen].row[j].signum() * f64::from(active[i - seen].row[j] != 0.0) * data.column(j).norm(),
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
-        let found = Identifiability::of(&stacked.qr().unpack_r().select_columns(&free));
-        let mut gauge = Gauge { rows: DMatrix::zeros(found.gauge.nrows(), n), visible: vec![0.0; n] };
+        let seen = stacked.qr().unpack_r().select_columns(&free);
+        let found = Identifiability::of(&seen);
+        let all = self.sizes();
+        let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
+        let weak = Weak::of(&below(&seen, &found.gauge), &sizes);
+        let blind = found.gauge.nrows();
+        let count = blind + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
+        let mut gauge = Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
         for (j, &k) in free.iter().enumerate() {
-            gauge.rows.set_column(k, &found.gauge.column(j));
+            gauge.rows.view_mut((0, k), (blind, 1)).copy_from(&found.gauge.column(j));
             gauge.visible[k] = found.visible[j];
+            if let Some(weak) = &weak {
+                gauge.rows.view_mut((blind, k), (count - blind, 1)).copy_from(&weak.rows.column(j));
+                gauge.visible[k] = found.visible[j].min(weak.visible[j]);
+            }
         }
+        let named = |own: BlindCombination| BlindCombination {
+            weights: own.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
+            ..own
+        };
+        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(named).collect();
         gauge
     }
 
     /// Minimises from the full parameter vector `start`.
     ///
-    /// Combinations that are blind at the start are held there. What is blind at the start may be seen at the end, or
-    /// decided by a bound or a constraint: then the fit goes on with that set free.
+    /// Combinations that are blind or weak at the start are held there, what becomes weak on the way is held where it is then.
+    /// What is blind at the start may be seen at the end, or decided by a bound or a constraint: then the fit goes on with that
+    /// set free.
     ///
     /// # Errors
     /// Bounds and constraints leave the parameters no values.
@@ -149,7 +183,9 @@ impl<'a> Stage<'a> {
             if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
                 (solution.iterations, solution.cost_evaluations) = (iterations, cost_evaluations);
                 solution.linearisations = linearisations;
-                return Ok(StageEnd { x, solution, gauge });
+                let weak = now.weak.clone();
+                let held = if now.rows.nrows() > gauge.rows.nrows() { now } else { gauge };
+                return Ok(StageEnd { x, solution, gauge: Gauge { weak, ..held } });
             }
             gauge = now;
             begin = solution.x;
@@ -171,6 +207,8 @@ impl<'a> Stage<'a> {
             .with_loss(self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?;
+        let sizes = self.sizes();
+        let fit = Steadied { objective: fit, sizes: &sizes };
         let settings =
             Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
         let reporter = self.progress.map(|sink| Reporter {
@@ -220,4 +258,12 @@ impl<'a> Stage<'a> {
         }
         rows
     }
+}
+
+/// Rows stacked on top of each other and brought to a triangle.
+fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = triangle.ncols();
+    let mut stack = triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
+    stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
+    if rows.nrows() == 0 { stack } else { stack.qr().unpack_r() }
 }

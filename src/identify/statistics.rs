@@ -4,13 +4,12 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::active::{Held, confine};
+use super::assumed::{Assumed, IMPROBABLE};
 use super::fitting::FitEnd;
 use super::outliers::Lengths;
 use super::stage::{Stage, StageError};
 use crate::least_squares::{Identifiability, Loss, Uncertainty};
 
-/// A χ² this improbable under the declared σ means that σ is understated.
-const IMPROBABLE: f64 = 1e-3;
 /// A part this large in blind combinations leaves an unknown without an error of its own.
 const PARTLY_BLIND: f64 = 1e-3;
 
@@ -25,10 +24,10 @@ pub(super) struct Statistics {
     pub identified: Vec<f64>,
     /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 where one is held.
     pub covariance: DMatrix<f64>,
-    /// χ² over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
+    /// χ² against the declared σ over its degrees of freedom, outliers left out where the loss is robust; `None` without any.
     pub reduced_chi2: Option<f64>,
-    /// By how much the assumed variance was raised, ≥ 1.
-    pub noise_factor: f64,
+    /// Where chance keeps it.
+    pub chance: Option<(f64, f64)>,
     /// The constraints that hold back.
     pub constraints: Vec<Held>,
     /// Lengths of the residuals.
@@ -36,15 +35,14 @@ pub(super) struct Statistics {
 }
 
 impl Statistics {
-    /// Of a stage that ended at `end`.
+    /// Of a stage that ended at `end` and took its σ as `assumed`, if any σ was declared.
     ///
-    /// The model's errors count as noise: where χ² / ν is beyond chance under a declared σ, the variance is raised by it.
     /// With a robust loss the covariance is that of the weighted Jacobian, times [`Loss::variance_factor`].
     /// Active constraints confine it to the directions that they leave open.
     ///
     /// # Errors
     /// Constraints make no sense.
-    pub fn of(stage: &Stage, end: &FitEnd, noise_is_declared: bool) -> Result<Self, StageError> {
+    pub fn of(stage: &Stage, end: &FitEnd, assumed: Option<Assumed>) -> Result<Self, StageError> {
         let triangle = stage.weighted_triangle(&end.x);
         let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
         let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
@@ -54,16 +52,13 @@ impl Statistics {
         let mut uncertainty = of(1.0);
         let coordinates = 3.0 * stage.poses.len() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
-        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, noise_is_declared);
+        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, assumed.map(|assumed| assumed.scale));
         let robust = stage.loss != Loss::Squares;
         let counts = |length: f64| !robust || lengths.outlying(length).is_none();
         let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
         let left_out = if robust { 3.0 * lengths.outliers() as f64 } else { 0.0 };
-        let noise_factor = if noise_is_declared { raised(chi2, freedom - left_out) } else { 1.0 };
         if robust {
-            uncertainty = of(stage.loss.variance_factor(&lengths.values, 3, freedom));
-        } else if noise_factor > 1.0 {
-            uncertainty = of(noise_factor);
+            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, 3, freedom));
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
@@ -89,16 +84,16 @@ impl Statistics {
             known,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
-            noise_factor,
+            chance: chance(freedom),
             constraints,
             lengths,
         })
     }
 }
 
-/// χ² / ν where that is beyond chance, else 1.
-fn raised(chi2: f64, freedom: f64) -> f64 {
-    let beyond_chance =
-        freedom > 0.5 && ChiSquared::new(freedom).is_ok_and(|distribution| distribution.sf(chi2) < IMPROBABLE);
-    if beyond_chance { (chi2 / freedom).max(1.0) } else { 1.0 }
+/// Where chance keeps χ² / ν.
+fn chance(freedom: f64) -> Option<(f64, f64)> {
+    let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
+    let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
+    Some((bound(0.5 * IMPROBABLE), bound(1.0 - 0.5 * IMPROBABLE)))
 }

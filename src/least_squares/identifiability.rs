@@ -88,7 +88,7 @@ impl Identifiability {
 }
 
 /// Orthonormal rows that span what the orthonormal columns of `basis` leave out.
-fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, r) = basis.shape();
     let mut rest = DMatrix::identity(n, n) - basis * basis.transpose();
     let mut rows = DMatrix::zeros(n - r, n);

@@ -12,6 +12,8 @@ mod singular;
 pub mod solver;
 mod triangle;
 mod uncertainty;
+mod variance;
+mod weak;
 
 use std::ops::Range;
 
@@ -23,6 +25,8 @@ pub use loss::Loss;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
+pub use variance::VarianceLikelihood;
+pub use weak::{Steadied, WEAK_BELOW, Weak};
 
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {
@@ -131,4 +135,22 @@ pub struct Linearisation {
     pub triangle: DMatrix<f64>,
     /// The first n entries of Qᵀr.
     pub projected: DVector<f64>,
+}
+
+impl Linearisation {
+    /// The same with further rows W p = 0 for the step p, whose cost is left out.
+    #[must_use]
+    pub fn with_rows(self, rows: &DMatrix<f64>) -> Self {
+        let n = self.projected.len();
+        let mut block = Block::zeros(n + rows.nrows(), n);
+        for j in 0..n {
+            let (own, more) = block.column_mut(j).split_at_mut(n);
+            own.copy_from_slice(self.triangle.column(j).as_slice());
+            more.copy_from_slice(rows.column(j).as_slice());
+        }
+        block.column_mut(n)[..n].copy_from_slice(self.projected.as_slice());
+        let mut triangle = Triangle::new(n);
+        triangle.absorb(&mut block);
+        Self { cost: self.cost, ..triangle.into_linearisation() }
+    }
 }

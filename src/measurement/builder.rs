@@ -241,6 +241,7 @@ impl DatasetBuilder {
             session: words("session", self.session)?.unwrap_or_else(unnamed),
             target: words("target", self.target)?,
             marked_held_out: None,
+            warnings: Vec::new(),
         })
     }
 }

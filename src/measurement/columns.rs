@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest};
+use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest, one_typo};
 use crate::problem::{HeldOut, JointKind, Problem};
 use crate::quantity::Unit;
 
@@ -85,7 +85,7 @@ impl Columns {
         let mut found: BTreeMap<Role, &str> = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut columns = Self { read: Vec::new(), marked: None };
-        let mut unknown = Vec::new();
+        let (mut unknown, mut mistyped) = (Vec::new(), None);
         for (place, name) in table.header.iter().enumerate() {
             let error = |kind| table.column(name).error(kind);
             if !name.is_empty() && !names.insert(name) {
@@ -108,6 +108,10 @@ impl Columns {
                     unknown.push(name.as_str());
                     let asked = unknown.len() <= ASKED;
                     let meant = asked.then(|| numbering.meant(name, &there, problem)).flatten();
+                    if let Some(meant) = meant.as_ref().filter(|meant| counts(meant) && one_typo(name, meant)) {
+                        mistyped =
+                            mistyped.or_else(|| Some(error(InputErrorKind::MistypedColumn { meant: meant.clone() })));
+                    }
                     let kind = WarningKind::ColumnIgnored { meant };
                     warnings.push(Warning { location: table.column(name), kind });
                 }
@@ -115,7 +119,7 @@ impl Columns {
         }
         columns.read.sort_by_key(|column| column.role);
         columns.require(table, problem, measured, &numbering, &unknown)?;
-        Ok(columns)
+        mistyped.map_or(Ok(columns), Err)
     }
 
     /// Whether every column is there that has to be; one of the `unknown` may be meant by it.
@@ -248,6 +252,12 @@ impl Numbering {
             None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
         }
     }
+}
+
+/// Whether a column that was meant would be missed: a pose's name and orientations decide nothing.
+fn counts(meant: &str) -> bool {
+    let base = split_unit(meant).0;
+    base != "pose" && !MEASURED.iter().any(|(known, role, ..)| *known == base && matches!(role, Role::Orientation(_)))
 }
 
 /// What q of a joint is measured in, where it takes one.

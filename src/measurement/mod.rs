@@ -22,7 +22,7 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use crate::error::Location;
+use crate::error::{Location, Warning};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use dataset::Dataset;
@@ -64,6 +64,8 @@ pub struct Measurements {
     pub target: Option<Labels>,
     /// Whether the row is marked `validation`: in the column that the problem names, or in `split` where it says nothing.
     pub marked_held_out: Option<Vec<bool>>,
+    /// What was passed over in the files, for reports.
+    pub warnings: Vec<Warning>,
 }
 
 /// A word per row, stored as an index into the distinct words in order of appearance.
@@ -142,6 +144,7 @@ impl Measurements {
             session: words(&self.session),
             target: self.target.as_ref().map(words),
             marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+            warnings: self.warnings.clone(),
         }
     }
 

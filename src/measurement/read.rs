@@ -52,10 +52,11 @@ impl Measurements {
         }
         match builder {
             Some(builder) => {
-                let (measurements, columns) = builder.finish();
+                let (mut measurements, columns) = builder.finish();
                 if measured {
                     warnings.extend(measurements.beyond_limits(problem, &commands(&columns)));
                 }
+                measurements.warnings.clone_from(&warnings);
                 Ok((measurements, warnings))
             }
             None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
@@ -140,6 +141,7 @@ impl Builder {
             session: Labels::default(),
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
+            warnings: Vec::new(),
         };
         let columns = columns.read.iter().map(|column| (*column, table.name_of(column.place).to_owned())).collect();
         Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), columns }

@@ -45,10 +45,19 @@ impl Measurements {
     /// They agree in configuration, session and target, in payload and hoist where something of the arm gives way or an
     /// effect is declared, and in temperature and approach where a declared effect depends on them.
     pub fn pose_numbers(&self, problem: &Problem) -> Vec<usize> {
+        self.numbers(problem, true)
+    }
+
+    /// The same whatever the target: rows of several targets in one pose show one pose of the arm.
+    pub fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
+        self.numbers(problem, false)
+    }
+
+    fn numbers(&self, problem: &Problem, by_target: bool) -> Vec<usize> {
         let mut columns = self.joint_columns(problem);
         let words = |of_row: &[usize]| Column { values: of_row.iter().map(|&word| word as f64).collect(), step: SAME };
         columns.push(words(&self.session.of_row));
-        columns.extend(self.target.iter().map(|target| words(&target.of_row)));
+        columns.extend(self.target.iter().filter(|_| by_target).map(|target| words(&target.of_row)));
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let gives_way = problem.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.is_some());
         if gives_way || !problem.effects.is_empty() {

@@ -102,6 +102,13 @@ impl Model {
         self.nominal.joints.len()
     }
 
+    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²) over its joints and the farthest target; 1 m where all that is nought.
+    pub fn size(&self) -> f64 {
+        let links: f64 = self.nominal.joints.iter().map(|joint| joint.a.hypot(joint.d)).sum();
+        let target = self.targets.iter().map(Vector3::norm).fold(0.0, f64::max);
+        if links + target > 0.0 { links + target } else { 1.0 }
+    }
+
     /// Whether bounds or constraints limit the parameters.
     pub fn is_bounded(&self) -> bool {
         !self.constraints.is_empty() || self.parameters.iter().any(Parameter::is_bounded)

@@ -115,6 +115,7 @@ pub fn table(rows: &[Row]) -> Measurements {
         session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
         target: None,
         marked_held_out: None,
+        warnings: Vec::new(),
     }
 }
 
@@ -127,6 +128,12 @@ fn score(data: &Data, found: &Identification) -> Score {
         Some(QualityFlag::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
         Some(QualityFlag::Misses { .. }) => return Score::Failed("misses-the-data"),
         Some(QualityFlag::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
+        Some(QualityFlag::BeyondArm { .. }) => return Score::Failed("beyond-the-arm"),
+        Some(QualityFlag::OtherSize { .. }) => return Score::Failed("another-size"),
+        Some(QualityFlag::Undetermined { .. }) => return Score::Failed("undetermined"),
+        Some(QualityFlag::HeldOutCopied | QualityFlag::HeldOutMisses { .. } | QualityFlag::HeldOutWorse { .. }) => {
+            return Score::Failed("misses-held-out-poses");
+        }
         None => {}
     }
     let held_out = &found.fitted.held_out;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Headline, Point, Table, code, some_of};
 use super::errors::{NOMINAL, mean_and_rms, row, unpredicted};
 use super::figures::{Figure, PlotData};
-use super::identify::{change, fitted_parameters, poses, short_mm, size, spread, told, why_not_trusted};
+use super::identify::{beware, change, fitted_parameters, poses, short_mm, size, spread, told, why_not_trusted};
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, p_value};
@@ -152,6 +152,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
     blocks.extend(quality_flag(closure));
+    blocks.extend(beware(after, plots));
     blocks.extend([
         Block::Table(errors(closure)),
         Block::Text(gain(closure)),

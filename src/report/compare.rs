@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::document::{Block, Headline, Table, code};
 use super::figures::{Figure, PlotData};
-use super::identify::{change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
+use super::identify::{beware, change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
 use super::json::{Both, object, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
@@ -165,6 +165,8 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
     let mut blocks = vec![
         Block::Headline(head),
         Block::Text(counts(joint)),
+        Block::Words(beware(joint, plots).into_iter().collect()),
+        Block::Page(beware(joint, plots).into_iter().collect()),
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![Figure::Strategies(comparison)]),
         Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),

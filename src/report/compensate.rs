@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::Block;
 use super::json::{object, to_text};
-use super::quantity::{fixed, mm};
+use super::quantity::{fixed, mm, number};
 use super::render::text;
 use super::table;
 use crate::files::csv;
@@ -48,8 +48,10 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
     if let (Some(after), Some(before)) = (document.mean_miss_mm, document.mean_miss_before_mm) {
         let _ = write!(
             words,
-            ": {after:.4} mm from them on average with these commands, {before:.4} mm with those in the file,\n\
-             as the identified arm predicts"
+            ": {} mm from them on average with these commands, {} mm with those in the file,\n\
+             as the identified arm predicts",
+            number(after, 4),
+            number(before, 4)
         );
     }
     let point = |command: &Command| {

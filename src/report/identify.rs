@@ -7,7 +7,7 @@ use super::errors::{NOMINAL, row, unpredicted};
 use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentified};
-use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters};
+use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
 use super::quantity::{decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{ActiveConstraint, ErrorSummary, Estimate, Identification, Noise, Outlier, QualityFlag};
@@ -38,16 +38,20 @@ object! {
             Noise::Declared | Noise::Unknown => None,
             Noise::Estimated(sigma) => Some(sigma * 1e3),
         },
+        chance: Option<[f64; 2]> = found.chance.map(<[f64; 2]>::from),
         noise_factor: f64 = found.noise_factor,
+        sigma_taken_mm: f64 = found.sigma_taken * 1e3,
         rank: usize = found.identifiability.rank,
         #[serde(flatten)]
         conditioning: Conditioning<'a> = Conditioning::of(&found.identifiability, found.coordinates),
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         unidentified: Vec<Unidentified<'a>> = unidentified(&found.identifiability, |k| found.unknowns[k].as_str()),
+        weak: Vec<Unidentified<'a>> = found.weak.iter().map(|own| Unidentified::of(own, |k: usize| found.unknowns[k].as_str())).collect(),
         covariance: Vec<Box<RawValue>> = covariance(found),
         correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
         active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
         outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
+        cautions: Vec<String> = found.cautions.iter().map(ToString::to_string).collect(),
     }
 }
 object! {
@@ -126,6 +130,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
         ],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
+    blocks.extend(beware(found, plots));
     blocks.extend(errors(found));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
     blocks.extend(remainder(problem, found, plots, FILE));
@@ -144,10 +149,10 @@ fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
     let fitted = &found.fitted;
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     Block::lines(format!(
-        "{}\n{} parameters from {} poses, {} poses held out; strategy {}, solver {}{reason}\n{} after {} steps, {:.3} s",
+        "{}\n{} parameters from {}, {} poses held out; strategy {}, solver {}{reason}\n{} after {} steps, {:.3} s",
         problem.title,
         found.unknowns.len(),
-        fitted.identification.n,
+        measured(found),
         fitted.held_out.n,
         found.strategy.as_str(),
         found.solver.as_str(),
@@ -159,15 +164,34 @@ fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
 
 /// What was fitted to what, and how it ended.
 pub(super) fn counts(found: &Identification) -> String {
-    let (fitted, held_out) = (found.fitted.identification.n, found.fitted.held_out.n);
+    let held_out = found.fitted.held_out.n;
     let beware = if found.is_trusted() { String::new() } else { format!(" Beware: {}.", why_not_trusted(found)) };
     format!(
-        "{} parameters from {fitted} poses; {held_out} poses held out. Strategy {}, solver {}: {}.{beware}",
+        "{} parameters from {}; {held_out} poses held out. Strategy {}, solver {}: {}.{beware}",
         found.unknowns.len(),
+        measured(found),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
     )
+}
+
+/// What the terminal warns of, apart from a fit that is not to be trusted; nothing to say without any.
+pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
+    let of_fit = found.too_few_poses.iter().map(ToString::to_string);
+    let own = of_fit.chain(found.cautions.iter().map(ToString::to_string));
+    let points: Vec<String> = plots.warnings.iter().map(ToString::to_string).chain(own).collect();
+    (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
+}
+
+/// What was fitted: several targets in one pose are points of it.
+fn measured(found: &Identification) -> String {
+    let points = found.fitted.identification.n;
+    if found.several_targets {
+        format!("{points} points in {} different poses", found.poses)
+    } else {
+        format!("{points} poses")
+    }
 }
 
 fn errors_by_axis(found: &Identification) -> Table {
@@ -245,6 +269,7 @@ pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
         blind(&found.identifiability, &found.unknowns, file),
     ];
     blocks.extend(more_blind(found, file));
+    blocks.extend(weak(found, file));
     blocks.push(correlations(found, file));
     blocks
 }
@@ -267,19 +292,38 @@ fn noise(problem: &Problem, found: &Identification) -> String {
             "There are not enough different poses to judge the declared σ, or the model.".to_owned()
         }
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
-        (Noise::Declared, Some(chi2)) if found.noise_factor > 1.0 => {
-            let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({:.4} mm)", s * 1e3));
+        (Noise::Declared, Some(chi2)) if contradicted(found) => {
+            let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, 4)));
+            let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
+            let chance = found.chance.map_or_else(String::new, |(low, high)| {
+                format!("; chance gives {} to {}", number(low, 2), number(high, 2))
+            });
+            let (size, cause) = if found.noise_factor > 1.0 {
+                (format!("{size} times the declared σ{declared}"), "so the model lacks something, or σ is larger")
+            } else {
+                (format!("{size} of the declared σ{declared}"), "which is too large")
+            };
             format!(
-                "Reduced χ² is {}: the residual is {} times the declared σ{declared}, so the model lacks something.\n\
-                 Standard errors are raised by that factor.",
-                number(chi2, 2),
-                number(chi2.sqrt(), 1)
+                "Reduced χ² is {}{chance}: the scatter is {size}, {cause}.\n\
+                 Fit and standard errors take a σ of {} mm, which residual and priors speak for.",
+                short(chi2),
+                short_mm(found.sigma_taken)
             )
         }
         (Noise::Declared, Some(chi2)) => {
             format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2))
         }
     }
+}
+
+/// Whether residual and priors contradict the declared σ.
+pub(super) fn contradicted(found: &Identification) -> bool {
+    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > 1e-9
+}
+
+/// A χ² / ν with two decimals, or two digits where it is small.
+fn short(chi2: f64) -> String {
+    number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
 /// The constraints that hold parameters back; nothing to say without any.

@@ -7,7 +7,7 @@ use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash};
 use crate::identify::{Estimate, Identification};
 use crate::least_squares::solver::AtBound;
-use crate::least_squares::{BlindCombination, Identifiability};
+use crate::least_squares::{BlindCombination, Identifiability, WEAK_BELOW};
 use crate::model::effect;
 use crate::model::parameter::Driver;
 use crate::problem::Problem;
@@ -179,6 +179,20 @@ pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str
         unknowns.len()
     );
     Block::Lines(words, first_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN, file))
+}
+
+/// The combinations that are seen too weakly; nothing to say without any.
+pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
+    let count = found.weak.len();
+    let (noun, hold) = if count == 1 { ("combination", "is held") } else { ("combinations", "are held") };
+    let words = format!(
+        "{count} {noun} of parameters {hold} where the fit met {}: seen too weakly (moved by the arm's own size, 1 rad\n\
+         or a factor of 100, all measured coordinates together change by less than {WEAK_BELOW} σ):",
+        if count == 1 { "it" } else { "them" }
+    );
+    let (mut points, more) = some_of(found.weak.iter().map(|own| blind_words(own, &found.unknowns)), SHOWN);
+    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    (count > 0).then_some(Block::Lines(words, points))
 }
 
 /// Those that [`blind`] leaves out, on the page.

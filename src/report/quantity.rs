@@ -25,8 +25,11 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// `value` with `decimals`, never as "-0", for tables that programs read.
+/// `value` with `decimals`, never as "-0", for tables that programs read; nothing where it is not finite.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return String::new();
+    }
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
@@ -66,6 +69,7 @@ mod tests {
         assert_eq!(number(-0.0001, 3), "0.000");
         assert_eq!(number(-0.5, 1), "-0.5");
         assert_eq!(number(-1.5e300, 4), "-1.500e300");
+        assert_eq!((fixed(f64::NAN, 2), fixed(f64::INFINITY, 2)), (String::new(), String::new()));
         assert_eq!((number(f64::NAN, 2), number(f64::INFINITY, 2)), ("–".to_owned(), "–".to_owned()));
     }
 }

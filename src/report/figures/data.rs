@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::arm::{Arm, Poses};
 use super::cause::{self, Cause};
 use crate::diagnose::{ClosedLoop, Findings, examine};
+use crate::error::Warning;
 use crate::identify::{Comparison, Correlations, Identification, IdentifyError, Strategy};
 use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
@@ -61,6 +62,8 @@ pub struct PlotData {
     pub time_measured: bool,
     /// Tests of what it leaves of the fitted poses.
     pub findings: Findings,
+    /// What was passed over in the measurement files.
+    pub warnings: Vec<Warning>,
     /// Correlations of its parameters, as estimate.json has them.
     pub correlations: Correlations,
     /// The residual against the cause of each found effect, in the order in which they were found.
@@ -132,6 +135,7 @@ impl PlotData {
             residuals: poses.all(found.sigma).into_iter().enumerate().zip(errors).map(residual).collect(),
             time_measured,
             findings,
+            warnings: poses.measurements.warnings.clone(),
             correlations: found.correlations(),
             causes: Vec::new(),
             trend: None,

@@ -1,0 +1,137 @@
+//! Whether there are poses enough for what is fitted to them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::DVector;
+
+use super::Placement;
+use super::fitting::Fitting;
+use super::quality::{QualityFlag, TooFewPoses};
+use crate::measurement::different;
+use crate::model::Model;
+use crate::model::parameter::{Parameter, Slot};
+use crate::problem::Problem;
+
+/// Coordinates of a rigid body: what any number of targets in one pose of the arm tell of it.
+const BODY: usize = 6;
+
+/// What the poses are enough for.
+pub(super) struct Enough {
+    /// What they are not enough for, priors or not.
+    pub flag: Option<QualityFlag>,
+    /// Whether priors decide most.
+    pub too_few: Option<TooFewPoses>,
+    /// Different poses of the arm among the identification rows, several targets in one pose being one.
+    pub poses: usize,
+    /// Whether some pose of the arm shows several of them.
+    pub several_targets: bool,
+}
+
+impl Enough {
+    /// For the parameters `unknowns` of a fit that begins at the full parameter vector `at`.
+    pub fn of(fitting: &Fitting, problem: &Problem, unknowns: &[&Parameter], at: &DVector<f64>) -> Self {
+        let Fitting { model, measurements, placement, held_out_only, split, .. } = fitting;
+        let numbers = measurements.pose_numbers(problem);
+        let of_arm = measurements.arm_pose_numbers(problem);
+        let poses = different(&of_arm, split.identification.iter().copied());
+        let coordinates = coordinates(&numbers, &of_arm, placement, &split.identification);
+        let parameters = unknowns.len();
+        let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+        let (rows, later) = (&split.identification, &held_out_only.rows);
+        let (own, theirs) = (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
+        let flag = (coordinates < without_prior)
+            .then(|| QualityFlag::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
+            .or_else(|| underdetermined(model, placement, &numbers, (rows, false), own))
+            .or_else(|| underdetermined(model, placement, &numbers, (later, true), theirs))
+            .or_else(|| undetermined(fitting, &numbers, rows, at, own))
+            .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
+        let too_few = (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
+        let several_targets = poses < different(&numbers, split.identification.iter().copied());
+        Self { flag, too_few, poses, several_targets }
+    }
+}
+
+/// Coordinates that tell of the arm and of its targets: three for each different point, but no more than six for a pose of the
+/// arm; the shape of its targets is one measurement more.
+fn coordinates(numbers: &[usize], of_arm: &[usize], placement: &Placement, rows: &[usize]) -> usize {
+    let mut points: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+    let mut targets = BTreeSet::new();
+    for &row in rows {
+        points.entry(of_arm[row]).or_default().insert(numbers[row]);
+        targets.insert(placement.target_of(row));
+    }
+    let of_poses: usize = points.values().map(|own| (3 * own.len()).min(BODY)).sum();
+    let several = points.values().any(|own| 3 * own.len() > BODY);
+    of_poses + if several { (3 * targets.len()).saturating_sub(BODY) } else { 0 }
+}
+
+/// `base[A]`, or `base` where there is one without a name.
+fn label(what: &str, word: &str) -> String {
+    if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
+}
+
+/// The first base whose place the points of `rows` leave open, by the parameters without a prior that are `varied` there.
+fn undetermined(
+    fitting: &Fitting,
+    numbers: &[usize],
+    rows: &[usize],
+    at: &DVector<f64>,
+    varied: impl Fn(usize) -> bool,
+) -> Option<QualityFlag> {
+    let Fitting { model, placement, .. } = fitting;
+    let open = |b: &usize| {
+        let own: Vec<usize> = rows.iter().copied().filter(|&row| placement.base_of(row) == *b).collect();
+        let counts = |k: &usize| {
+            let parameter = &model.parameters[*k];
+            let of_base = matches!(parameter.slot, Slot::Base { base, .. } if base == *b);
+            of_base && parameter.sigma.is_none() && varied(*k)
+        };
+        let unknowns: Vec<usize> = (0..model.parameters.len()).filter(counts).collect();
+        if own.is_empty() || unknowns.is_empty() {
+            return false;
+        }
+        let none = vec![false; unknowns.len()];
+        fitting.stage(&own, unknowns).gauge(at, &none, &[]).rows.nrows() > 0
+    };
+    let base = (0..placement.bases.len()).find(open)?;
+    let own = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
+    Some(QualityFlag::Undetermined { of: label("base", &placement.bases[base]), poses: different(numbers, own) })
+}
+
+/// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates measured in different
+/// poses of `rows` than parameters of its own without a prior; of the parameters that are `varied` there. `numbers` are those
+/// of the poses of all rows. Where `judged`, the rows have to leave something to judge by as well.
+fn underdetermined(
+    model: &Model,
+    placement: &Placement,
+    numbers: &[usize],
+    (rows, judged): (&[usize], bool),
+    varied: impl Fn(usize) -> bool,
+) -> Option<QualityFlag> {
+    let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
+        let coordinates = 3 * different(numbers, rows.iter().copied().filter(|&row| used(row)));
+        let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
+        let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
+        let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };
+        (0 < coordinates && 0 < unknowns && !enough).then_some(QualityFlag::TooFewEquations {
+            of,
+            coordinates,
+            unknowns,
+        })
+    };
+    let base = |b: usize| {
+        let alone = |t: usize| rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b);
+        let own = |slot| match slot {
+            Slot::Base { base, .. } => base == b,
+            Slot::Target { target, .. } => alone(target) && rows.iter().any(|&row| placement.target_of(row) == target),
+            _ => false,
+        };
+        check(label("base", &placement.bases[b]), &|row| placement.base_of(row) == b, &own)
+    };
+    let target = |t: usize| {
+        let own = |slot| matches!(slot, Slot::Target { target, .. } if target == t);
+        check(label("tool", &placement.targets[t]), &|row| placement.target_of(row) == t, &own)
+    };
+    let bases = (0..placement.bases.len()).find_map(base);
+    bases.or_else(|| (0..placement.targets.len()).find_map(target))
+}

@@ -1,0 +1,96 @@
+//! What held-out poses say of a fit: they decide nothing in it, and are judged by it and it by them.
+
+use std::collections::HashSet;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::fitting::Fitting;
+use super::outliers::{BY_CHANCE, Outlier};
+use super::quality::{LEAST_SPREAD, MISSES, QualityFlag};
+use super::{ErrorSummary, Errors};
+use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
+use crate::measurement::Measurements;
+use crate::numeric::median;
+
+/// A fit is worse than none if its error on held-out poses is this many times that of the registered nominal arm …
+const WORSE: f64 = 1.5;
+/// … and this many times the noise.
+const ABOVE_NOISE: f64 = 5.0;
+
+/// Held-out rows whose errors are too long for the fit's σ and its own uncertainty there, in the order of the rows.
+///
+/// A row is one where P(χ²₃ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J whitened by the σ that the fit
+/// took, C the covariance of its `unknowns` at `x`. The scatter is the median s over 1.538, no less than 1: so a model that
+/// misses some effect everywhere does not turn every row into one.
+pub(super) fn outliers(
+    fitting: &Fitting,
+    x: &DVector<f64>,
+    unknowns: &[usize],
+    covariance: &DMatrix<f64>,
+) -> Vec<Outlier> {
+    let rows = &fitting.split.held_out;
+    let stage = fitting.stage(rows, unknowns.to_vec());
+    let residuals = stage.residuals(x);
+    let at = residuals.reduced(x);
+    let n = unknowns.len();
+    let mut lengths = Vec::with_capacity(rows.len());
+    for first in (0..rows.len()).step_by(CHUNK_ITEMS) {
+        let items = first..(first + CHUNK_ITEMS).min(rows.len());
+        let mut block = Block::zeros(3 * items.len(), n);
+        residuals.linearise(&at, items.clone(), &mut block);
+        for pose in 0..items.len() {
+            let jacobian = DMatrix::from_fn(3, n, |i, j| block.column(j)[3 * pose + i]);
+            let residual = Vector3::from_fn(|i, _| block.column(n)[3 * pose + i]);
+            let own = &jacobian * covariance * jacobian.transpose();
+            let spread = Matrix3::identity() + Matrix3::from_fn(|i, j| own[(i, j)]);
+            // Scaled: squares of what is far off overflow.
+            let size = residual.amax().max(1.0);
+            let square =
+                spread.cholesky().map_or(f64::NAN, |factor| (residual / size).dot(&factor.solve(&(residual / size))));
+            lengths.push(size * square.max(0.0).sqrt());
+        }
+    }
+    let known = lengths.iter().copied().filter(|length| length.is_finite());
+    let Ok(squares) = ChiSquared::new(3.0) else { return Vec::new() };
+    let scatter = (median(known).unwrap_or(0.0) / squares.inverse_cdf(0.5).sqrt()).max(1.0);
+    let limit = squares.inverse_cdf(1.0 - BY_CHANCE / lengths.len().max(1) as f64).sqrt();
+    let errors = fitting.position_errors(rows, x);
+    let outlier = |((&row, &length), error): ((&usize, &f64), Vector3<f64>)| {
+        let distance = length / scatter;
+        (distance > limit).then(|| Outlier { row, location: fitting.measurements.location(row), distance, error })
+    };
+    rows.iter().zip(&lengths).zip(errors).filter_map(outlier).collect()
+}
+
+/// Number of held-out rows that are identification rows again: configuration, position and session are the same to the bit.
+pub(super) fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
+    let key = |row: usize| -> Vec<u64> {
+        let values = measurements.configuration(row).iter().chain(measurements.positions[row].iter());
+        values.map(|value| value.to_bits()).chain([measurements.session.of_row[row] as u64]).collect()
+    };
+    let known: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();
+    held_out.iter().filter(|&&row| known.contains(&key(row))).count()
+}
+
+/// Whether held-out poses contradict the fit: most are missed as if they were of another arm, or they are met worse than by the
+/// registered nominal arm.
+///
+/// `spread` \[m\] is that of the identification positions, `sigma` \[m\] what the fit took for noise, `least` \[m\] an error below
+/// which nothing is said.
+pub(super) fn contradict(
+    fitting: &Fitting,
+    x: &DVector<f64>,
+    (registered, fitted): (&Errors, &Errors),
+    (spread, sigma, least): (f64, f64, f64),
+) -> Option<QualityFlag> {
+    let errors = fitting.position_errors(&fitting.split.held_out, x);
+    let typical = median(errors.iter().map(Vector3::norm).filter(|length| length.is_finite())).unwrap_or(0.0);
+    if spread > LEAST_SPREAD && typical > MISSES * spread && typical > least {
+        return Some(QualityFlag::HeldOutMisses { median: typical, spread });
+    }
+    let size = |of: &ErrorSummary| of.rms.norm;
+    let (before, after) = (size(&registered.held_out), size(&fitted.held_out));
+    (after > WORSE * before && after > ABOVE_NOISE * 3.0_f64.sqrt() * sigma)
+        .then_some(QualityFlag::HeldOutWorse { before, after })
+}

@@ -1,0 +1,96 @@
+//! The σ that a fit takes: as declared, or what residual and priors speak for where that contradicts it.
+
+use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::active::confine;
+use super::assumed::{Assumed, IMPROBABLE, LEAST_NOISE};
+use super::fitting::{FitEnd, Fitting};
+use super::outcome::Noise;
+use super::stage::{Stage, StageError};
+use super::statistics::Statistics;
+use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood};
+
+/// An undeclared σ has settled when it changes by less than this part.
+const NOISE_SETTLED: f64 = 1e-3;
+/// A declared σ that is contradicted has settled when it changes by less than this part: standard errors tell no more.
+const SCALE_SETTLED: f64 = 0.01;
+/// Fits after which the search for σ stops.
+const MAX_NOISE_FITS: usize = 20;
+/// Runs the strategy until the σ that it takes is the one declared or, where residual and priors contradict that, the one they
+/// speak for; where none is declared, until the scatter about the fit is the σ assumed. `judged` says whether the poses are
+/// enough to contradict a σ.
+pub(super) fn fitted(
+    fitting: &mut Fitting,
+    start: &DVector<f64>,
+    (noise_is_declared, judged): (bool, bool),
+) -> Result<(FitEnd, Statistics, Noise), StageError> {
+    let mut fits = 0;
+    let mut begin = start.clone();
+    loop {
+        fits += 1;
+        let end = fitting.run(&begin)?;
+        let whole = fitting.whole();
+        let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.assumed))?;
+        if noise_is_declared {
+            let next = if judged { contradicted(&whole, &end, &statistics, fitting.assumed)? } else { None };
+            match next.filter(|_| fits < MAX_NOISE_FITS) {
+                Some(next) => {
+                    fitting.assumed = next;
+                    // What was held stays where it began, and what ran off under a σ too small begins anew.
+                    let settled = end.termination.converged() && end.gauge.rows.nrows() == 0;
+                    begin = if settled { end.x } else { start.clone() };
+                }
+                None => return Ok((end, statistics, Noise::Declared)),
+            }
+            continue;
+        }
+        let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
+        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
+        if settled || fits == MAX_NOISE_FITS {
+            let noise = match statistics.reduced_chi2 {
+                Some(_) => Noise::Estimated(fitting.sigma),
+                None => Noise::Unknown,
+            };
+            return Ok((end, statistics, noise));
+        }
+        fitting.sigma = next;
+    }
+}
+
+/// What to assume instead, if what is assumed is contradicted or has not settled; poses that a robust loss sets aside as
+/// outliers do not count.
+///
+/// Contradicted is the declared σ where twice the logarithm of the likelihood ratio exceeds what chance gives (χ²₁) with
+/// probability 0.001.
+fn contradicted(
+    stage: &Stage,
+    end: &FitEnd,
+    statistics: &Statistics,
+    assumed: Assumed,
+) -> Result<Option<Assumed>, StageError> {
+    let counts = |place: &usize| {
+        stage.loss == Loss::Squares || statistics.lengths.outlying(statistics.lengths.values[*place]).is_none()
+    };
+    let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
+    let poses = places.iter().map(|&place| stage.poses[place]).collect();
+    let residuals = stage.residuals_of(poses, &end.x);
+    let x = residuals.reduced(&end.x);
+    let data = Fit::new(&residuals).linearise(&x);
+    let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+    let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
+    let rows = (3 * places.len(), 2.0 * data.cost);
+    let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
+    if !ratio.is_finite() {
+        return Ok(None);
+    }
+    let first = assumed == Assumed::DECLARED;
+    let chance = ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE));
+    if (first && gain <= chance) || (!first && (ratio.sqrt() - 1.0).abs() < SCALE_SETTLED) {
+        return Ok(None);
+    }
+    let of = |all: &dyn Fn(usize) -> f64| places.iter().map(|&place| all(place)).collect::<Vec<f64>>();
+    let next = Assumed::raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio);
+    Ok((next != assumed).then_some(next))
+}
