@@ -85,7 +85,7 @@ fn a_fit_that_is_worse_than_none_where_it_was_not_made_is_not_trusted() {
     // What the model lacks, the few poses at one end of the range turn into wrong parameters.
     let problem = arm("'joint*' = { sigma_deg = 1, sigma_mm = 20 }\n'tool.*' = { sigma_mm = 20 }");
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let near = at_random(&problem, 20, 0.15, &mut rng);
+    let near = at_random(&problem, 20, 0.4, &mut rng);
     let wide = at_random(&problem, 40, 2.0, &mut rng);
     let mut all: Vec<Vec<f64>> = (0..20).map(|row| near.configuration(row).to_vec()).collect();
     all.extend((0..40).map(|row| wide.configuration(row).to_vec()));
@@ -97,10 +97,8 @@ fn a_fit_that_is_worse_than_none_where_it_was_not_made_is_not_trusted() {
         rows.positions[row] += 4e-4 * Vector3::new((9.0 * q).sin(), (7.0 * q).cos(), (8.0 * q).sin());
     }
     let found = fit(&problem, &divided(20, &rows));
-    let Some(QualityFlag::HeldOutWorse { before, after }) = found.quality_flag else {
-        panic!("{:?}", found.quality_flag)
-    };
-    assert!(after > 1.5 * before, "{before} {after}");
+    assert!(matches!(found.quality_flag, Some(QualityFlag::HeldOutWorse { .. })), "{:?}", found.quality_flag);
+    assert!(found.fitted.held_out.rms.norm > 1.5 * found.registered.held_out.rms.norm);
 }
 
 #[test]

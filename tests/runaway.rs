@@ -72,7 +72,7 @@ fn what_is_seen_too_weakly_is_held_and_named() {
 
 #[test]
 fn what_is_seen_well_enough_is_not_held() {
-    let problem = elbow(1.0, &format!("{PRIORS}'joint*.d' = {{ free = true }}"));
+    let problem = elbow(1.0, &format!("{PRIORS}'joint*.d' = {{ free = true }}\n'joint4.d' = {{ fixed = true }}"));
     let found = identify(&problem, &measured(&problem, 1), &Options::default()).unwrap();
     assert!(found.weak.is_empty() && far(&found).is_empty(), "{:?}", found.weak);
     assert!(found.estimate("joint3.d").unwrap().std_error.unwrap() < 0.05);

@@ -40,7 +40,8 @@ fn apart(one: &Identification, other: &Identification) -> (f64, f64) {
 fn a_sigma_that_fits_is_taken_as_declared() {
     for name in ["a-none", "h-none-large"] {
         let (problem, found) = fit(name, 5e-5);
-        assert_eq!((found.noise_factor, found.sigma_scale, found.sigma_taken), (1.0, 1.0, 5e-5), "{name}");
+        assert_eq!((found.noise_factor, found.sigma_scale), (1.0, 1.0), "{name}");
+        assert!((found.sigma_taken / 5e-5 - 1.0).abs() < 1e-12, "{name}");
         assert!(estimate_text(&problem, &found).contains("explains the data to the declared σ"));
     }
 }

@@ -145,6 +145,24 @@ impl Fitted {
         self.neighbourhood_without(linearised, &[], smooth_terms)
     }
 
+    /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.
+    pub fn neighbourhood_as_fitted(&self, linearised: &Linearised) -> LinearNeighbourhood {
+        let unknowns = self.unknowns_without(linearised, &[], self.found.noise_factor.max(1.0).sqrt());
+        LinearNeighbourhood::new(&linearised.fitted(), linearised.residual(), &unknowns)
+    }
+
+    /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is divided by `weight`.
+    fn unknowns_without(&self, linearised: &Linearised, without: &[usize], weight: f64) -> Unknowns {
+        let kept: Vec<usize> = (0..self.unknowns.len()).filter(|j| !without.contains(j)).collect();
+        let relaxed = linearised.relaxed().iter().copied();
+        let own = kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma);
+        Unknowns {
+            x: kept.iter().map(|&j| self.found.x[self.unknowns[j]]).chain(relaxed.clone().map(|_| 0.0)).collect(),
+            priors: own.chain(relaxed).map(|sigma| Some(sigma? / weight)).collect(),
+            active: self.active.select_columns(&kept),
+        }
+    }
+
     /// The same with some unknowns left out of the fit.
     pub fn neighbourhood_without(
         &self,
@@ -158,12 +176,7 @@ impl Fitted {
         for &j in without {
             residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
         }
-        let relaxed = linearised.relaxed().iter().copied();
-        let unknowns = Unknowns {
-            x: kept.iter().map(|&j| self.found.x[self.unknowns[j]]).chain(relaxed.clone().map(|_| 0.0)).collect(),
-            priors: kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma).chain(relaxed).collect(),
-            active: self.active.select_columns(&kept),
-        };
+        let unknowns = self.unknowns_without(linearised, without, 1.0);
         let fitted: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
         let mut fit = LinearNeighbourhood::new(&columns.select_columns(&fitted), &residual, &unknowns);
         for smooth_term in smooth_terms {

@@ -165,7 +165,7 @@ pub fn examine(problem: &Problem, data: &Dataset, found: &Identification) -> Res
 /// Tests what a fit leaves.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let linearised = fitted.linearised(data, &[], &[]);
-    let linear = fitted.neighbourhood(&linearised, &[]);
+    let linear = fitted.neighbourhood_as_fitted(&linearised);
     let fit = FitResidual {
         residual: &linear.data_residual(),
         fitted: &linear.fitted(),

@@ -47,8 +47,8 @@ impl Judgement<'_> {
         let least = self.sigma.0.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
         enough
             .or(misses)
-            .or(not_converged)
             .or(other_size)
+            .or(not_converged)
             .or_else(|| beyond_prior(model, &self.end.x))
             .or_else(|| beyond_arm(model, &self.end.x))
             .or_else(|| {

@@ -68,7 +68,10 @@ fn arm(rng: &mut ChaCha8Rng) -> Problem {
 fn rule(text: &mut String, name: &str, rng: &mut ChaCha8Rng) {
     let _ = match rng.random_range(0..3) {
         0 => Ok(()),
-        1 => writeln!(text, "'{name}' = {{ sigma_deg = 0.3, sigma_mm = 2 }}"),
+        1 if ["alpha", "theta", "beta"].iter().any(|field| name.ends_with(field)) => {
+            writeln!(text, "'{name}' = {{ sigma_deg = 0.3 }}")
+        }
+        1 => writeln!(text, "'{name}' = {{ sigma_mm = 2 }}"),
         _ => writeln!(text, "'{name}' = {{ free = true }}"),
     };
 }
