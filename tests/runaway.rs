@@ -74,8 +74,10 @@ fn what_is_seen_too_weakly_is_held_and_named() {
 fn what_is_seen_well_enough_is_not_held() {
     let problem = elbow(1.0, &format!("{PRIORS}'joint*.d' = {{ free = true }}\n'joint4.d' = {{ fixed = true }}"));
     let found = identify(&problem, &measured(&problem, 1), &Options::default()).unwrap();
-    assert!(found.weak.is_empty() && far(&found).is_empty(), "{:?}", found.weak);
-    assert!(found.estimate("joint3.d").unwrap().std_error.unwrap() < 0.05);
+    assert!(found.weak.is_empty(), "{:?}", found.weak);
+    let own = found.estimate("joint3.d").unwrap();
+    let error = own.std_error.unwrap();
+    assert!(error < 0.05 && own.estimate.abs() < 4.0 * error + 3e-3, "{own:?}");
 }
 
 #[test]

@@ -299,13 +299,13 @@ fn noise(problem: &Problem, found: &Identification) -> String {
                 format!("; chance gives {} to {}", number(low, 2), number(high, 2))
             });
             let (size, cause) = if found.noise_factor > 1.0 {
-                (format!("{size} times the declared σ{declared}"), "so the model lacks something, or σ is larger")
+                (format!("{size} times the declared σ{declared}"), "so the model lacks something")
             } else {
                 (format!("{size} of the declared σ{declared}"), "which is too large")
             };
             format!(
-                "Reduced χ² is {}{chance}: the scatter is {size}, {cause}.\n\
-                 Fit and standard errors take a σ of {} mm, which residual and priors speak for.",
+                "Reduced χ² is {}{chance}: the scatter is {size},\n\
+                 {cause}. Fit and standard errors take a σ of {} mm, which residual and priors speak for.",
                 short(chi2),
                 short_mm(found.sigma_taken)
             )
