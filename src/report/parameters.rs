@@ -190,8 +190,7 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
          or a factor of 100, all measured coordinates together change by less than {WEAK_BELOW} σ):",
         if count == 1 { "it" } else { "them" }
     );
-    let (mut points, more) = some_of(found.weak.iter().map(|own| blind_words(own, &found.unknowns)), SHOWN);
-    points.extend((more > 0).then(|| format!("and {more} more in {file}")));
+    let points = first_of(found.weak.iter().map(|own| blind_words(own, &found.unknowns)), SHOWN, file);
     (count > 0).then_some(Block::Lines(words, points))
 }
 
