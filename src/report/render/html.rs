@@ -193,7 +193,7 @@ fn bar(own: &Bar) -> Markup {
     html! {
         @if let Some(bound) = own.bound {
             span.bar { i {} u {} b.at.out style=(format!("left:{:.0}%", 100.0 * bound)) {} }
-        } @else if let Some(change) = own.change {
+        } @else if let Some(change) = own.change.filter(|change| change.is_finite()) {
             @let (from, to) = (place(change - 1.0), place(change + 1.0));
             span.bar title=(format!("{change:.1} σ")) {
                 i {} u {}
