@@ -132,8 +132,9 @@ impl<'a> PolyhedronProblem<'a> {
         Faces { bounds: (0..q.len()).map(bound).collect(), rows }
     }
 
+    /// Into the box; a bound that overflowed to no number bounds nothing.
     fn clamped(&self, mut q: DVector<f64>) -> DVector<f64> {
-        (0..q.len()).for_each(|j| q[j] = q[j].clamp(self.polyhedron.lower[j], self.polyhedron.upper[j]));
+        (0..q.len()).for_each(|j| q[j] = q[j].max(self.polyhedron.lower[j]).min(self.polyhedron.upper[j]));
         q
     }
 
