@@ -11,7 +11,6 @@ use super::residual_tests::CovariateValues;
 use super::rules::SelectionRules;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::DataCoverage;
-use crate::model::parameter::Quantity;
 use crate::problem::{Effect, JointKind, Problem};
 
 /// Measurements and which of their rows take part.
@@ -67,36 +66,6 @@ impl<'a> Data<'a> {
         let rows = self.rows();
         let taken = rows.len().min(most);
         (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
-    }
-
-    /// Values of a quantity at the identification rows.
-    fn values(&self, of: Quantity) -> Vec<f64> {
-        let measurements = self.measurements;
-        let column = |column: &Option<Vec<f64>>| column.as_deref().map_or_else(Vec::new, |all| self.pick(all));
-        match of {
-            Quantity::Command(joint) => self.rows().iter().map(|&row| measurements.configuration(row)[joint]).collect(),
-            Quantity::Temperature => column(&measurements.temperature),
-            Quantity::Payload => column(&measurements.payload),
-            Quantity::Hoist => column(&measurements.hoist),
-            Quantity::Elapsed => {
-                let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
-                self.time().into_iter().map(|time| time - first).collect()
-            }
-        }
-    }
-
-    /// Range of a quantity at the identification rows.
-    pub fn range(&self, of: Quantity) -> (f64, f64) {
-        let widest = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
-        self.values(of).into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), widest)
-    }
-
-    /// Number of distinct values of a quantity at the identification rows.
-    pub fn distinct(&self, of: Quantity) -> usize {
-        let mut values = self.values(of);
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values.len()
     }
 
     /// Time of each identification row \[s\].
@@ -197,7 +166,7 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
 }
 
 /// Numbers keys in order of appearance.
-fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
+pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut known = BTreeMap::new();
     keys.map(|key| {
         let next = known.len();

@@ -1,17 +1,25 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
 use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
-use super::smooth_term::SmoothTerm;
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
-use crate::model::parameter::Slot;
+use crate::model::parameter::{BeamField, Slot};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in the choice of effects.
 const WITHOUT_WEIGHT: f64 = 1e6;
+
+/// |r|² of an outlier in units of the others' scatter of a coordinate: by chance one pose in a million is beyond.
+const GROSS: f64 = 30.0;
+/// Median of |r|² of three normal coordinates of unit scatter.
+const MEDIAN: f64 = 2.366;
+/// Part of the poses that may be outliers; where more are far off, they are no outliers.
+const FEW: f64 = 0.1;
+/// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
+const TIMES: usize = 5;
 
 /// A fitted problem.
 #[derive(Clone)]
@@ -25,6 +33,8 @@ pub(super) struct Fitted {
     active: DMatrix<f64>,
     /// 1 σ of a coordinate in rows without one of their own \[m\].
     pub sigma: f64,
+    /// Rows that take no part in the choice of effects: outliers.
+    pub set_aside: Vec<usize>,
 }
 
 impl Fitted {
@@ -55,7 +65,12 @@ impl Fitted {
                 found.sigma_scale * placement.sigma(data.measurements, data.rows(), &problem)
             }
         };
-        Ok(Self { problem, model, found, unknowns, active, sigma })
+        let set_aside = found.outliers.iter().map(|outlier| outlier.row).collect();
+        let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside };
+        if fitted.problem.robust.is_none() {
+            fitted.set_aside = outliers(&fitted, data);
+        }
+        Ok(fitted)
     }
 
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
@@ -96,31 +111,14 @@ impl Fitted {
         self.model.residuals(self.poses(data, rows), &self.found.x)
     }
 
-    /// The model about the fit at the identification rows, with every place where `effects` and `smooth_terms` enter.
-    pub fn linearised<'a>(
-        &'a self,
-        data: &Data<'a>,
-        effects: &[Effect],
-        smooth_terms: &[SmoothTerm],
-    ) -> Linearised<'a> {
-        self.linearised_at(data, data.rows(), effects, smooth_terms)
+    /// The model about the fit at the identification rows, with every place where `effects` enter.
+    pub fn linearised<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Linearised<'a> {
+        self.linearised_at(data, data.rows(), effects)
     }
 
     /// The same at other rows.
-    pub fn linearised_at<'a>(
-        &'a self,
-        data: &Data<'a>,
-        rows: &[usize],
-        effects: &[Effect],
-        smooth_terms: &[SmoothTerm],
-    ) -> Linearised<'a> {
-        let mut places: Vec<Slot> = Vec::new();
-        for smooth_term in smooth_terms {
-            if !places.contains(&smooth_term.slot) {
-                places.push(smooth_term.slot);
-            }
-        }
-        self.linearised_with(data, rows, effects, &places)
+    pub fn linearised_at<'a>(&'a self, data: &Data<'a>, rows: &[usize], effects: &[Effect]) -> Linearised<'a> {
+        self.linearised_with(data, rows, effects, &[])
     }
 
     /// The same with further slots.
@@ -132,17 +130,14 @@ impl Fitted {
         slots: &[Slot],
     ) -> Linearised<'a> {
         let mut poses = self.poses(data, rows);
-        if self.problem.robust.is_some() {
-            let is_outlier = |row: &usize| self.found.outliers.iter().any(|outlier| outlier.row == *row);
-            let gross = poses.iter_mut().zip(rows).filter(|(_, row)| is_outlier(row));
-            gross.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
-        }
+        let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
+        aside.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
         Linearised::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, slots))
     }
 
-    /// The fit in its linear neighbourhood with `smooth_terms` taken in.
-    pub fn neighbourhood(&self, linearised: &Linearised, smooth_terms: &[SmoothTerm]) -> LinearNeighbourhood {
-        self.neighbourhood_without(linearised, &[], smooth_terms)
+    /// The fit in its linear neighbourhood.
+    pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
+        self.neighbourhood_with(linearised, &[], None)
     }
 
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.
@@ -163,26 +158,33 @@ impl Fitted {
         }
     }
 
-    /// The same with some unknowns left out of the fit.
-    pub fn neighbourhood_without(
+    /// The same with some unknowns left out of the fit, and with `more` columns in it, whose coefficients have a prior σ.
+    pub fn neighbourhood_with(
         &self,
         linearised: &Linearised,
         without: &[usize],
-        smooth_terms: &[SmoothTerm],
+        more: Option<(&DMatrix<f64>, f64)>,
     ) -> LinearNeighbourhood {
         let (columns, n) = (linearised.fitted(), self.unknowns.len());
         let kept: Vec<usize> = (0..n).filter(|j| !without.contains(j)).collect();
         let mut residual = linearised.residual().clone();
-        for &j in without {
+        // Of two parameters that are multiplied together one brings it down to nothing.
+        let is_place = |slot: Slot| matches!(slot, Slot::Beam { field: BeamField::AddedAt, .. });
+        for &j in without.iter().filter(|&&j| !is_place(self.model.parameters[self.unknowns[j]].slot)) {
             residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
         }
-        let unknowns = self.unknowns_without(linearised, without, 1.0);
+        let mut unknowns = self.unknowns_without(linearised, without, 1.0);
+        let added = more.map_or(0, |(columns, _)| columns.ncols());
+        unknowns.x.extend(std::iter::repeat_n(0.0, added));
+        unknowns.priors.extend(std::iter::repeat_n(more.map(|(_, sigma)| sigma), added));
         let fitted: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
-        let mut fit = LinearNeighbourhood::new(&columns.select_columns(&fitted), &residual, &unknowns);
-        for smooth_term in smooth_terms {
-            fit.add(&smooth_term.columns(linearised));
+        let mut columns = columns.select_columns(&fitted);
+        if let Some((more, _)) = more {
+            let first = columns.ncols();
+            columns = columns.resize_horizontally(first + added, 0.0);
+            columns.columns_mut(first, added).copy_from(more);
         }
-        fit
+        LinearNeighbourhood::new(&columns, &residual, &unknowns)
     }
 
     /// Numbers of an effect's parameters among the unknowns.
@@ -197,4 +199,39 @@ impl Fitted {
         let is_own = |&k: &usize| own.iter().any(|parameter| parameter.name == self.model.parameters[k].name);
         (0..self.model.parameters.len()).filter(is_own).collect()
     }
+}
+
+/// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood of the fit without them.
+fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
+    let rows = data.rows();
+    let far = |residual: &DVector<f64>| -> Vec<usize> {
+        let squares: Vec<f64> = (0..rows.len()).map(|k| residual.fixed_rows::<3>(3 * k).norm_squared()).collect();
+        let mut ascending = squares.clone();
+        ascending.sort_by(f64::total_cmp);
+        let scatter = ascending.get(rows.len() / 2).map_or(0.0, |median| median / MEDIAN);
+        (0..rows.len()).filter(|&k| squares[k] > GROSS * scatter).collect()
+    };
+    let whitened = |aside: &[usize]| {
+        let here = fitted.linearised(data, &[]);
+        let without: Vec<usize> = aside.iter().map(|&k| rows[k]).collect();
+        let rest = Fitted { set_aside: without, ..fitted.clone() };
+        let step = rest.neighbourhood(&rest.linearised(data, &[])).step().clone();
+        here.residual() + here.fitted() * step
+    };
+    let poses = fitted.poses(data, rows);
+    let errors = fitted.model.residuals(poses.clone(), &fitted.found.x);
+    let plain: Vec<f64> =
+        errors.iter().zip(&poses).flat_map(|(r, pose)| (r / pose.sigma).iter().copied().collect::<Vec<_>>()).collect();
+    let mut aside = far(&DVector::from_vec(plain));
+    for _ in 0..TIMES {
+        if aside.is_empty() || aside.len() as f64 > FEW * rows.len() as f64 {
+            return Vec::new();
+        }
+        let next = far(&whitened(&aside));
+        if next == aside {
+            break;
+        }
+        aside = next;
+    }
+    aside.into_iter().map(|k| rows[k]).collect()
 }

@@ -19,12 +19,11 @@ mod rules;
 mod screening;
 mod selection;
 mod separation;
-mod smooth_term;
 mod telling_pose;
 mod unexplained;
 
 pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
-pub use covariate::{Covariate, Place};
+pub use covariate::Covariate;
 pub use detection::{Detectable, Detection, Size, detectable};
 pub use evidence::{Claims, Evidence, Explanation, Hypothesis, Law, Part};
 pub use residual_tests::{
@@ -35,4 +34,4 @@ pub use screening::{Ranked, Trace, examine, trace, trace_by};
 pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, close, close_by};
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
-pub use unexplained::{Correction, PartialResidual, Unexplained};
+pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};

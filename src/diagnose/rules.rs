@@ -21,9 +21,6 @@ pub struct SelectionRules {
     pub rival: f64,
     /// Corrected p below which an effect whose rivals are of its own family needs no fit before the next is looked for.
     pub overwhelming: f64,
-    /// Where structure is left, another effect that explains this part of the squares of a named one is stated as an
-    /// alternative: residuals are then no independent noise, and small differences of a criterion no evidence.
-    pub as_much: f64,
     /// Standard errors below zero from which on what is never negative is impossible: one in 700 for normal errors.
     pub impossible: f64,
     /// Part of its columns' length that must be new for a candidate to be seen at all; with less, the fitted parameters take it
@@ -60,22 +57,6 @@ pub struct SelectionRules {
     pub range_parts: usize,
     /// Scales of the prior that are tried, as powers of two of the root mean square of the coefficients found.
     pub prior_scales: RangeInclusive<i32>,
-    /// Numbers of intervals of the splines that are tried as smooth terms.
-    pub spline_intervals: [usize; 3],
-    /// Poses per spline function at least.
-    pub poses_per_spline: usize,
-    /// Centres of a single bump or step along the range.
-    pub shape_centres: u32,
-    /// Widths of a single bump or step as parts of the range.
-    pub shape_widths: [f64; 5],
-    /// First and last step of the search for a shape, as parts of its width.
-    pub shape_steps: (f64, f64),
-    /// Places and quantities, those where splines find most, that are looked at for single bumps and steps.
-    pub promising: usize,
-    /// Bumps and steps whose centre and width are fitted.
-    pub refined: usize,
-    /// Poses, taken evenly, that are enough to find the place of a smooth term.
-    pub placing_poses: usize,
     /// Part of their rms error to which a correction must take poses that were left out to be worth stating.
     pub worthwhile: f64,
     /// Entries of a ranking.
@@ -98,6 +79,10 @@ pub struct SelectionRules {
     pub weighed_poses: usize,
     /// Chance of a family of functions of unknown law, over that of a family of effects: the catalogue holds what is common.
     pub unknown_law: f64,
+    /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds.
+    pub sure: f64,
+    /// Probability of a law from which on an effect is named as found; below it is a place with a law such as this one.
+    pub stated: f64,
     /// Root mean square displacements that a hypothesis may cause, in units of σ, each as probable as the others: from a third
     /// of σ, which hardly shows, by steps of three to what nobody overlooks.
     pub displacements: [f64; 6],
@@ -133,7 +118,6 @@ impl SelectionRules {
         beyond_doubt: 6.0,
         rival: 10.0,
         overwhelming: 1e-12,
-        as_much: 0.9,
         impossible: 3.0,
         absorbed: 1e-4,
         rounding: 1e-3,
@@ -151,14 +135,6 @@ impl SelectionRules {
         several_orders: 3,
         range_parts: 5,
         prior_scales: -8..=2,
-        spline_intervals: [3, 5, 8],
-        poses_per_spline: 3,
-        shape_centres: 16,
-        shape_widths: [0.04, 0.07, 0.12, 0.2, 0.35],
-        shape_steps: (0.4, 0.02),
-        promising: 12,
-        refined: 4,
-        placing_poses: 1000,
         worthwhile: 0.95,
         ranked: 20,
         looked_at: 8,
@@ -170,6 +146,8 @@ impl SelectionRules {
         covered: 0.95,
         weighed_poses: 240,
         unknown_law: 0.25,
+        sure: 0.95,
+        stated: 0.9,
         displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
         trust_declared: 0.1,
         trust_estimated: 1.0,

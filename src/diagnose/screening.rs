@@ -83,15 +83,15 @@ pub fn trace_by(
     rules.check()?;
     let data = Data::new(data, rules).with_candidates(&options.candidates);
     let fitted = Fitted::new(problem.clone(), &data, options)?;
-    Ok(Trace { evidence: weigh(&fitted, &data), ..trace_fit(&fitted, &data) })
+    Ok(Trace { evidence: weigh(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
 }
 
 /// Traces the residual of a fit.
 pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let rules = data.rules;
     let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
-    let linearised = fitted.linearised(data, &testable, &[]);
-    let scan = Scan::new(&linearised, fitted.neighbourhood(&linearised, &[]), testable, rules);
+    let linearised = fitted.linearised(data, &testable);
+    let scan = Scan::new(&linearised, fitted.neighbourhood(&linearised), testable, rules);
     untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {
@@ -110,7 +110,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         best.iter().take(rules.looked_at).map(|tried| scan.effects[tried.index].clone()).collect();
     let all: Vec<usize> = (0..poses.len()).collect();
     let elsewhere = Data { measurements: &poses, ..data.clone() };
-    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked, &[]));
+    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked));
     let ranked = |(place, tried): (usize, &Tried)| {
         let close = place < looked_at;
         let cross_validated = without.filter(|_| close).and_then(|without| {
@@ -164,7 +164,7 @@ pub fn examine(problem: &Problem, data: &Dataset, found: &Identification) -> Res
 
 /// Tests what a fit leaves.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
-    let linearised = fitted.linearised(data, &[], &[]);
+    let linearised = fitted.linearised(data, &[]);
     let linear = fitted.neighbourhood_as_fitted(&linearised);
     let fit = FitResidual {
         residual: &linear.data_residual(),

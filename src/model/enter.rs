@@ -79,10 +79,10 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::Beta, ..) => joint.beta = Angle::new(x + nominal),
                 (JointField::Stiffness, ..) => joint.flexibility = Some((-x).exp() / nominal),
                 (JointField::Compliance, ..) => joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x)),
-                (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic = x,
-                (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play = x,
-                (JointField::LateralX, _, Some(lateral)) => lateral[0] = x,
-                (JointField::LateralY, _, Some(lateral)) => lateral[1] = x,
+                (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic += x,
+                (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play += x,
+                (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
+                (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
                 (JointField::Cubic | JointField::Play | JointField::SlidingPlay, None, _)
                 | (JointField::LateralX | JointField::LateralY, _, None) => {}
             }
@@ -111,11 +111,11 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
             all.about_y += x;
             all.about_z += x;
         }
-        (BeamField::WarmingY, Some(thermal), _) => thermal.curvature[0] = x,
-        (BeamField::WarmingZ, Some(thermal), _) => thermal.curvature[1] = x,
-        (BeamField::Expansion, Some(thermal), _) => thermal.expansion = x,
-        (BeamField::AddedMass, _, Some(added)) => added.mass = x,
-        (BeamField::AddedAt, _, Some(added)) => added.at = x + nominal,
+        (BeamField::WarmingY, Some(thermal), _) => thermal.curvature[0] += x,
+        (BeamField::WarmingZ, Some(thermal), _) => thermal.curvature[1] += x,
+        (BeamField::Expansion, Some(thermal), _) => thermal.expansion += x,
+        (BeamField::AddedMass, _, Some(added)) => added.mass += x,
+        (BeamField::AddedAt, _, Some(added)) => added.at += x,
         (BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion, None, _)
         | (BeamField::AddedMass | BeamField::AddedAt, _, None) => {}
     }
@@ -123,16 +123,16 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
 
 fn enter_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
     match (field, &mut arm.rope, &mut arm.mounting) {
-        (ArmField::Payload, ..) => arm.payload_error = x,
-        (ArmField::GravityX, ..) => tilt[0] = x,
-        (ArmField::GravityY, ..) => tilt[1] = x,
-        (ArmField::Mixing, ..) => arm.mixing = Some(x),
-        (ArmField::HoistForce, Some(rope), _) => rope.force = x,
-        (ArmField::HoistLeanX, Some(rope), _) => rope.lean[0] = x,
-        (ArmField::HoistLeanY, Some(rope), _) => rope.lean[1] = x,
-        (ArmField::HoistTrolley, Some(rope), _) => rope.trolley = x,
-        (ArmField::MountingX, _, Some(mounting)) => mounting[0] = x,
-        (ArmField::MountingY, _, Some(mounting)) => mounting[1] = x,
+        (ArmField::Payload, ..) => arm.payload_error += x,
+        (ArmField::GravityX, ..) => tilt[0] += x,
+        (ArmField::GravityY, ..) => tilt[1] += x,
+        (ArmField::Mixing, ..) => arm.mixing = Some(arm.mixing.map_or(x, |known| known + x)),
+        (ArmField::HoistForce, Some(rope), _) => rope.force += x,
+        (ArmField::HoistLeanX, Some(rope), _) => rope.lean[0] += x,
+        (ArmField::HoistLeanY, Some(rope), _) => rope.lean[1] += x,
+        (ArmField::HoistTrolley, Some(rope), _) => rope.trolley += x,
+        (ArmField::MountingX, _, Some(mounting)) => mounting[0] += x,
+        (ArmField::MountingY, _, Some(mounting)) => mounting[1] += x,
         (ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::HoistTrolley, None, _)
         | (ArmField::MountingX | ArmField::MountingY, _, None) => {}
     }

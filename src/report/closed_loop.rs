@@ -12,7 +12,7 @@ use super::quantity::{decimals, mm, number, p_value};
 use super::render::{Report, report, text};
 use super::{effect, findings, trace};
 use crate::diagnose::{
-    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Unexplained, Verdict,
+    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Trace, Unexplained, Verdict,
 };
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
 use crate::problem::{Effect, JointKind, Problem};
@@ -35,7 +35,9 @@ object! {
         /// Mean reduction of the error on held-out poses.
         held_out_gain_mm: IntervalEntry = IntervalEntry::of(&closure.gain),
         effects: Vec<FoundEntry<'a>> = closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
-        unexplained: Option<UnexplainedEntry> = closure.unexplained.as_ref().map(UnexplainedEntry::of),
+        unexplained: Option<UnexplainedEntry> = closure.unexplained.first().map(|left| UnexplainedEntry::of(left, &closure.before)),
+        /// Further structure without a known law.
+        further: Vec<UnexplainedEntry> = closure.unexplained.iter().skip(1).map(|left| UnexplainedEntry::of(left, &closure.before)).collect(),
         /// 1 σ of the prior that waves of joints were given \[rad\].
         wave_prior_rad: Option<f64> = closure.harmonic_sigma,
         steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
@@ -62,6 +64,7 @@ object! {
         #[serde(flatten)]
         effect: &'a Effect = &found.effect,
         description: String = closure.before.describe(&found.effect),
+        claims: Option<trace::ClaimsEntry> = found.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, &closure.before)),
         p_value: f64 = found.p_value,
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         alternatives: &'a [Effect] = &found.alternatives,
@@ -77,10 +80,11 @@ object! {
     }
 }
 object! {
-    UnexplainedEntry(own: &Unexplained) {
+    UnexplainedEntry(own: &Unexplained, trace: &Trace) {
         #[serde(rename = "where")]
-        place: String = own.place.to_string(),
+        place: String = place(own),
         depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
+        claims: Option<trace::ClaimsEntry> = own.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, trace)),
         p_value: f64 = own.p_value,
         held_out_with_empirical_correction: Option<Summary> = own.correction.as_ref().map(|own| Summary::of(&own.held_out)),
         correction: Option<CorrectionEntry> = own.correction.as_ref().map(CorrectionEntry::of),
@@ -88,8 +92,8 @@ object! {
 }
 object! {
     CorrectionEntry(own: &Correction) {
-        /// Of what it depends on, SI; beyond it nothing is corrected.
-        range: [f64; 2] = own.range.into(),
+        /// Of each covariate that it depends on, SI; beyond it nothing is corrected.
+        ranges: Vec<(String, [f64; 2])> = own.ranges.iter().map(|(of, range)| (of.to_string(), (*range).into())).collect(),
         held_out_beyond: usize = own.beyond,
         /// Root mean squared error of poses left out in turn, before and with the correction.
         cross_validated_rms_mm: [f64; 2] = [own.cross_validated.0 * 1e3, own.cross_validated.1 * 1e3],
@@ -125,7 +129,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     }
     blocks.extend(found(closure, SHOWN_ALTERNATIVES));
     let failed = findings::failed(&closure.findings);
-    if closure.unexplained.is_some() || (!failed.is_empty() && !closure.effects.is_empty()) {
+    if !closure.unexplained.is_empty() || (!failed.is_empty() && !closure.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
         let unexplained = unexplained(problem, closure).into_iter();
         // Without effects the checks are those above.
@@ -196,7 +200,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
 fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
-    let correction = closure.unexplained.as_ref().and_then(|left| left.correction.as_ref());
+    let correction = correction(closure);
     let (best, with) = match correction {
         Some(correction) => (correction.held_out, ", empirical correction included"),
         None => (last, ""),
@@ -327,6 +331,7 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
 
 fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     let mut details = effect::values(found);
+    details.extend(found.claims.as_ref().map(trace::claimed));
     let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));
     if let Some(then) = closure.held_out_once(found) {
         let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
@@ -357,17 +362,24 @@ fn rounds<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     vec![Block::heading("Rounds"), Block::Table(Table::new(&header, rows, &[1]))]
 }
 
-/// What no effect explains.
+/// The correction of structure without a law, if there is one.
+fn correction(closure: &ClosedLoop) -> Option<&Correction> {
+    closure.unexplained.iter().find_map(|left| left.correction.as_ref())
+}
+
+/// Where structure is.
+fn place(left: &Unexplained) -> String {
+    left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
+}
+
+/// Structure whose law is not known.
 fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
-    let Some(unexplained) = &closure.unexplained else { return Vec::new() };
-    let Unexplained { place, depends_on, p_value: p, correction } = unexplained;
-    let on = depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let mut sentences = vec![match on.as_str() {
-        "" => format!("Structure is left: {place} (p {}).", p_value(*p)),
-        on => format!("Structure is left: {place}, depending on {on} (p {}).", p_value(*p)),
-    }];
+    if closure.unexplained.is_empty() {
+        return Vec::new();
+    }
+    let mut sentences: Vec<String> = closure.unexplained.iter().map(located).collect();
     let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();
-    let mut catalogue = "No effect of the catalogue explains it".to_owned();
+    let mut catalogue = "No effect of the catalogue explains it better than a function without a law".to_owned();
     for (why, words) in [(HELD_FIXED, "holds them fixed"), (REFUSED, "speaks of them in another unit")] {
         match untried(why) {
             0 => {}
@@ -375,32 +387,68 @@ fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
         }
     }
     sentences.push(catalogue + ".");
-    match correction {
+    match correction(closure) {
         None => {
             sentences.push(
                 "No empirical correction would improve the prediction of poses that it was not fitted to.".to_owned(),
             );
         }
-        Some(Correction { covariate, range, beyond, cross_validated: (without, with), held_out, .. }) => {
-            sentences.push(format!(
-                "A smooth correction there as a function of {on} would bring the held-out error to {} mm in the mean, rms \
-                 {} mm, and that of identification poses left out in turn from rms {} to {} mm. It names no cause and is \
-                 not part of {}.",
-                mm(held_out.mean.norm, 4),
-                mm(held_out.rms.norm, 4),
-                mm(*without, 4),
-                mm(*with, 4),
-                code("problem.closed.toml"),
-            ));
-            let (factor, unit) = unit(problem, *covariate);
-            sentences.push(format!(
-                "It holds for {on} from {} to {}{unit}, as far as the identification poses reach; nothing is corrected beyond \
-                 ({beyond} of {} held-out poses).",
-                number(range.0 * factor, 2),
-                number(range.1 * factor, 2),
-                held_out.n
-            ));
+        Some(correction) => sentences.extend(corrected(problem, closure, correction)),
+    }
+    sentences
+}
+
+/// One finding without a law.
+fn located(left: &Unexplained) -> String {
+    let on = left.depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let chance = format!("p-value at most {}", p_value(left.p_value));
+    let of = |probability: f64| number(probability, 2);
+    match (&left.claims, on.as_str()) {
+        (Some(claims), "") => {
+            format!(
+                "Structure at {}, probability {}; what it depends on is not known ({chance}).",
+                place(left),
+                of(claims.place.1)
+            )
         }
+        (Some(claims), on) => format!(
+            "Structure at {}, probability {}, that depends on {on}, probability {}; its law is not known ({chance}).",
+            place(left),
+            of(claims.place.1),
+            of(claims.depends_on.1)
+        ),
+        (None, "") => format!("Structure is left: {} (p {}).", place(left), p_value(left.p_value)),
+        (None, on) => format!("Structure is left: {}, depending on {on} (p {}).", place(left), p_value(left.p_value)),
+    }
+}
+
+/// What a correction does, and as far as it reaches.
+fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -> Vec<String> {
+    let before = closure.after.fitted.held_out;
+    let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
+    let does = if held_out.rms.norm < before.rms.norm { "improves" } else { "does not improve" };
+    let mut sentences = vec![format!(
+        "A smooth correction there {does} the prediction of held-out poses: mean {} to {} mm, rms {} to {} mm; of identification poses \
+         left out in turn rms {} to {} mm. It names no cause and is not part of {}.",
+        mm(before.mean.norm, 4),
+        mm(held_out.mean.norm, 4),
+        mm(before.rms.norm, 4),
+        mm(held_out.rms.norm, 4),
+        mm(*without, 4),
+        mm(*with, 4),
+        code("problem.closed.toml"),
+    )];
+    let range = |(covariate, range): &(Covariate, (f64, f64))| {
+        let (factor, unit) = unit(problem, *covariate);
+        format!("{covariate} from {} to {}{unit}", number(range.0 * factor, 2), number(range.1 * factor, 2))
+    };
+    let ranges: Vec<String> = ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
+    if !ranges.is_empty() {
+        sentences.push(format!(
+            "It holds for {}, as far as the identification poses reach; nothing is corrected beyond ({beyond} of {} held-out poses).",
+            ranges.join(", "),
+            held_out.n
+        ));
     }
     sentences
 }

@@ -115,7 +115,7 @@ object! {
 
 /// A claim with its probability.
 #[derive(Debug, Serialize)]
-struct Claim<T> {
+pub(in crate::report) struct Claim<T> {
     value: T,
     probability: f64,
 }
@@ -183,17 +183,6 @@ fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
     if shown.is_empty() {
         return Vec::new();
     }
-    let claimed = |claims: &Claims| {
-        let law = match claims.law.0.effect() {
-            Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
-            None => "its law is not known".to_owned(),
-        };
-        let on = match claims.depends_on.0.as_slice() {
-            [] => String::new(),
-            some => format!("; depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
-        };
-        format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
-    };
     let mut blocks = vec![
         Block::heading(
             "Explanations weighed against each other, several effects and functions of unknown law among them",
@@ -208,6 +197,19 @@ fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
         blocks.push(Block::list(claims));
     }
     blocks
+}
+
+/// What is claimed, from the least to the most.
+pub(super) fn claimed(claims: &Claims) -> String {
+    let law = match claims.law.0.effect() {
+        Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
+        None => "its law is not known".to_owned(),
+    };
+    let on = match claims.depends_on.0.as_slice() {
+        [] => String::new(),
+        some => format!("; depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
+    };
+    format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
 }
 
 fn percent(probability: f64) -> String {

@@ -1,41 +1,27 @@
 //! Columns of the hypotheses: what each would do to every measured coordinate.
 
-use std::f64::consts::PI;
-
 use nalgebra::{DMatrix, DVector};
 
+use super::functions::{Known, basis, goes_with, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use crate::diagnose::covariate::Covariate;
+use crate::diagnose::data::{bits, number};
 use crate::diagnose::neighbourhood::{Linearised, tries};
 use crate::diagnose::rules::SelectionRules;
-use crate::diagnose::smooth_term::places;
 use crate::model::Pose;
 use crate::model::parameter::{BeamField, JointField, Slot};
 use crate::problem::{Effect, JointKind, Problem};
 
-/// Margin beyond the range on either side, where functions need not be flat.
-const MARGIN: f64 = 0.25;
-/// Variance of a basis function, of that of the first, below which it is left out.
-const NEGLIGIBLE: f64 = 1e-3;
 /// A hypothesis with its columns and the logarithm of its prior probability.
 pub(super) struct Candidate {
     pub hypothesis: Hypothesis,
+    /// Which of the functions of that hypothesis, counted from 0.
+    pub variant: usize,
     /// Shape = (3 N, k), of root mean square 1 all together.
     pub columns: DMatrix<f64>,
     pub ln_prior: f64,
     /// For each column, whether its parameter is never negative.
     pub never_negative: Vec<bool>,
-}
-
-/// A covariate at every pose.
-struct Known {
-    covariate: Covariate,
-    /// As measured.
-    values: Vec<f64>,
-    /// From 0 to 1.
-    scaled: Vec<f64>,
-    /// Different values.
-    levels: usize,
 }
 
 /// Slots whose columns the hypotheses need beside those of effects.
@@ -51,6 +37,12 @@ pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
     slots
 }
 
+/// Every coordinate of a joint or link that may be off.
+fn places(problem: &Problem) -> impl Iterator<Item = Slot> + '_ {
+    (0..problem.joints.len())
+        .flat_map(|joint| JointField::GEOMETRY.into_iter().map(move |field| Slot::Joint { joint, field }))
+}
+
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
 /// Everything that may explain a residual.
@@ -59,20 +51,25 @@ pub(super) struct Columns<'a, 'l> {
     pub linearised: &'a Linearised<'l>,
     pub time_measured: bool,
     pub rules: &'a SelectionRules,
+    /// Poses, the first ones, that hypotheses are weighed on; at those behind them they are predicted.
+    pub weighed: usize,
     candidates: Vec<Candidate>,
     /// Family of each candidate and its share of the family's chance.
     shares: Vec<(String, f64)>,
+    /// What functions are functions of.
+    covariates: Vec<Known>,
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Effects, with the columns of those that the fit holds already, and functions of unknown law.
+    /// Effects with their columns and functions of unknown law; and the covariates of those functions.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
-        (time_measured, rules): (bool, &'a SelectionRules),
+        (time_measured, rules, weighed): (bool, &'a SelectionRules, usize),
         effects: &[(Effect, DMatrix<f64>)],
-    ) -> Vec<Candidate> {
-        let mut all = Self { problem, linearised, time_measured, rules, candidates: Vec::new(), shares: Vec::new() };
+    ) -> (Vec<Candidate>, Vec<Known>) {
+        let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { problem, linearised, time_measured, rules, weighed, candidates, shares, covariates };
         all.effects(effects);
         all.functions();
         all.weighted()
@@ -91,10 +88,13 @@ impl<'a, 'l> Columns<'a, 'l> {
         mut columns: DMatrix<f64>,
         never_negative: Vec<bool>,
     ) {
-        let size = (columns.norm_squared() / columns.nrows().max(1) as f64).sqrt();
+        let weighed = columns.rows(0, 3 * self.weighed);
+        let size = (weighed.norm_squared() / weighed.nrows().max(1) as f64).sqrt();
         if size > 0.0 && size.is_finite() {
             columns /= size;
-            self.candidates.push(Candidate { hypothesis, columns, ln_prior: 0.0, never_negative });
+            let same = self.candidates.last().filter(|last| last.hypothesis.says(&hypothesis));
+            let variant = same.map_or(0, |last| last.variant + 1);
+            self.candidates.push(Candidate { hypothesis, variant, columns, ln_prior: 0.0, never_negative });
             self.shares.push((family.to_owned(), share));
         }
     }
@@ -107,7 +107,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             let mut columns = columns.clone();
             // Parameters of several units: each alone moves the poses as much as the others.
             for mut column in columns.column_iter_mut() {
-                let length = column.norm();
+                let length = column.rows(0, 3 * self.weighed).norm();
                 if length > 0.0 {
                     column /= length;
                 }
@@ -142,6 +142,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
         self.measurement(&known);
         self.warming(&known);
+        self.repeats();
+        self.covariates.extend(known);
     }
 
     /// Whether a slot is the coordinate that a joint moves.
@@ -177,7 +179,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
             all.extend(sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)));
         }
-        all.into_iter().filter_map(|(covariate, values)| Known::of(covariate, values)).collect()
+        all.into_iter().filter_map(|(covariate, values)| Known::of(covariate, values, self.weighed)).collect()
     }
 
     /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a compliance there would do, over
@@ -193,7 +195,8 @@ impl<'a, 'l> Columns<'a, 'l> {
                 let along = gives.rows(3 * k, 3).dot(&turns.rows(3 * k, 3));
                 if lever(k) > 1e-12 * longest { along / lever(k) } else { 0.0 }
             };
-            Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect()).filter(|known| known.levels > 3)
+            Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect(), self.weighed)
+                .filter(|known| known.levels > 3)
         };
         (0..self.problem.joints.len())
             .flat_map(|joint| pairs.into_iter().filter_map(move |pair| of(joint, pair)))
@@ -216,9 +219,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) {
             // What settles changes fast at first.
-            let range = of.values.iter().copied().fold(0.0, f64::max);
-            let logarithm: Vec<f64> = of.values.iter().map(|t| (t + range / 30.0).ln()).collect();
-            if let Some(warped) = Known::of(of.covariate, logarithm) {
+            let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
+            let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
+            if let Some(warped) = Known::of(of.covariate, logarithm, self.weighed) {
                 self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&warped.scaled, 0.25)));
             }
         }
@@ -261,7 +264,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         let q: Vec<f64> = self.linearised.poses().iter().map(|pose| pose.setup.configuration[joint]).collect();
-        let Some(known) = Known::of(Covariate::Command(joint), q) else { return };
+        let Some(known) = Known::of(Covariate::Command(joint), q, self.weighed) else { return };
         let slow = basis(&known.scaled, self.rules.slow_length);
         for order in 1..=self.rules.near_orders {
             let k = slow.ncols();
@@ -287,11 +290,13 @@ impl<'a, 'l> Columns<'a, 'l> {
             self.smooth("smooth in the measurement", slot, &at, of, &lengths);
         }
         let poses = self.linearised.poses();
-        let coordinate = |axis: usize| Known::of(Covariate::Position, poses.iter().map(|p| p.measured[axis]).collect());
+        let coordinate = |axis: usize| {
+            Known::of(Covariate::Position, poses.iter().map(|p| p.measured[axis]).collect(), self.weighed)
+        };
         let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
         let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
             let scaled = &coordinates[j].scaled;
-            scaled[k] - scaled.iter().sum::<f64>() / scaled.len() as f64
+            scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
         });
         let hypothesis =
             |law| Hypothesis { law, part: Part::Measurement, slot: None, depends_on: vec![Covariate::Position] };
@@ -300,6 +305,23 @@ impl<'a, 'l> Columns<'a, 'l> {
             let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
             self.add("field", 1.0, hypothesis(Law::Smooth), times(&at, &plane));
         }
+        self.covariates.extend(coordinates);
+    }
+
+    /// Another error in every configuration, which all positions measured in it share.
+    fn repeats(&mut self) {
+        let axes: Vec<DVector<f64>> = (0..3).filter_map(|axis| self.linearised.place(Slot::Shift { axis })).collect();
+        let poses = self.linearised.poses();
+        let configurations: Vec<Vec<u64>> = poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
+        let numbers = number(configurations[..self.weighed].iter().cloned());
+        let count = numbers.iter().max().map_or(0, |last| last + 1);
+        if count == self.weighed || axes.len() < 3 {
+            return;
+        }
+        let of_pose = |row: usize, group: usize| numbers.get(row) == Some(&group);
+        let indicators = DMatrix::from_fn(poses.len(), count, |row, group| f64::from(u8::from(of_pose(row, group))));
+        let hypothesis = Hypothesis { law: Law::PerPose, part: Part::Arm, slot: None, depends_on: Vec::new() };
+        self.add("per pose", 1.0, hypothesis, times(&axes.iter().collect::<Vec<_>>(), &indicators));
     }
 
     /// Curvature and strain of beams by other functions than the temperature's multiple.
@@ -339,7 +361,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// The candidates with their prior probabilities: odds of one to two for each further hypothesis, then equal chances for all families and,
     /// but for harmonics, all members of a family.
-    fn weighted(self) -> Vec<Candidate> {
+    fn weighted(self) -> (Vec<Candidate>, Vec<Known>) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
             if let Some((_, _, sum)) = families.iter_mut().find(|(known, ..)| *known == family.as_str()) {
@@ -356,73 +378,6 @@ impl<'a, 'l> Columns<'a, 'l> {
             let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
             candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
         }
-        candidates
+        (candidates, self.covariates)
     }
-}
-
-impl Known {
-    /// A covariate that varies.
-    fn of(covariate: Covariate, values: Vec<f64>) -> Option<Self> {
-        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if !(high > low && (high - low).is_finite()) {
-            return None;
-        }
-        let mut sorted = values.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.dedup();
-        let scaled = values.iter().map(|value| (value - low) / (high - low)).collect();
-        Some(Self { covariate, values, scaled, levels: sorted.len() })
-    }
-}
-
-/// Whether a function of these two is looked for.
-fn goes_with(one: Covariate, other: Covariate) -> bool {
-    use Covariate::{Approach, Command, Row, Temperature, Time};
-    match (one, other) {
-        (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),
-        (Command(_), Command(_)) | (Temperature, Time | Row) | (Time | Row, Temperature) => true,
-        _ => false,
-    }
-}
-
-/// Cosines over the range and its margin, each with the deviation that a Gaussian process of squared-exponential covariance
-/// with that length has along it [Solin & Särkkä 2020]; shape = (poses, functions).
-fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
-    let weights = weights(length);
-    DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
-}
-
-fn cosine(k: usize, u: f64) -> f64 {
-    (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
-}
-
-/// Deviations along the cosines, down to a negligible variance.
-fn weights(length: f64) -> Vec<f64> {
-    let variance = |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2)).exp();
-    let count = (0..usize::MAX).find(|&k| variance(k) <= NEGLIGIBLE).unwrap_or(0);
-    (0..count).map(|k| variance(k).sqrt()).collect()
-}
-
-/// Products of cosines, one of each covariate.
-fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
-    let weights = weights(length);
-    let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
-    for _ in scaled {
-        let longer =
-            |index: &Vec<usize>| (0..weights.len()).map(|k| [index.as_slice(), &[k]].concat()).collect::<Vec<_>>();
-        indices = indices.iter().flat_map(longer).collect();
-    }
-    let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
-    indices.retain(|index| weight(index).powi(2) > NEGLIGIBLE);
-    DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
-        let index = &indices[j];
-        weight(index) * index.iter().zip(scaled).map(|(&k, scaled)| cosine(k, scaled[row])).product::<f64>()
-    })
-}
-
-/// Columns times functions of the pose: every column with every function, shape = (3 N, columns · functions).
-fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
-    let k = functions.ncols();
-    DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| at[j / k][row] * functions[(row / 3, j % k)])
 }

@@ -7,26 +7,29 @@
 //! height and phase change, another value in every pose. So a law is probable only where it is better than what needs none.
 
 mod columns;
+mod functions;
+mod hypotheses;
 mod hypothesis;
 mod marginal;
 mod search;
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
 use super::covariate::Covariate;
 use super::data::Data;
 use super::fitted::Fitted;
 use crate::identify::Noise;
-use crate::model::parameter::{JointField, Parameter, Slot};
 use crate::problem::Effect;
-use columns::{Columns, slots};
+use columns::Candidate;
+pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
-use search::{Block, Target, search};
+use search::{Block, Target, Weighted, search};
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
+/// Odds to another effect from which on it is named as an alternative.
+const BESIDE: f64 = 0.05;
+
 /// Hypotheses that may be at work together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
@@ -34,6 +37,21 @@ pub struct Explanation {
     pub hypotheses: Vec<Hypothesis>,
     /// Its probability among all explanations that were looked at.
     pub probability: f64,
+    /// For each which of its functions, and 1 σ of their coefficients.
+    functions: Vec<(usize, f64)>,
+}
+
+impl Explanation {
+    /// Its effects.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
+    }
+
+    /// Its functions without a law, each with which one of its hypothesis it is.
+    pub(super) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
+        let all = self.hypotheses.iter().zip(&self.functions).filter(|(own, _)| own.effect().is_none());
+        all.map(|(own, (variant, _))| (own.clone(), *variant)).collect()
+    }
 }
 
 /// All explanations of a residual that were looked at.
@@ -66,6 +84,80 @@ impl Evidence {
         self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
+    /// The most probable explanation that claims no more than is sure: with as many hypotheses as there are with probability
+    /// `level`, whichever they are.
+    pub fn sure(&self, level: f64) -> Option<&Explanation> {
+        let as_many = |count: usize| -> f64 {
+            let holds = |explanation: &&Explanation| explanation.hypotheses.len() >= count;
+            self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
+        };
+        self.explanations.iter().find(|explanation| as_many(explanation.hypotheses.len()) >= level)
+    }
+
+    /// Chance that noise alone makes a hypothesis of a kind as probable, for all that were looked at together: of a ratio of
+    /// likelihoods no more than 1 in B is above B.          [Ville 1939]
+    pub fn chance(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
+        let probability = self.probability(of).clamp(NEGLIGIBLE, 1.0);
+        ((1.0 - probability).max(NEGLIGIBLE) / probability).min(1.0)
+    }
+
+    /// Explanations with an effect in the place of another of `best`, the most probable first: their sets of hypotheses.
+    pub(super) fn exchanged(&self, best: &Explanation) -> impl Iterator<Item = &Explanation> {
+        let differ = |one: &Explanation, other: &Explanation| {
+            let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
+            let new: Vec<&Hypothesis> = one.hypotheses.iter().filter(is_new).collect();
+            matches!(new.as_slice(), [only] if only.effect().is_some())
+        };
+        let is_exchange = move |other: &&Explanation| {
+            other.hypotheses.len() == best.hypotheses.len() && differ(best, other) && differ(other, best)
+        };
+        self.explanations.iter().filter(is_exchange)
+    }
+
+    /// The same with other odds for some explanations: ln of those to `best`, each at a fit of its own.
+    pub(super) fn corrected(mut self, best: &Explanation, odds: &[(Explanation, f64)]) -> Self {
+        let says = |one: &Explanation, other: &Explanation| one.hypotheses == other.hypotheses;
+        let of_best = self.explanations.iter().find(|own| says(own, best)).map_or(0.0, |own| own.probability);
+        for (explanation, ln_odds) in odds {
+            if let Some(own) = self.explanations.iter_mut().find(|own| says(own, explanation)) {
+                own.probability = of_best * ln_odds.exp();
+            }
+        }
+        let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
+        self.explanations.iter_mut().for_each(|own| own.probability /= total);
+        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        self
+    }
+
+    /// Effects that may stand in the place of one of an explanation, each as probable without it as a twentieth of it, best
+    /// first.
+    pub fn alternatives(&self, effect: &Effect, best: &Explanation) -> Vec<Effect> {
+        let has = |explanation: &Explanation, own: &Effect| {
+            explanation.hypotheses.iter().any(|hypothesis| hypothesis.effect() == Some(own))
+        };
+        let with: f64 =
+            self.explanations.iter().filter(|known| has(known, effect)).map(|known| known.probability).sum();
+        let mut others: Vec<(&Effect, f64)> = Vec::new();
+        for explanation in self.explanations.iter().filter(|known| !has(known, effect)) {
+            for other in explanation.hypotheses.iter().filter_map(Hypothesis::effect).filter(|other| !has(best, other))
+            {
+                match others.iter_mut().find(|(known, _)| *known == other) {
+                    Some((_, probability)) => *probability += explanation.probability,
+                    None => others.push((other, explanation.probability)),
+                }
+            }
+        }
+        others.retain(|(_, probability)| *probability >= with * BESIDE);
+        others.sort_by(|a, b| b.1.total_cmp(&a.1));
+        others.into_iter().map(|(effect, _)| effect.clone()).collect()
+    }
+
+    /// What is claimed of an effect; `None` where it is in no explanation.
+    pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
+        let mut all = self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
+        all.find(|hypothesis| hypothesis.effect() == Some(effect)).map(|hypothesis| self.claims(hypothesis))
+    }
+
     /// What is claimed of a hypothesis.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
         let place = self.probability(|other| other.part == of.part);
@@ -80,38 +172,43 @@ impl Evidence {
     }
 }
 
-/// Weighs what may explain the residual of a fit.
+/// ln of the marginal likelihood and prior of a fit's own explanation: the effects `added` by the search, and functions without a law.
 ///
-/// `None` where the residual is not a finite number, as that of a pose without equilibrium.
-pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Option<Evidence> {
+/// The fit is linear about its own optimum: sets whose effects are strong are compared by this, each at a fit of its own.
+pub(super) fn ln_posterior(
+    fitted: &Fitted,
+    data: &Data,
+    added: &[Effect],
+    functions: &[(Hypothesis, usize)],
+) -> Option<f64> {
     let rows = data.thinned(data.rules.weighed_poses);
-    let candidates = Candidates::of(&fitted.problem, data).testable;
-    // What the model has already as a constant is a fitted column.
-    let taken = |slot: &Slot| {
-        let own = |parameter: &&Parameter| parameter.slot == *slot && parameter.driver.is_constant();
-        !is_added(*slot) && fitted.model.parameters.iter().find(own).is_some()
+    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
+        Some(effect) => hypotheses.added.contains(effect),
+        None => functions.iter().any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis.says(own)),
     };
-    let slots: Vec<Slot> = slots(&fitted.problem).into_iter().filter(|slot| !taken(slot)).collect();
-    let linearised = fitted.linearised_with(data, &rows, &candidates, &slots);
-    let neighbourhood = fitted.neighbourhood(&linearised, &[]);
+    let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &own)?;
+    search::ln_posterior(&blocks, &target, data.rules)
+}
+
+/// Hypotheses and the residual with everything that is fitted projected out; `None` where the residual is not a finite number.
+fn blocks(fitted: &Fitted, data: &Data, hypotheses: &Hypotheses, own: &[&Candidate]) -> Option<(Vec<Block>, Target)> {
+    let neighbourhood = fitted.neighbourhood_with(&hypotheses.linearised, &hypotheses.unknowns, None);
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }
-    let effects: Vec<(Effect, DMatrix<f64>)> =
-        candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect))).collect();
-    let all = Columns::all(&fitted.problem, &linearised, (data.measurements.time_measured, data.rules), &effects);
-    let (hypotheses, blocks): (Vec<Hypothesis>, Vec<Block>) = all
-        .into_par_iter()
-        .map(|candidate| {
-            let columns = neighbourhood.left_of(&candidate.columns);
-            let block = Block::new(columns, neighbourhood.residual(), candidate.ln_prior, candidate.never_negative);
-            (candidate.hypothesis, block)
-        })
-        .unzip();
+    let of_candidate = |candidate: &&Candidate| {
+        let columns = neighbourhood.left_of(&candidate.columns);
+        Block::new(columns, neighbourhood.residual(), candidate.ln_prior, &candidate.never_negative)
+    };
+    let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
+    let rows = data.thinned(data.rules.weighed_poses);
+    let without_weight = 3 * rows.iter().filter(|row| fitted.set_aside.contains(row)).count();
     let target = Target {
         residual: neighbourhood.residual().clone(),
         noise: marginal::Noise {
-            freedom: neighbourhood.sums().freedom(),
+            freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
             trust: if fitted.found.noise == Noise::Declared {
                 data.rules.trust_declared
             } else {
@@ -119,9 +216,23 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Option<Evidence> {
             },
         },
     };
+    Some((blocks, target))
+}
+
+/// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.
+///
+/// `None` where the residual is not a finite number, as that of a pose without equilibrium.
+pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
+    let rows = data.thinned(data.rules.weighed_poses);
+    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>())?;
+    let is_added = |effect: &Effect| hypotheses.added.contains(effect);
+    let of = |k: usize| &hypotheses.all[k].hypothesis;
+    let present: Vec<usize> = (0..blocks.len()).filter(|&k| of(k).effect().is_some_and(is_added)).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    for (members, probability) in search(&blocks, &target, data.rules).into_iter().filter(|(_, p)| *p > NEGLIGIBLE) {
-        let own: Vec<&Hypothesis> = members.into_iter().map(|member| &hypotheses[member]).collect();
+    let weighted = search(&blocks, &target, data.rules, &present);
+    for Weighted { members, sizes, probability } in weighted.into_iter().filter(|set| set.probability > NEGLIGIBLE) {
+        let own: Vec<&Hypothesis> = members.iter().map(|&member| of(member)).collect();
         // Functions of one covariate that change over other lengths are one hypothesis.
         let is_same = |other: &&mut Explanation| {
             let others = &other.hypotheses;
@@ -132,19 +243,37 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data) -> Option<Evidence> {
         match explanations.iter_mut().find(is_same) {
             Some(known) => known.probability += probability,
             None => {
-                explanations.push(Explanation { hypotheses: own.into_iter().cloned().collect(), probability });
+                let own = own.into_iter().cloned().collect();
+                let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
+                explanations.push(Explanation {
+                    hypotheses: own,
+                    probability,
+                    functions: variants.zip(sizes).collect(),
+                });
             }
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    Some(Evidence { explanations })
-}
-
-/// Whether a probe at a slot adds to what the arm declares there.
-fn is_added(slot: Slot) -> bool {
-    match slot {
-        Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field),
-        Slot::Shift { .. } => true,
-        _ => false,
+    if std::env::var("FXDEBUG").is_ok() {
+        eprintln!("added {:?} unknowns {:?}", hypotheses.added, hypotheses.unknowns);
+        for one in explanations.iter().take(8) {
+            let words: Vec<String> = one
+                .hypotheses
+                .iter()
+                .map(|h| {
+                    format!(
+                        "{} {} {:?}",
+                        match &h.law {
+                            Law::Effect(e) => format!("{}{}", e.name(), e.place()),
+                            other => format!("{other:?}"),
+                        },
+                        h.part,
+                        h.depends_on
+                    )
+                })
+                .collect();
+            eprintln!("  {:.3} {words:?} {:?}", one.probability, one.functions);
+        }
     }
+    Some(Evidence { explanations })
 }

@@ -24,11 +24,11 @@ pub(super) struct Block {
 
 impl Block {
     /// Of projected columns, with what they have in common with a projected residual.
-    pub fn new(columns: DMatrix<f64>, residual: &DVector<f64>, ln_prior: f64, never_negative: Vec<bool>) -> Self {
+    pub fn new(columns: DMatrix<f64>, residual: &DVector<f64>, ln_prior: f64, never_negative: &[bool]) -> Self {
         let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
         // The narrow side is transposed: this is the product that is fast.
         gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
-        Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative }
+        Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative: never_negative.to_vec() }
     }
 }
 
@@ -40,8 +40,15 @@ pub(super) struct Target {
     pub noise: Noise,
 }
 
-/// Members, ascending, and their probability among all sets looked at.
-pub(super) type Weighted = (Vec<usize>, f64);
+/// A set of hypotheses, and its probability among all sets looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Weighted {
+    /// Numbers of the hypotheses, in the order in which they were taken.
+    pub members: Vec<usize>,
+    /// The most probable size of each: 1 σ of its coefficients.
+    pub sizes: Vec<f64>,
+    pub probability: f64,
+}
 
 /// A set with the sizes of its members and ln of its posterior, up to a constant.
 #[derive(Debug, Clone)]
@@ -49,6 +56,17 @@ struct Set {
     members: Vec<usize>,
     sizes: Vec<f64>,
     ln_posterior: f64,
+}
+
+impl Set {
+    /// The set with one more, which gains so much at this size.
+    fn with(&self, block: usize, (gain, size): (f64, f64), blocks: &[Block]) -> Self {
+        Self {
+            members: [self.members.as_slice(), &[block]].concat(),
+            sizes: [self.sizes.as_slice(), &[size]].concat(),
+            ln_posterior: self.ln_posterior + gain + blocks[block].ln_prior,
+        }
+    }
 }
 
 /// What a set leaves of the residual: with A of its members scaled by their sizes and 1 + AᵀA = L Lᵀ, Z = L⁻¹AᵀC takes its part off
@@ -97,47 +115,89 @@ impl Conditioned {
 }
 
 /// All sets that were looked at, most probable first; the empty set stands for "nothing".
-pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules) -> Vec<Weighted> {
-    let mut known: BTreeMap<Vec<usize>, f64> = BTreeMap::from([(Vec::new(), 0.0)]);
-    let mut front = vec![Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 }];
-    let mut promising: Vec<usize> = (0..blocks.len()).collect();
-    for depth in 0..rules.together {
+///
+/// The search starts from nothing and from the set `present`, whole and without one of its members: what was found before is
+/// judged again beside everything else.
+pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, present: &[usize]) -> Vec<Weighted> {
+    let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+    let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
+    let starts = std::iter::once(Vec::new()).chain((0..present.len()).map(without)).chain([present.to_vec()]);
+    for start in starts {
+        if let Some(set) = assembled(&start, blocks, target, rules) {
+            known.insert(sorted(&set.members), set);
+        }
+    }
+    let mut front: Vec<Set> = known.values().cloned().collect();
+    let mut promising: Option<Vec<usize>> = None;
+    for _ in 0..rules.together {
         let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
         for (place, set) in front.iter().enumerate() {
             let Some(conditioned) = Conditioned::new(set, blocks, target) else { continue };
-            let tried: Vec<usize> = if place == 0 { (0..blocks.len()).collect() } else { promising.clone() };
+            let all = || (0..blocks.len()).collect();
+            let tried: Vec<usize> = promising.as_ref().filter(|_| place > 0).map_or_else(all, Vec::clone);
             let gains: Vec<(usize, (f64, f64))> = tried
                 .into_par_iter()
                 .filter(|block| !set.members.contains(block))
                 .map(|block| (block, conditioned.gain(&blocks[block], target, rules)))
                 .collect();
-            for (block, (gain, size)) in gains {
-                let ln_posterior = set.ln_posterior + gain + blocks[block].ln_prior;
-                let mut key = set.members.clone();
-                key.push(block);
-                key.sort_unstable();
-                if next.get(&key).is_none_or(|other| ln_posterior > other.ln_posterior) {
-                    let members = [set.members.as_slice(), &[block]].concat();
-                    next.insert(key, Set { members, sizes: [set.sizes.as_slice(), &[size]].concat(), ln_posterior });
+            for (block, gain) in gains {
+                let longer = set.with(block, gain, blocks);
+                let key = sorted(&longer.members);
+                let best = next.get(&key).or_else(|| known.get(&key));
+                if best.is_none_or(|other| longer.ln_posterior > other.ln_posterior) {
+                    next.insert(key, longer);
                 }
             }
         }
-        let best_known = known.values().copied().fold(f64::NEG_INFINITY, f64::max);
+        let best_known = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let mut sets: Vec<Set> = next.values().cloned().collect();
-        known.extend(next.into_iter().map(|(key, set)| (key, set.ln_posterior)));
+        known.extend(next);
         sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        if depth == 0 {
-            promising = sets.iter().take(rules.extending).map(|set| set.members[0]).collect();
-        }
+        promising.get_or_insert_with(|| {
+            let mut promising: Vec<usize> = Vec::new();
+            for last in sets.iter().filter_map(|set| set.members.last()) {
+                if promising.len() < rules.extending && !promising.contains(last) {
+                    promising.push(*last);
+                }
+            }
+            promising
+        });
         sets.truncate(rules.extended);
         front = sets;
         if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
             break;
         }
     }
-    let most = known.values().copied().fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = known.values().map(|ln| (ln - most).exp()).sum();
-    let mut all: Vec<Weighted> = known.into_iter().map(|(key, ln)| (key, (ln - most).exp() / total)).collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = known.values().map(|set| (set.ln_posterior - most).exp()).sum();
+    let weighted = |Set { members, sizes, ln_posterior }| {
+        let probability = (ln_posterior - most).exp() / total;
+        Weighted { members, sizes, probability }
+    };
+    let mut all: Vec<Weighted> = known.into_values().map(weighted).collect();
+    all.sort_by(|a, b| b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members)));
     all
+}
+
+/// ln p(r | all blocks) and of their prior.
+pub(super) fn ln_posterior(blocks: &[Block], target: &Target, rules: &SelectionRules) -> Option<f64> {
+    let all: Vec<usize> = (0..blocks.len()).collect();
+    let set = assembled(&all, blocks, target, rules)?;
+    Some(set.ln_posterior + over_noise(target.residual.norm_squared(), &target.noise.grid()))
+}
+
+/// A set with these members, one after the other.
+fn assembled(members: &[usize], blocks: &[Block], target: &Target, rules: &SelectionRules) -> Option<Set> {
+    let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
+    for &member in members {
+        let gain = Conditioned::new(&set, blocks, target)?.gain(&blocks[member], target, rules);
+        set = set.with(member, gain, blocks);
+    }
+    Some(set)
+}
+
+fn sorted(members: &[usize]) -> Vec<usize> {
+    let mut members = members.to_vec();
+    members.sort_unstable();
+    members
 }

@@ -54,6 +54,13 @@ impl<'a> Linearised<'a> {
         };
         let shared: Vec<(Slot, Option<f64>)> = unknowns.iter().filter_map(shared).collect();
         let relaxed: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
+        // A parameter that is fitted at a place has its column already.
+        let fitted_at = |&(slot, _): &(Slot, f64)| {
+            let is_it = |&k: &usize| model.parameters[k].slot == slot && model.parameters[k].driver.is_constant();
+            unknowns.iter().position(is_it).map(|column| (slot, column))
+        };
+        let known: Vec<(Slot, usize)> = slots.iter().filter_map(fitted_at).collect();
+        slots.retain(|place| fitted_at(place).is_none());
         slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
         let first = model.parameters.len();
         let probing = model.probing(&slots);
@@ -69,7 +76,8 @@ impl<'a> Linearised<'a> {
         let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
         let (_, residual) = linearise(&plain, &DVector::zeros(0));
         let fitted = unknowns.len();
-        let places = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index)).collect();
+        let probed = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index));
+        let places = known.into_iter().chain(probed).collect();
         Self { problem, poses, places, jacobian, residual, fitted, relaxed }
     }
 

@@ -16,4 +16,3 @@ pub(super) use linear::LEAST_DECIDED;
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(crate) use linearised::Linearised;
 pub(crate) use scan::{Scan, Tried, tries};
-pub(crate) use score::Gain;

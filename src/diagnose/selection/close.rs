@@ -2,6 +2,7 @@
 
 use super::super::candidates::Candidates;
 use super::super::data::Data;
+use super::super::evidence::{Claims, Evidence, Explanation, ln_posterior, weigh};
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
@@ -32,15 +33,24 @@ pub enum Verdict {
 pub struct Found {
     /// Which.
     pub effect: Effect,
-    /// Probability that it is none, corrected for the candidates tried.
+    /// What is claimed of it, each with its probability; `None` where no evidence could be weighed.
+    pub claims: Option<Claims>,
+    /// Probability that chance alone gains as much, corrected for the candidates tried.
     pub p_value: f64,
     /// Its parameters.
     pub estimates: Vec<Estimate>,
-    /// Candidates that these data cannot tell from it, best first.
+    /// Effects that these data cannot tell from it, best first.
     pub alternatives: Vec<Effect>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
     /// fit where no round is such.
     pub held_out_after: ErrorSummary,
+}
+
+impl Found {
+    /// Whether it is named as found: its law is surer than `stated`. Below that a place is found, and the law is such as this one.
+    pub fn is_named(&self, stated: f64) -> bool {
+        self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
+    }
 }
 
 /// The loop from the declared problem to one that leaves nothing to find.
@@ -62,8 +72,8 @@ pub struct ClosedLoop {
     pub rounds: Vec<Round>,
     /// 1 σ of the prior that the closed problem has for the harmonics of joints, where they are many \[rad\].
     pub harmonic_sigma: Option<f64>,
-    /// Structure that no effect explains.
-    pub unexplained: Option<Unexplained>,
+    /// Structure whose law is not known, the surest first.
+    pub unexplained: Vec<Unexplained>,
     /// Mean reduction of the error on held-out poses \[m\].
     pub gain: Interval,
 }
@@ -99,22 +109,31 @@ pub fn close_by(
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
     let mut rounds = Rounds::new(&data, options, first.effects());
-    let mut fitted = rounds.run(first)?;
-    for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
-        let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
-        fitted = rounds.run(next)?;
-    }
-    let (fitted, unexplained) = with_smooth_term(&mut rounds, fitted)?;
-    let (fitted, harmonic_sigma, changed) = harmonics::filled(&rounds, fitted)?;
-    let unexplained =
-        if changed { unexplained::localise(&fitted, &data, rounds.smooth_terms.first()) } else { unexplained };
+    let (fitted, harmonic_sigma) = if data.rows().len() <= rules.weighed_poses {
+        (weighed(&mut rounds, first)?, None)
+    } else {
+        let mut fitted = rounds.run(first)?;
+        for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
+            let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
+            fitted = rounds.run(next)?;
+        }
+        harmonics::filled(&rounds, fitted)?
+    };
     let findings = check_fit(&fitted, &data);
-    let unexplained = unexplained.or_else(|| unexplained::nowhere(&findings));
-    let effects = found(&rounds, &fitted, (findings.is_structured(), harmonic_sigma.is_some()));
-    let verdict = match (&unexplained, effects.is_empty()) {
-        (Some(_), _) => Verdict::Unexplained,
-        (None, true) => Verdict::NothingFound,
-        (None, false) => Verdict::Explained,
+    let added = rounds.added(&fitted);
+    let evidence = weigh(&fitted, &data, &added);
+    let evidence =
+        evidence.map(|evidence| refitted(&rounds, &fitted, evidence)).transpose()?.map(|(evidence, _)| evidence);
+    let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
+    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, &added));
+    if unexplained.is_empty() {
+        unexplained.extend(unexplained::nowhere(&findings));
+    }
+    let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
+    let verdict = match (unexplained.is_empty(), effects.is_empty()) {
+        (false, _) => Verdict::Unexplained,
+        (true, true) => Verdict::NothingFound,
+        (true, false) => Verdict::Explained,
     };
     let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &data.split.held_out));
     Ok(ClosedLoop {
@@ -131,34 +150,54 @@ pub fn close_by(
     })
 }
 
-/// The fit without effects that only stood in for a smooth function, and the structure that this leaves; the fit as it was
-/// where in the end there is none.
-fn with_smooth_term(rounds: &mut Rounds, fitted: Fitted) -> Result<(Fitted, Option<Unexplained>), IdentifyError> {
-    let data = rounds.data;
-    let candidates = Candidates::of(&fitted.problem, data).testable;
-    let without = if let Some((term, rest)) = unexplained::withdraw(&fitted, data, &rounds.added(&fitted), &candidates)
-    {
-        rounds.smooth_terms.push(term);
-        let without = rounds.fit(&fitted, &rest)?;
-        let without = rounds.without_insignificant(without)?;
-        rounds.forget();
-        rounds.note(&without);
-        rounds.run(without)?
-    } else if let Some(tried) = unexplained::strongest(&fitted, data, None) {
-        rounds.smooth_terms.push(tried.smooth_term);
-        let without = rounds.without_insignificant(fitted.clone())?;
-        rounds.enter(&without);
-        without
-    } else {
-        return Ok((fitted, None));
-    };
-    let left = unexplained::localise(&without, data, rounds.smooth_terms.first());
-    if left.is_some() {
-        return Ok((without, left));
+/// The fit with the effects of the explanation that is sure, weighed again about every fit until that is what the model holds.
+fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<Fitted, IdentifyError> {
+    rounds.is_new(&first);
+    let mut fitted = first;
+    while rounds.done.len() < rounds.data.rules.rounds {
+        let Some(evidence) = weigh(&fitted, rounds.data, &rounds.added(&fitted)) else { break };
+        let Some(best) = evidence.sure(rounds.data.rules.sure) else { break };
+        let mut next = rounds.fit(&fitted, &best.effects())?;
+        if !rounds.is_new(&next) {
+            // What the model holds is what is sure; is there a better one at a fit of its own?
+            let Some(better) = refitted(rounds, &fitted, evidence)?.1 else { break };
+            next = better;
+            if !rounds.is_new(&next) {
+                break;
+            }
+        }
+        rounds.note(&next);
+        fitted = next;
     }
-    rounds.smooth_terms.clear();
-    rounds.note(&fitted);
-    Ok((fitted, None))
+    rounds.settled(fitted)
+}
+
+/// The evidence with what may stand in the place of an effect weighed at a fit of its own, and the best of these fits where it is
+/// better than the one given.
+fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evidence, Option<Fitted>), IdentifyError> {
+    let (data, rules) = (rounds.data, rounds.data.rules);
+    let added = rounds.added(fitted);
+    let holds = |best: &&Explanation| {
+        let own = best.effects();
+        let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+        own.len() == parts.len() && parts.iter().all(|part| own.contains(part))
+    };
+    let Some(best) = evidence.sure(rules.sure).filter(holds).filter(|_| !added.is_empty()).cloned() else {
+        return Ok((evidence, None));
+    };
+    let functions = best.without_law();
+    let Some(own) = ln_posterior(fitted, data, &added, &functions) else { return Ok((evidence, None)) };
+    let rivals: Vec<Explanation> = evidence.exchanged(&best).take(rules.rivals).cloned().collect();
+    let (mut odds, mut better): (Vec<(Explanation, f64)>, Option<(f64, Fitted)>) = (Vec::new(), None);
+    for rival in rivals {
+        let next = rounds.fit(fitted, &rival.effects())?;
+        let Some(other) = ln_posterior(&next, data, &rounds.added(&next), &functions) else { continue };
+        odds.push((rival, other - own));
+        if other > own && better.as_ref().is_none_or(|(most, _)| other > *most) {
+            better = Some((other, next));
+        }
+    }
+    Ok((evidence.corrected(&best, &odds), better.map(|(_, fitted)| fitted)))
 }
 
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
@@ -168,11 +207,10 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
         return Ok(None);
     }
     let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let linearised = fitted.linearised(rounds.data, &candidates, &rounds.smooth_terms);
-    let taken_in = rounds.smooth_terms.clone();
-    let replacements = Replacements::new(fitted, &linearised, (&candidates, &taken_in), rounds.data);
+    let linearised = fitted.linearised(rounds.data, &candidates);
+    let replacements = Replacements::new(fitted, &linearised, &candidates, rounds.data);
     for effect in &added {
-        if let Some(better) = replacements.of(effect, false).better {
+        if let Some(better) = replacements.better_than(effect) {
             let kept: Vec<Effect> = added.iter().filter(|known| *known != effect).chain([&better]).cloned().collect();
             let next = rounds.without_insignificant(rounds.fit(fitted, &kept)?)?;
             if rounds.enter(&next) {
@@ -183,11 +221,8 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     Ok(None)
 }
 
-/// Every added effect with what is known of it, where structure is left, and where harmonics share a prior.
-fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bool)) -> Vec<Found> {
-    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
-    let linearised = fitted.linearised(rounds.data, &candidates, &rounds.smooth_terms);
-    let replacements = Replacements::new(fitted, &linearised, (&candidates, &rounds.smooth_terms), rounds.data);
+/// Every added effect with what is known of it; harmonics may share a prior.
+fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation)>, common_prior: bool) -> Vec<Found> {
     let added = rounds.added(fitted);
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
@@ -198,11 +233,32 @@ fn found(rounds: &Rounds, fitted: &Fitted, (structured, common_prior): (bool, bo
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| Found {
+        claims: best.and_then(|(evidence, _)| claims(evidence, &effect)),
         p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
         estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
-        alternatives: replacements.of(&effect, structured).effects,
+        alternatives: best.map_or_else(Vec::new, |(evidence, best)| alternatives(evidence, best, &effect)),
         held_out_after: first_with(&effect),
         effect,
     };
     added.iter().cloned().map(one).collect()
+}
+
+/// What is claimed of an effect: of several orders of a harmonic, that of the one that is least sure.
+fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
+    let parts = effect.parts();
+    let claims = parts.iter().map(|part| evidence.claims_of(part)).collect::<Option<Vec<Claims>>>()?;
+    claims.into_iter().min_by(|a, b| a.law.1.total_cmp(&b.law.1))
+}
+
+/// What may stand in the place of an effect: of a family at one place the most probable.
+fn alternatives(evidence: &Evidence, best: &Explanation, effect: &Effect) -> Vec<Effect> {
+    let mut all: Vec<Effect> = Vec::new();
+    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best)) {
+        let is_known = |known: &Effect| known.name_and_place() == other.name_and_place();
+        // Other times of the same shift are the same effect; other orders of a harmonic are not.
+        if !all.iter().any(is_known) && !(effect.is_searched() && is_known(effect)) {
+            all.push(other);
+        }
+    }
+    all
 }

@@ -5,13 +5,10 @@
 //! coefficients, predictions go to zero where nothing was measured. The prior's σ is the one that predicts best when whole
 //! parts of a joint's range are left out.
 
-use nalgebra::DMatrix;
-
 use super::super::candidates::joined;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::PartSquares;
-use super::super::smooth_term::SmoothTerm;
 use super::rounds::{Retested, Rounds};
 use crate::identify::IdentifyError;
 use crate::model::effect;
@@ -23,8 +20,8 @@ use crate::quantity::Unit;
 pub const HARMONICS: &str = "joint-harmonic.*";
 
 /// The fit with every order of the joints whose harmonics are many, and 1 σ of their prior \[rad\]; the fit, settled, where
-/// they are few or no common prior can hold them. And whether the fit is another than it was.
-pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>, bool), IdentifyError> {
+/// they are few or no common prior can hold them.
+pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
     let rules = rounds.data.rules;
     let coefficients = coefficients(&fitted);
     let all = |own| all_orders(own, &rounds.declared, rules.several_orders);
@@ -32,13 +29,12 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
         rounds.added(&fitted).into_iter().map(all).fold(rounds.declared.clone(), |all, own| joined(&all, &own));
     let dense = fitted.with_effects(&effects);
     if coefficients.len() < rules.many_coefficients || !takes_prior(&dense) {
-        let changed = !fitted.found.termination.converged();
-        return Ok((rounds.settled(fitted)?, None, changed));
+        return Ok((rounds.settled(fitted)?, None));
     }
     let squares: f64 = coefficients.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / coefficients.len() as f64).sqrt();
     let first = rounds.fit_on(with_scale(dense.clone(), found), &fitted)?;
-    let scale = best_scale(&first, rounds.data, &rounds.smooth_terms, found);
+    let scale = best_scale(&first, rounds.data, found);
     let mut filled = rounds.fit_whole(with_scale(dense, scale), &first)?;
     // What more harmonics explain need not be explained by anything else.
     loop {
@@ -48,7 +44,7 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
         let leaving: Vec<Effect> =
             rounds.tested(&filled).into_iter().filter(leaves).map(|tested| tested.effect).collect();
         if leaving.is_empty() {
-            return Ok((filled, Some(scale), true));
+            return Ok((filled, Some(scale)));
         }
         let kept = rounds.added(&filled).into_iter().filter(|own| !leaving.contains(own));
         let effects = kept.fold(rounds.declared.clone(), |all, own| joined(&all, &own));
@@ -103,14 +99,11 @@ fn with_scale(mut problem: Problem, sigma: f64) -> Problem {
 
 /// The scale \[rad\] of the prior on harmonics with which parts of the joints' ranges that are left out are predicted best,
 /// in the linear neighbourhood of the fit.
-fn best_scale(fitted: &Fitted, data: &Data, smooth_terms: &[SmoothTerm], found: f64) -> f64 {
+fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
     let own = coefficients(fitted);
-    let linearised = fitted.linearised(data, &[], smooth_terms);
-    let terms: Vec<DMatrix<f64>> = smooth_terms.iter().map(|term| term.columns(&linearised)).collect();
-    let columns = linearised.fitted();
-    let columns: Vec<_> = columns.column_iter().chain(terms.iter().flat_map(DMatrix::column_iter)).collect();
+    let linearised = fitted.linearised(data, &[]);
     let parts = parts_of_ranges(&fitted.problem, data);
-    let squares = PartSquares::new(&DMatrix::from_columns(&columns), linearised.residual(), &parts);
+    let squares = PartSquares::new(&linearised.fitted(), linearised.residual(), &parts);
     let parameters = fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
     let priors: Vec<(f64, Option<f64>)> =
         parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma))).collect();

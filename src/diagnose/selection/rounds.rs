@@ -6,7 +6,6 @@ use super::super::candidates::{Candidates, joined};
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{Scan, tries};
-use super::super::smooth_term::SmoothTerm;
 use super::pick::{Pick, pick};
 use crate::identify::{ErrorSummary, IdentifyError, Options};
 use crate::problem::{Effect, Problem};
@@ -35,8 +34,6 @@ pub(super) struct Rounds<'a> {
     pub options: &'a Options,
     /// Effects of the problem itself, which stay.
     pub declared: Vec<Effect>,
-    /// Smooth structure that is known of and kept out of the search.
-    pub smooth_terms: Vec<SmoothTerm>,
     /// What each round came to.
     pub done: Vec<Round>,
     /// Sets of effects that were fitted.
@@ -46,7 +43,7 @@ pub(super) struct Rounds<'a> {
 impl<'a> Rounds<'a> {
     /// None yet.
     pub fn new(data: &'a Data<'a>, options: &'a Options, declared: Vec<Effect>) -> Self {
-        Self { data, options, declared, smooth_terms: Vec::new(), done: Vec::new(), seen: Vec::new() }
+        Self { data, options, declared, done: Vec::new(), seen: Vec::new() }
     }
 
     /// Effects that the loop added.
@@ -63,8 +60,8 @@ impl<'a> Rounds<'a> {
         while self.done.len() < self.data.rules.rounds {
             let candidates = Candidates::of(&fitted.problem, self.data);
             let picks = {
-                let linearised = fitted.linearised(self.data, &candidates.testable, &self.smooth_terms);
-                let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
+                let linearised = fitted.linearised(self.data, &candidates.testable);
+                let fit = fitted.neighbourhood(&linearised);
                 let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
                 pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1)
             };
@@ -122,13 +119,8 @@ impl<'a> Rounds<'a> {
         self.done.push(Round { effects, identification: errors.identification, held_out: errors.held_out });
     }
 
-    /// Sets of effects fitted so far may be fitted again.
-    pub fn forget(&mut self) {
-        self.seen.clear();
-    }
-
     /// Whether these effects were not fitted together before.
-    fn is_new(&mut self, fitted: &Fitted) -> bool {
+    pub fn is_new(&mut self, fitted: &Fitted) -> bool {
         let effects = fitted.effects();
         let is_same = |seen: &Vec<Effect>| seen.len() == effects.len() && effects.iter().all(|own| seen.contains(own));
         let new = !self.seen.iter().any(is_same);
@@ -171,8 +163,8 @@ impl<'a> Rounds<'a> {
     /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect
     /// that was picked.
     fn criterion(&self, fitted: &Fitted, picked: &Effect) -> f64 {
-        let linearised = fitted.linearised(self.data, &[], &self.smooth_terms);
-        let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
+        let linearised = fitted.linearised(self.data, &[]);
+        let fit = fitted.neighbourhood(&linearised);
         let candidates = Candidates::of(&fitted.problem, self.data).testable;
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
@@ -208,8 +200,8 @@ impl<'a> Rounds<'a> {
     /// Effects of a fit with the p of what it would lose without each, corrected for the tries: those of all orders of a
     /// harmonic together.
     pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
-        let linearised = fitted.linearised(self.data, &[], &self.smooth_terms);
-        let fit = fitted.neighbourhood(&linearised, &self.smooth_terms);
+        let linearised = fitted.linearised(self.data, &[]);
+        let fit = fitted.neighbourhood(&linearised);
         let mut everything = Candidates::of(&fitted.problem, self.data).testable;
         let first = everything.len();
         everything.extend(own.iter().flat_map(Effect::parts));

@@ -309,15 +309,18 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
     }
 }
 
-/// The correction of structure without a cause, less its mean; none where it is one of the order of the rows.
+/// The correction of structure without a cause, less its mean; none where it is no function of one covariate, or of the order of the
+/// rows.
 pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
-    let correction = left.correction.as_ref()?;
+    let of = left.correction.as_ref()?.curve.as_ref()?;
+    let mut curve: Vec<(f64, f64)> = of.points.iter().map(|point| (point.covariate, point.correction)).collect();
+    curve.sort_by(|a, b| a.0.total_cmp(&b.0));
     let trapezoid = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) * 0.5 * (pair[0].1 + pair[1].1);
-    let width = correction.curve.last()?.0 - correction.curve.first()?.0;
-    let area: f64 = correction.curve.windows(2).map(trapezoid).sum();
+    let width = curve.last()?.0 - curve.first()?.0;
+    let area: f64 = curve.windows(2).map(trapezoid).sum();
     let mean = if width > 0.0 { area / width } else { 0.0 };
-    let curve: Vec<(f64, f64)> = correction.curve.iter().map(|&(x, y)| (x, y - mean)).collect();
-    let across = match correction.covariate {
+    curve.iter_mut().for_each(|(_, y)| *y -= mean);
+    let across = match of.covariate {
         Covariate::Temperature => Quantity::temperature(),
         Covariate::Time => Quantity::elapsed(range(curve.iter().map(|at| at.0)).1),
         Covariate::Payload => Quantity::new("payload [kg]", 1.0),
@@ -325,12 +328,13 @@ pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
         Covariate::Command(joint) => Quantity::command(problem, joint + 1),
         _ => return None,
     };
-    let most = correction.points.iter().map(|point| point.lever).fold(0.0, f64::max);
-    let telling = correction.points.iter().filter(|point| point.lever > LEAST_LEVER * most);
+    let most = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
+    let telling = of.points.iter().filter(|point| point.lever > LEAST_LEVER * most);
     let points: Vec<Point> =
         telling.map(|point| Point { x: point.covariate, y: point.value - mean, held_out: false }).collect();
-    let up = Quantity::error(&left.place.to_string(), correction.unit, largest(&points, &curve));
-    let title = format!("{}: structure without a known cause", left.place);
+    let place = left.part?;
+    let up = Quantity::error(&place.to_string(), of.unit, largest(&points, &curve));
+    let title = format!("{place}: structure without a known cause");
     Some(Cause { title, across, up, points, curve, reading: COORDINATE })
 }
 

@@ -115,7 +115,7 @@ impl PlotData {
         let effects = closure.effects.iter();
         Ok(Self {
             causes: effects.filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &poses)).collect(),
-            trend: closure.unexplained.as_ref().and_then(|left| cause::unexplained(left, &closure.closed)),
+            trend: closure.unexplained.iter().find_map(|left| cause::unexplained(left, &closure.closed)),
             ..Self::of(&poses, stages, &after, &closure.after, closure.findings.clone())
         })
     }

@@ -1,0 +1,92 @@
+//! Functions of what is known of a pose, as sums of a few columns.
+
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnose::covariate::Covariate;
+
+/// Margin beyond the range on either side, where functions need not be flat.
+const MARGIN: f64 = 0.25;
+/// Variance of a basis function, of that of the first, below which it is left out.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// A covariate at every pose.
+pub(super) struct Known {
+    pub covariate: Covariate,
+    /// As measured.
+    pub values: Vec<f64>,
+    /// From 0 to 1 over the range; beyond it the nearer end.
+    pub scaled: Vec<f64>,
+    /// Of the poses that hypotheses are weighed on.
+    pub range: (f64, f64),
+    /// Different values among them.
+    pub levels: usize,
+}
+
+impl Known {
+    /// A covariate that varies over the first `weighed` poses.
+    pub fn of(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
+        let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !(high > low && (high - low).is_finite()) {
+            return None;
+        }
+        let mut sorted = values[..weighed].to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let scaled = values.iter().map(|value| ((value - low) / (high - low)).clamp(0.0, 1.0)).collect();
+        Some(Self { covariate, values, scaled, range: (low, high), levels: sorted.len() })
+    }
+}
+
+/// Whether a function of these two is looked for.
+pub(super) fn goes_with(one: Covariate, other: Covariate) -> bool {
+    use Covariate::{Approach, Command, Row, Temperature, Time};
+    match (one, other) {
+        (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),
+        (Command(_), Command(_)) | (Temperature, Time | Row) | (Time | Row, Temperature) => true,
+        _ => false,
+    }
+}
+
+/// Cosines over the range and its margin, each with the deviation that a Gaussian process of squared-exponential covariance
+/// with that length has along it [Solin & Särkkä 2020]; shape = (poses, functions).
+pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
+}
+
+fn cosine(k: usize, u: f64) -> f64 {
+    (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
+}
+
+/// Deviations along the cosines, down to a negligible variance.
+fn weights(length: f64) -> Vec<f64> {
+    let variance = |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2)).exp();
+    let count = (0..usize::MAX).find(|&k| variance(k) <= NEGLIGIBLE).unwrap_or(0);
+    (0..count).map(|k| variance(k).sqrt()).collect()
+}
+
+/// Products of cosines, one of each covariate.
+pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
+    for _ in scaled {
+        let longer =
+            |index: &Vec<usize>| (0..weights.len()).map(|k| [index.as_slice(), &[k]].concat()).collect::<Vec<_>>();
+        indices = indices.iter().flat_map(longer).collect();
+    }
+    let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
+    indices.retain(|index| weight(index).powi(2) > NEGLIGIBLE);
+    DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
+        let index = &indices[j];
+        weight(index) * index.iter().zip(scaled).map(|(&k, scaled)| cosine(k, scaled[row])).product::<f64>()
+    })
+}
+
+/// Columns times functions of the pose: every column with every function, shape = (3 N, columns · functions).
+pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
+    let k = functions.ncols();
+    DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| at[j / k][row] * functions[(row / 3, j % k)])
+}

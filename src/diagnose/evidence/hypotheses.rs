@@ -1,0 +1,76 @@
+//! All hypotheses about what a fit leaves, with their columns at some poses.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::columns::{Candidate, Columns, slots};
+use super::functions::Known;
+use super::{Explanation, Hypothesis};
+use crate::diagnose::candidates::Candidates;
+use crate::diagnose::covariate::Covariate;
+use crate::diagnose::data::Data;
+use crate::diagnose::fitted::Fitted;
+use crate::diagnose::neighbourhood::Linearised;
+use crate::model::parameter::Slot;
+use crate::problem::Effect;
+
+/// A fit linearised at some rows, with every hypothesis.
+pub(in crate::diagnose) struct Hypotheses<'a> {
+    pub linearised: Linearised<'a>,
+    /// Effects that the search added, part by part.
+    pub added: Vec<Effect>,
+    /// Their columns among those of the fit.
+    pub unknowns: Vec<usize>,
+    pub(super) all: Vec<Candidate>,
+    covariates: Vec<Known>,
+}
+
+impl<'a> Hypotheses<'a> {
+    /// About what the fit without what was `added` leaves of the first `weighed` of some rows.
+    pub fn of(fitted: &'a Fitted, data: &Data<'a>, added: &[Effect], rows: &[usize], weighed: usize) -> Self {
+        let candidates = Candidates::of(&fitted.problem, data).testable;
+        let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+        let own: Vec<Vec<usize>> = added.iter().map(|part| fitted.unknowns_of(part)).collect();
+        let unknowns = own.concat();
+        let linearised = fitted.linearised_with(data, rows, &candidates, &slots(&fitted.problem));
+        let fit = linearised.fitted();
+        let known = added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
+        let new = candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
+        let effects: Vec<(Effect, DMatrix<f64>)> = known.chain(new).collect();
+        let how = (data.measurements.time_measured, data.rules, weighed);
+        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &effects);
+        Self { linearised, added, unknowns, all, covariates }
+    }
+
+    /// The columns of a hypothesis of an explanation, and 1 σ of their coefficients.
+    pub fn columns(&self, explanation: &Explanation, hypothesis: &Hypothesis) -> Option<(&DMatrix<f64>, f64)> {
+        let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
+        let (_, &(variant, sigma)) = members.find(|(known, _)| known.says(hypothesis))?;
+        let own = self.all.iter().find(|own| own.variant == variant && own.hypothesis.says(hypothesis))?;
+        Some((&own.columns, sigma))
+    }
+
+    /// The covariates that a hypothesis depends on.
+    fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &Known> {
+        self.covariates.iter().filter(|known| hypothesis.depends_on.contains(&known.covariate))
+    }
+
+    /// Their ranges where hypotheses were weighed.
+    pub fn ranges(&self, hypothesis: &Hypothesis) -> Vec<(Covariate, (f64, f64))> {
+        self.covariates(hypothesis).map(|known| (known.covariate, known.range)).collect()
+    }
+
+    /// For each pose from number `first` on, whether it is within those ranges.
+    pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
+        let within = |known: &Known, pose: usize| (known.range.0..=known.range.1).contains(&known.values[pose]);
+        let poses = self.linearised.poses().len();
+        (first..poses).map(|pose| self.covariates(hypothesis).all(|known| within(known, pose))).collect()
+    }
+
+    /// Values of the only covariate of a function at one coordinate of a joint, and the lever of that coordinate; `None` for others.
+    pub fn coordinate(&self, hypothesis: &Hypothesis) -> Option<(Covariate, Slot, &[f64], DVector<f64>)> {
+        let slot = hypothesis.slot.filter(|slot| matches!(slot, Slot::Joint { .. }))?;
+        let mut covariates = self.covariates(hypothesis);
+        let (only, None) = (covariates.next()?, covariates.next()) else { return None };
+        Some((only.covariate, slot, &only.values, self.linearised.place(slot)?))
+    }
+}
