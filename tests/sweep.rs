@@ -11,6 +11,8 @@ mod common;
 mod arms;
 #[path = "sweep/bench.rs"]
 mod bench;
+#[path = "sweep/calibration.rs"]
+mod calibration;
 #[path = "sweep/families.rs"]
 mod families;
 #[path = "sweep/full.rs"]

@@ -7,6 +7,7 @@ use super::data::Data;
 use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part};
 use super::fitted::Fitted;
 use super::residual_tests::Findings;
+use super::selection::Found;
 use crate::identify::ErrorSummary;
 use crate::problem::Effect;
 use crate::quantity::Unit;
@@ -24,6 +25,20 @@ pub struct Unexplained {
     pub claims: Option<Claims>,
     /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out.
     pub correction: Option<Correction>,
+}
+
+impl Unexplained {
+    /// What is known where an effect of the model stands for a law that is not sure.
+    pub(super) fn of_found(found: &Found) -> Option<Self> {
+        let claims = found.claims.clone()?;
+        Some(Self {
+            part: Some(claims.place.0),
+            depends_on: claims.depends_on.0.clone(),
+            p_value: found.p_value,
+            claims: Some(claims),
+            correction: None,
+        })
+    }
 }
 
 /// A smooth correction of one part's error as a function of what it depends on.
@@ -80,7 +95,7 @@ pub(super) fn without_law(
         let found = Unexplained {
             part: Some(hypothesis.part),
             depends_on: hypothesis.depends_on.clone(),
-            p_value: evidence.chance(|other| other.effect().is_none()),
+            p_value: evidence.chance(best),
             claims: Some(claims),
             correction: None,
         };

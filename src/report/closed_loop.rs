@@ -12,7 +12,8 @@ use super::quantity::{decimals, mm, number, p_value};
 use super::render::{Report, report, text};
 use super::{effect, findings, trace};
 use crate::diagnose::{
-    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, Trace, Unexplained, Verdict,
+    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, SelectionRules, Trace, Unexplained,
+    Verdict,
 };
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
 use crate::problem::{Effect, JointKind, Problem};
@@ -238,10 +239,17 @@ fn verdict_word(verdict: Verdict) -> &'static str {
 
 /// The outcome in a sentence or two.
 fn verdict(closure: &ClosedLoop) -> String {
-    let found = match closure.effects.as_slice() {
+    let stated = SelectionRules::DEFAULT.stated;
+    let (named, such): (Vec<&Found>, Vec<&Found>) = closure.effects.iter().partition(|found| found.is_named(stated));
+    let named = match named.as_slice() {
         [] => "No effect was found".to_owned(),
         [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
         several => format!("{} effects were found", several.len()),
+    };
+    let found = match such.len() {
+        0 => named,
+        1 => format!("{named}; of one more the place is known and not the law"),
+        more => format!("{named}; of {more} more the places are known and not the laws"),
     };
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
@@ -343,7 +351,14 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
         named.extend((more > 0).then(|| format!("and {more} more")));
         details.push(format!("these data do not distinguish it from: {}", named.join("; ")));
     }
-    Point { text: effect::both(&found.effect, &closure.before), details, mark: None }
+    let own = effect::both(&found.effect, &closure.before);
+    let text = match &found.claims {
+        Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
+            format!("{}: its law is not known, such as: {own}", claims.place.0)
+        }
+        _ => own,
+    };
+    Point { text, details, mark: None }
 }
 
 /// What each round of fit, trace and refit came to.

@@ -88,13 +88,22 @@ pub struct Set {
 /// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd ones; stiffnesses 18 % off
 /// nominal, each by itself, `EI_y` and `EI_z` too, although the problem declares them equal.
 pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
+    with_noise(effects, size, seed, DRAWN)
+}
+
+/// The same without noise.
+pub fn noiseless(size: Size, seed: u64) -> Set {
+    with_noise(&[], size, seed, &DRAWN.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0"))
+}
+
+fn with_noise(effects: &[TrueEffect], size: Size, seed: u64, drawn: &str) -> Set {
     let mut arm = lunar();
     for beam in arm.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
         // A hair's breadth apart, so that each is drawn by itself.
         beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
     }
     let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
-    let mut truth = Truth::parse(&format!("{given}{DRAWN}"), Path::new("truth.toml"), &arm).unwrap();
+    let mut truth = Truth::parse(&format!("{given}{drawn}"), Path::new("truth.toml"), &arm).unwrap();
     truth.effects = effects.to_vec();
     truth.held_out = flexcal::simulate::HeldOutRows::AllBut(size.identification);
     let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();

@@ -12,7 +12,7 @@ use crate::judged::{Judged, name};
 use crate::outside::{KINDS, Left};
 
 /// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
-fn sets(otherwise: u64) -> u64 {
+pub fn sets(otherwise: u64) -> u64 {
     env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
 }
 

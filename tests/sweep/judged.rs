@@ -1,6 +1,6 @@
 //! One set through the loop, and what the loop makes of it beside the truth.
 
-use flexcal::diagnose::{ClosedLoop, Covariate, Verdict, close};
+use flexcal::diagnose::{ClosedLoop, Covariate, Unexplained, Verdict, close};
 use flexcal::identify::{Identification, Options, identify};
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
@@ -87,9 +87,7 @@ impl Judged {
     pub fn line(&self, name: &str, size: Size, seed: u64) -> String {
         let names = |effects: &mut dyn Iterator<Item = &Effect>| effects.map(named).collect::<Vec<_>>().join(" + ");
         let closure = &self.closure;
-        let cause = closure.unexplained.as_ref().map_or_else(String::new, |left| {
-            format!("{} {} p {:.1e}", left.place, words(&left.depends_on), left.p_value)
-        });
+        let cause = closure.unexplained.first().map_or_else(String::new, located);
         let failed: Vec<String> = closure
             .findings
             .tests
@@ -192,4 +190,10 @@ pub fn name(lacking: &[Lacking]) -> String {
 /// Covariates by name, with spaces between.
 pub fn words(covariates: &[Covariate]) -> String {
     covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Where structure without a law is, and what it depends on.
+pub fn located(left: &Unexplained) -> String {
+    let place = left.part.map_or_else(|| "nowhere".to_owned(), |part| part.to_string());
+    format!("{place} {} p {:.1e}", words(&left.depends_on), left.p_value)
 }

@@ -1,11 +1,11 @@
 //! What no catalogue holds: a bump or a step of one joint's coordinate.
 
-use flexcal::diagnose::{ClosedLoop, close};
+use flexcal::diagnose::{ClosedLoop, Part, close};
 use flexcal::identify::Options;
 use flexcal::simulate::Shape;
 
 use crate::bench::{NOISE, Size, lunar, measured, outside};
-use crate::judged::{named, words};
+use crate::judged::{located, named, words};
 
 /// A bump or step: joint, shape; height, centre and width in degrees.
 pub type Outside = (usize, Shape, [f64; 3]);
@@ -42,9 +42,9 @@ impl Left {
     pub fn of((joint, shape, values): Outside, size: Size, seed: u64) -> Self {
         let set = measured(&[outside(joint, shape, values)], size, seed);
         let closure = close(&lunar(), &set.data, &Options::default()).unwrap();
-        let left = closure.unexplained.as_ref();
+        let left = closure.unexplained.first();
         let located = left.is_some_and(|left| {
-            left.place.to_string() == format!("joint {joint}") && words(&left.depends_on) == format!("q{joint}")
+            left.part == Some(Part::Joint(joint - 1)) && words(&left.depends_on) == format!("q{joint}")
         });
         let correction = left.and_then(|left| left.correction.as_ref());
         Self {
@@ -57,10 +57,7 @@ impl Left {
 
     /// One line of figures.
     pub fn line(&self, (joint, shape, values): Outside, size: Size, seed: u64) -> String {
-        let left = self.closure.unexplained.as_ref();
-        let place = left.map_or_else(String::new, |left| {
-            format!("{} {} p {:.1e}", left.place, words(&left.depends_on), left.p_value)
-        });
+        let place = self.closure.unexplained.first().map_or_else(String::new, located);
         let effects: Vec<String> = self.closure.effects.iter().map(|found| named(&found.effect)).collect();
         format!(
             "outside {joint} {shape:?} {values:?};{};{seed};{:?};{};{place};{};{:.3};{:.3};{}",

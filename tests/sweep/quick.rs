@@ -1,6 +1,6 @@
 //! A representative part of the sweep, and the cases of `tests/cases`.
 
-use flexcal::diagnose::{Covariate, Verdict, close};
+use flexcal::diagnose::{Covariate, Part, Verdict, close};
 use flexcal::identify::{Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, EffectDeclaration};
@@ -119,9 +119,9 @@ fn a_case_of_what_no_catalogue_holds() {
     let measurements = read(&problem, &["tests/cases/g-not-in-catalogue.csv"]);
     let data = Dataset::of(&problem, measurements).unwrap();
     let closure = close(&problem, &data, &Options::default()).unwrap();
-    let left = closure.unexplained.unwrap();
-    assert_eq!((left.place.to_string().as_str(), left.depends_on), ("joint 2", vec![Covariate::Command(1)]));
-    let (before, after) = (closure.before.fit.fitted.held_out, left.correction.unwrap().held_out);
+    let [left] = closure.unexplained.as_slice() else { panic!("{:?}", closure.unexplained) };
+    assert_eq!((left.part, left.depends_on.as_slice()), (Some(Part::Joint(1)), [Covariate::Command(1)].as_slice()));
+    let (before, after) = (closure.before.fit.fitted.held_out, left.correction.as_ref().unwrap().held_out);
     println!("g-not-in-catalogue: {:.4} mm, corrected {:.4} mm", before.rms.norm * 1e3, after.rms.norm * 1e3);
     assert!(2.0 * after.rms.norm < before.rms.norm);
 }

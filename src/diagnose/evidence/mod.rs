@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use super::covariate::Covariate;
 use super::data::Data;
 use super::fitted::Fitted;
+use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
 use columns::Candidate;
@@ -59,6 +60,8 @@ impl Explanation {
 pub struct Evidence {
     /// Most probable first.
     pub explanations: Vec<Explanation>,
+    /// For effects of the sure explanation, others that do nearly the same in these poses.
+    look_alikes: Vec<(Effect, Hypothesis)>,
 }
 
 /// What is claimed of a hypothesis, from the least to the most.
@@ -94,33 +97,53 @@ impl Evidence {
         self.explanations.iter().find(|explanation| as_many(explanation.hypotheses.len()) >= level)
     }
 
-    /// Chance that noise alone makes a hypothesis of a kind as probable, for all that were looked at together: of a ratio of
-    /// likelihoods no more than 1 in B is above B.          [Ville 1939]
-    pub fn chance(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
-        let probability = self.probability(of).clamp(NEGLIGIBLE, 1.0);
-        ((1.0 - probability).max(NEGLIGIBLE) / probability).min(1.0)
+    /// Chance that fewer hypotheses than `best` has and noise make as many as probable, for all that were looked at together: a ratio
+    /// of likelihoods is above B no more than once in B times.          [Ville 1939]
+    pub fn chance(&self, best: &Explanation) -> f64 {
+        let is_fewer = |known: &&Explanation| known.hypotheses.len() < best.hypotheses.len();
+        let fewer: f64 = self.explanations.iter().filter(is_fewer).map(|known| known.probability).sum();
+        (fewer.max(NEGLIGIBLE) / (1.0 - fewer).max(NEGLIGIBLE)).min(1.0)
     }
 
-    /// Explanations with an effect in the place of another of `best`, the most probable first: their sets of hypotheses.
-    pub(super) fn exchanged(&self, best: &Explanation) -> impl Iterator<Item = &Explanation> {
+    /// Explanations with an effect in the place of another of `best`: the most probable ones, and those with one that does nearly the
+    /// same, which strong effects decide only at a fit of their own.
+    pub(super) fn exchanged(&self, best: &Explanation, most: usize) -> Vec<Explanation> {
         let differ = |one: &Explanation, other: &Explanation| {
             let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
             let new: Vec<&Hypothesis> = one.hypotheses.iter().filter(is_new).collect();
             matches!(new.as_slice(), [only] if only.effect().is_some())
         };
-        let is_exchange = move |other: &&Explanation| {
+        let is_exchange = |other: &&Explanation| {
             other.hypotheses.len() == best.hypotheses.len() && differ(best, other) && differ(other, best)
         };
-        self.explanations.iter().filter(is_exchange)
+        let mut all: Vec<Explanation> = self.explanations.iter().filter(is_exchange).take(most).cloned().collect();
+        for (effect, other) in &self.look_alikes {
+            let Some(place) = best.hypotheses.iter().position(|own| own.effect() == Some(effect)) else { continue };
+            let mut exchanged = Explanation { probability: 0.0, ..best.clone() };
+            exchanged.hypotheses[place] = other.clone();
+            exchanged.functions[place].0 = 0;
+            let is_known = |known: &Explanation| known.hypotheses.iter().all(|own| exchanged.hypotheses.contains(own));
+            if !all.iter().any(is_known) && !best.hypotheses.contains(other) {
+                all.push(exchanged);
+            }
+        }
+        all
     }
 
     /// The same with other odds for some explanations: ln of those to `best`, each at a fit of its own.
     pub(super) fn corrected(mut self, best: &Explanation, odds: &[(Explanation, f64)]) -> Self {
-        let says = |one: &Explanation, other: &Explanation| one.hypotheses == other.hypotheses;
-        let of_best = self.explanations.iter().find(|own| says(own, best)).map_or(0.0, |own| own.probability);
+        let of_best =
+            self.explanations.iter().find(|own| own.hypotheses == best.hypotheses).map_or(0.0, |own| own.probability);
         for (explanation, ln_odds) in odds {
-            if let Some(own) = self.explanations.iter_mut().find(|own| says(own, explanation)) {
-                own.probability = of_best * ln_odds.exp();
+            // Beyond that nothing is left of the best one.
+            let probability = of_best * ln_odds.min(40.0).exp();
+            let is_same = |own: &&mut Explanation| {
+                own.hypotheses.len() == explanation.hypotheses.len()
+                    && own.hypotheses.iter().all(|known| explanation.hypotheses.contains(known))
+            };
+            match self.explanations.iter_mut().find(is_same) {
+                Some(own) => own.probability = probability,
+                None => self.explanations.push(Explanation { probability, ..explanation.clone() }),
             }
         }
         let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
@@ -254,26 +277,43 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    if std::env::var("FXDEBUG").is_ok() {
-        eprintln!("added {:?} unknowns {:?}", hypotheses.added, hypotheses.unknowns);
-        for one in explanations.iter().take(8) {
-            let words: Vec<String> = one
-                .hypotheses
-                .iter()
-                .map(|h| {
-                    format!(
-                        "{} {} {:?}",
-                        match &h.law {
-                            Law::Effect(e) => format!("{}{}", e.name(), e.place()),
-                            other => format!("{other:?}"),
-                        },
-                        h.part,
-                        h.depends_on
-                    )
-                })
-                .collect();
-            eprintln!("  {:.3} {words:?} {:?}", one.probability, one.functions);
+    let mut evidence = Evidence { explanations, look_alikes: Vec::new() };
+    if let Some(best) = evidence.sure(data.rules.sure) {
+        evidence.look_alikes = look_alikes(&best.effects(), &hypotheses, &blocks, data.rules);
+    }
+    Some(evidence)
+}
+
+/// For each effect the few others that do nearly the same with everything fitted projected out.
+fn look_alikes(
+    effects: &[Effect],
+    hypotheses: &Hypotheses,
+    blocks: &[Block],
+    rules: &SelectionRules,
+) -> Vec<(Effect, Hypothesis)> {
+    let of = |effect: &Effect| hypotheses.all.iter().position(|own| own.hypothesis.effect() == Some(effect));
+    let mut all = Vec::new();
+    for effect in effects {
+        let Some(own) = of(effect) else { continue };
+        let angle = |(k, candidate): (usize, &Candidate)| {
+            let other = candidate.hypothesis.effect()?;
+            // Other times of a shift and other orders of a harmonic stand beside each other in the search.
+            if k == own || other.name_and_place() == effect.name_and_place() {
+                return None;
+            }
+            let angle = blocks[own].angle(&blocks[k]).filter(|angle| *angle < rules.alike)?;
+            Some((angle, candidate.hypothesis.clone()))
+        };
+        let mut near: Vec<(f64, Hypothesis)> = hypotheses.all.iter().enumerate().filter_map(angle).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut known: Vec<String> = Vec::new();
+        for (_, hypothesis) in near {
+            let name = hypothesis.effect().map(Effect::name_and_place).unwrap_or_default();
+            if !known.contains(&name) && known.len() < rules.look_alikes {
+                known.push(name);
+                all.push((effect.clone(), hypothesis));
+            }
         }
     }
-    Some(Evidence { explanations })
+    all
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::super::neighbourhood::orthonormal;
 use super::super::rules::SelectionRules;
 use super::marginal::{Noise, of_block, over_noise};
 
@@ -29,6 +30,17 @@ impl Block {
         // The narrow side is transposed: this is the product that is fast.
         gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
         Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative: never_negative.to_vec() }
+    }
+
+    /// Largest principal angle \[rad\] to another's columns; `None` where one of them is nothing.
+    pub fn angle(&self, other: &Self) -> Option<f64> {
+        let (a, _) = orthonormal(&self.columns, None);
+        let (b, _) = orthonormal(&other.columns, None);
+        if a.is_empty() || b.is_empty() {
+            return None;
+        }
+        let cosines = a.tr_mul(&b).singular_values();
+        cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Found {
     pub estimates: Vec<Estimate>,
     /// Effects that these data cannot tell from it, best first.
     pub alternatives: Vec<Effect>,
+    /// Probability that it or one of the alternatives is at work; `None` where no evidence could be weighed.
+    pub one_of_few: Option<f64>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
     /// fit where no round is such.
     pub held_out_after: ErrorSummary,
@@ -50,6 +52,11 @@ impl Found {
     /// Whether it is named as found: its law is surer than `stated`. Below that a place is found, and the law is such as this one.
     pub fn is_named(&self, stated: f64) -> bool {
         self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
+    }
+
+    /// Whether at least it or one of its alternatives is the law.
+    fn is_one_of_few(&self, stated: f64) -> bool {
+        self.one_of_few.is_none_or(|probability| probability >= stated)
     }
 }
 
@@ -126,10 +133,13 @@ pub fn close_by(
         evidence.map(|evidence| refitted(&rounds, &fitted, evidence)).transpose()?.map(|(evidence, _)| evidence);
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, &added));
+    let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
+    // Where a place is found and no law is sure, not even that it is one of a few, what is left is not explained.
+    let is_open = |found: &&Found| !found.is_named(rules.stated) && !found.is_one_of_few(rules.stated);
+    unexplained.extend(effects.iter().filter(is_open).filter_map(Unexplained::of_found));
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
-    let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::NothingFound,
@@ -187,7 +197,7 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     };
     let functions = best.without_law();
     let Some(own) = ln_posterior(fitted, data, &added, &functions) else { return Ok((evidence, None)) };
-    let rivals: Vec<Explanation> = evidence.exchanged(&best).take(rules.rivals).cloned().collect();
+    let rivals = evidence.exchanged(&best, rules.rivals);
     let (mut odds, mut better): (Vec<(Explanation, f64)>, Option<(f64, Fitted)>) = (Vec::new(), None);
     for rival in rivals {
         let next = rounds.fit(fitted, &rival.effects())?;
@@ -232,13 +242,21 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
         let step = rounds.done.iter().find(|step| holds(step) && step.effects.iter().all(stays));
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
-    let one = |effect: Effect| Found {
-        claims: best.and_then(|(evidence, _)| claims(evidence, &effect)),
-        p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
-        estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
-        alternatives: best.map_or_else(Vec::new, |(evidence, best)| alternatives(evidence, best, &effect)),
-        held_out_after: first_with(&effect),
-        effect,
+    let one = |effect: Effect| {
+        let alternatives = best.map_or_else(Vec::new, |(evidence, best)| alternatives(evidence, best, &effect));
+        let few = |own: &Effect| {
+            effect.covers(own) || alternatives.iter().any(|other| other.name_and_place() == own.name_and_place())
+        };
+        let one_of_few = best.map(|(evidence, _)| evidence.probability(|own| own.effect().is_some_and(few)));
+        Found {
+            one_of_few,
+            claims: best.and_then(|(evidence, _)| claims(evidence, &effect)),
+            p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
+            estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
+            held_out_after: first_with(&effect),
+            alternatives,
+            effect,
+        }
     };
     added.iter().cloned().map(one).collect()
 }

@@ -1,0 +1,221 @@
+//! Whether what is stated is true as often as its probability says, and whether noise of many kinds is taken for an effect:
+//! `cargo test --release --test sweep calibration -- --ignored --nocapture`.
+
+use flexcal::diagnose::{Verdict, close};
+use flexcal::identify::Options;
+use flexcal::measurement::{Dataset, Measurements};
+use nalgebra::Vector3;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal, StudentT};
+use rayon::prelude::*;
+
+use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
+use crate::families::{Lacking, catalogue};
+use crate::full::sets;
+use crate::judged::{Judged, Place, is_the_same, name};
+
+/// From this probability on an effect is named as found.
+const STATED: f64 = 0.9;
+
+/// One statement: its probability, and whether it is true.
+type Statement = (f64, bool);
+
+/// One to three effects of the catalogue, at different parts.
+fn drawn(seed: u64) -> Vec<Lacking> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (all, count) = (catalogue(), rng.random_range(1..=3));
+    let mut chosen: Vec<Lacking> = Vec::new();
+    while chosen.len() < count {
+        let mut one = all[rng.random_range(0..all.len())].clone();
+        // From half the size to twice it, where it has one.
+        let factor = 2.0_f64.powf(rng.random_range(-1.0..1.0));
+        let is_size = !matches!(one.effect, flexcal::problem::Effect::UnmodelledMass { .. });
+        one.values.iter_mut().take(if is_size { usize::MAX } else { 1 }).for_each(|value| *value *= factor);
+        if !chosen.iter().any(|known| known.effect.name() == one.effect.name()) {
+            chosen.push(one);
+        }
+    }
+    chosen
+}
+
+struct Set {
+    laws: Vec<Statement>,
+    places: Vec<Statement>,
+    shown: usize,
+    named: usize,
+    stated: usize,
+    ghosts: usize,
+    exact: bool,
+    close: bool,
+}
+
+fn judge(seed: u64) -> Set {
+    let lacking = drawn(seed);
+    let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
+    let judged = Judged::of(&lacking, size, seed);
+    println!("{}", judged.line(&name(&lacking), size, seed));
+    let true_law = |effect: &flexcal::problem::Effect| lacking.iter().any(|own| is_the_same(effect, &own.effect));
+    let found = &judged.closure.effects;
+    let problem = lunar();
+    let part = |effect: &flexcal::problem::Effect| {
+        effect.terms(&problem).first().map(|term| flexcal::diagnose::Part::of(term.slot))
+    };
+    let true_place = |place: flexcal::diagnose::Part| lacking.iter().any(|own| part(&own.effect) == Some(place));
+    let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
+    let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
+    let [shown, named, stated] = judged.counts();
+    let stands = found.iter().filter(|found| found.is_named(STATED));
+    Set {
+        laws: claims().map(|(found, claims)| (claims.law.1, true_law(&found.effect))).collect(),
+        places: claims()
+            .map(|(_, claims)| claims)
+            .chain(others)
+            .map(|claims| (claims.place.1, true_place(claims.place.0)))
+            .collect(),
+        shown,
+        named,
+        stated,
+        ghosts: stands.filter(|found| !true_law(&found.effect)).count(),
+        exact: judged.places.iter().zip(&judged.chance).all(|(place, chance)| *place == Place::Found || *chance > 1e-4)
+            && found.iter().all(|found| true_law(&found.effect)),
+        close: judged.after < 1.25 * judged.best,
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn what_is_stated_is_as_true_as_it_is_probable() {
+    let all: Vec<Set> = (5000..5000 + sets(300)).into_par_iter().map(judge).collect();
+    let count = |of: &dyn Fn(&Set) -> usize| all.iter().map(of).sum::<usize>();
+    let bins = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)];
+    for (what, statements) in [
+        ("law", &(|set: &Set| set.laws.clone()) as &dyn Fn(&Set) -> Vec<Statement>),
+        ("place", &|set| set.places.clone()),
+    ] {
+        for (low, high) in bins {
+            let within: Vec<Statement> =
+                all.iter().flat_map(statements).filter(|(p, _)| (low..high).contains(p)).collect();
+            let right = within.iter().filter(|(_, right)| *right).count();
+            println!("{what} {low} to {high}: {right} of {} true", within.len());
+        }
+    }
+    let (shown, named, stated) = (count(&|set| set.shown), count(&|set| set.named), count(&|set| set.stated));
+    let part = |of: &dyn Fn(&Set) -> bool| all.iter().filter(|set| of(set)).count();
+    println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
+    println!(
+        "{} of {} sets exact, {} with a ghost, {} within 1.25 of the truth declared",
+        part(&|set| set.exact),
+        all.len(),
+        part(&|set| set.ghosts > 0),
+        part(&|set| set.close)
+    );
+    let sure: Vec<Statement> = all.iter().flat_map(|set| set.laws.clone()).filter(|(p, _)| *p >= STATED).collect();
+    let right = sure.iter().filter(|(_, right)| *right).count();
+    assert!(100 * right >= 95 * sure.len(), "{right} of {} laws that were stated", sure.len());
+}
+
+/// Noise that is not as declared.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    White,
+    HeavyTails,
+    Correlated,
+    Outliers,
+    FiveTimes,
+    Fifth,
+    JointReadings,
+    ThreePoints,
+}
+
+/// Adds it, the same for the same seed.
+fn disturbed(data: Dataset, kind: Kind, seed: u64) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let Dataset { mut measurements, mut split } = data;
+    if let Kind::ThreePoints = kind {
+        let kept: Vec<usize> = (0..measurements.len()).collect();
+        let thrice: Vec<usize> = kept.iter().flat_map(|&row| [row; 3]).collect();
+        measurements = measurements.select(&thrice);
+        let rows = |rows: Vec<usize>| rows.into_iter().flat_map(|row| [3 * row, 3 * row + 1, 3 * row + 2]).collect();
+        split =
+            flexcal::measurement::Split { identification: rows(split.identification), held_out: rows(split.held_out) };
+    }
+    let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
+    let three = |rng: &mut ChaCha8Rng, of: &dyn Fn(&mut ChaCha8Rng) -> f64| Vector3::from_fn(|_, _| of(rng));
+    let (mut last, mut shared) = (three(&mut rng, &normal), Vector3::zeros());
+    for row in 0..measurements.len() {
+        let white = three(&mut rng, &normal);
+        let noise = match kind {
+            Kind::White | Kind::JointReadings => white,
+            Kind::HeavyTails => three(&mut rng, &|rng| StudentT::new(3.0).unwrap().sample(rng) / 3.0_f64.sqrt()),
+            Kind::Correlated => {
+                last = last * 0.8 + white * 0.6;
+                last
+            }
+            Kind::Outliers if rng.random_bool(0.03) => white * 50.0,
+            Kind::Outliers => white,
+            Kind::FiveTimes => white * 5.0,
+            Kind::Fifth => white / 5.0,
+            Kind::ThreePoints => {
+                if row % 3 == 0 {
+                    shared = three(&mut rng, &normal);
+                }
+                shared * 0.4_f64.sqrt() + white * 0.6_f64.sqrt()
+            }
+        };
+        measurements.positions[row] += noise * SIGMA;
+        if let Kind::JointReadings = kind {
+            let joints = measurements.joints;
+            for q in &mut measurements.configurations[row * joints..(row + 1) * joints] {
+                *q += 0.003_f64.to_radians() * normal(&mut rng);
+            }
+        }
+    }
+    Dataset::new(Measurements { ..measurements }, split)
+}
+
+#[test]
+#[ignore = "minutes"]
+fn noise_of_many_kinds_is_no_effect() {
+    let problem = lunar();
+    let kinds = [
+        Kind::White,
+        Kind::HeavyTails,
+        Kind::Correlated,
+        Kind::Outliers,
+        Kind::FiveTimes,
+        Kind::Fifth,
+        Kind::JointReadings,
+        Kind::ThreePoints,
+    ];
+    for kind in kinds {
+        let one = |seed: u64| {
+            let size = if seed.is_multiple_of(2) { SMALL } else { Size { identification: 60, held_out: 20 } };
+            let closure =
+                close(&problem, &disturbed(noiseless(size, seed).data, kind, seed), &Options::default()).unwrap();
+            let named = closure.effects.iter().filter(|found| found.is_named(STATED)).count();
+            let such = closure.effects.len() - named;
+            let located = closure.unexplained.iter().any(|left| left.claims.is_some());
+            let names: Vec<String> = closure.effects.iter().map(|found| crate::judged::named(&found.effect)).collect();
+            let left: Vec<String> = closure.unexplained.iter().map(crate::judged::located).collect();
+            if closure.verdict != Verdict::NothingFound {
+                println!("{kind:?} {seed}: {names:?} {left:?}");
+            }
+            [
+                usize::from(named > 0),
+                usize::from(such > 0),
+                usize::from(located),
+                usize::from(closure.verdict != Verdict::NothingFound),
+            ]
+        };
+        let count = sets(100);
+        let sums =
+            (6000..6000 + count).into_par_iter().map(one).reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|k| a[k] + b[k]));
+        println!(
+            "{kind:?}: of {count} sets {} name an effect, {} one such as, {} locate structure, {} are not nothing-found",
+            sums[0], sums[1], sums[2], sums[3]
+        );
+        let most = if let Kind::White = kind { count.div_ceil(100) + 1 } else { count * 3 / 100 + 2 };
+        assert!(sums[0] as u64 <= most, "{kind:?}: {} of {count}", sums[0]);
+    }
+}
