@@ -204,12 +204,16 @@ impl Fitted {
 /// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood of the fit without them.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let rows = data.rows();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
+    let most = (FEW * rows.len() as f64) as usize;
+    // The worst first.
     let far = |residual: &DVector<f64>| -> Vec<usize> {
         let squares: Vec<f64> = (0..rows.len()).map(|k| residual.fixed_rows::<3>(3 * k).norm_squared()).collect();
-        let mut ascending = squares.clone();
-        ascending.sort_by(f64::total_cmp);
-        let scatter = ascending.get(rows.len() / 2).map_or(0.0, |median| median / MEDIAN);
-        (0..rows.len()).filter(|&k| squares[k] > GROSS * scatter).collect()
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
+        let scatter = order.get(rows.len() / 2).map_or(0.0, |&middle| squares[middle] / MEDIAN);
+        order.retain(|&k| squares[k] > GROSS * scatter);
+        order
     };
     let whitened = |aside: &[usize]| {
         let here = fitted.linearised(data, &[]);
@@ -222,16 +226,20 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let errors = fitted.model.residuals(poses.clone(), &fitted.found.x);
     let plain: Vec<f64> =
         errors.iter().zip(&poses).flat_map(|(r, pose)| (r / pose.sigma).iter().copied().collect::<Vec<_>>()).collect();
-    let mut aside = far(&DVector::from_vec(plain));
+    let mut all = far(&DVector::from_vec(plain));
     for _ in 0..TIMES {
-        if aside.is_empty() || aside.len() as f64 > FEW * rows.len() as f64 {
-            return Vec::new();
-        }
-        let next = far(&whitened(&aside));
-        if next == aside {
+        let mut aside: Vec<usize> = all.iter().copied().take(most).collect();
+        if aside.is_empty() {
             break;
         }
-        aside = next;
+        aside.sort_unstable();
+        let next = far(&whitened(&aside));
+        let same = next.len() == aside.len() && next.iter().all(|k| aside.contains(k));
+        all = next;
+        if same {
+            break;
+        }
     }
-    aside.into_iter().map(|k| rows[k]).collect()
+    let few = all.len() <= most;
+    all.into_iter().filter(|_| few).map(|k| rows[k]).collect()
 }

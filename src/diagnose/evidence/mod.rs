@@ -227,16 +227,14 @@ fn blocks(fitted: &Fitted, data: &Data, hypotheses: &Hypotheses, own: &[&Candida
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
+    let is_declared = fitted.found.noise == Noise::Declared;
     let without_weight = 3 * rows.iter().filter(|row| fitted.set_aside.contains(row)).count();
     let target = Target {
         residual: neighbourhood.residual().clone(),
         noise: marginal::Noise {
             freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
-            trust: if fitted.found.noise == Noise::Declared {
-                data.rules.trust_declared
-            } else {
-                data.rules.trust_estimated
-            },
+            trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
+            is_declared,
         },
     };
     Some((blocks, target))
