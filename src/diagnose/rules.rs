@@ -75,6 +75,8 @@ pub struct SelectionRules {
     pub time_step: f64,
     /// Resamples of the interval of the gain.
     pub resamples: usize,
+    /// Draws of whole configurations that tell how often a finding returns.
+    pub drawn_again: u64,
     /// Part of the resamples within that interval.
     pub covered: f64,
     /// Poses, taken evenly, on which hypotheses are weighed against each other at most: the work grows with their square.
@@ -146,6 +148,7 @@ impl SelectionRules {
         power: 0.8,
         time_step: 60.0,
         resamples: 2000,
+        drawn_again: 20,
         covered: 0.95,
         weighed_poses: 240,
         unknown_law: 0.25,

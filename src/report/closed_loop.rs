@@ -66,6 +66,10 @@ object! {
         effect: &'a Effect = &found.effect,
         description: String = closure.before.describe(&found.effect),
         claims: Option<trace::ClaimsEntry> = found.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, &closure.before)),
+        /// Part of fits to configurations drawn anew that name it.
+        stability: Option<f64> = found.stability,
+        /// What data that took no part say: none do.
+        witness: Option<&'a str> = None,
         p_value: f64 = found.p_value,
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         alternatives: &'a [Effect] = &found.alternatives,
@@ -340,6 +344,11 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
 fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     let mut details = effect::values(found);
     details.extend(found.claims.as_ref().map(trace::claimed));
+    details.extend(
+        found
+            .stability
+            .map(|share| format!("named by {} % of fits to four fifths of the poses", number(share * 100.0, 0))),
+    );
     let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));
     if let Some(then) = closure.held_out_once(found) {
         let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));

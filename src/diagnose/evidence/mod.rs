@@ -13,10 +13,13 @@ mod hypothesis;
 mod marginal;
 mod search;
 
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::covariate::Covariate;
-use super::data::Data;
+use super::data::{Data, bits, number};
 use super::fitted::Fitted;
 use super::rules::SelectionRules;
 use crate::identify::Noise;
@@ -28,6 +31,8 @@ use search::{Block, Target, Weighted, search};
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
+/// One configuration in so many is left out.
+const LEFT_OUT: usize = 5;
 /// Odds to another effect from which on it is named as an alternative.
 const BESIDE: f64 = 0.05;
 
@@ -211,24 +216,72 @@ pub(super) fn ln_posterior(
         None => functions.iter().any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis.says(own)),
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &own)?;
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &[])?;
     search::ln_posterior(&blocks, &target, data.rules)
 }
 
-/// Hypotheses and the residual with everything that is fitted projected out; `None` where the residual is not a finite number.
-fn blocks(fitted: &Fitted, data: &Data, hypotheses: &Hypotheses, own: &[&Candidate]) -> Option<(Vec<Block>, Target)> {
-    let neighbourhood = fitted.neighbourhood_with(&hypotheses.linearised, &hypotheses.unknowns, None);
+/// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth left out, whose most probable
+/// explanation holds it; linear about the fit to all.
+pub(super) fn stability(
+    fitted: &Fitted,
+    data: &Data,
+    (evidence, best): (&Evidence, &Explanation),
+    added: &[Effect],
+) -> Vec<(Effect, f64)> {
+    let rows = data.thinned(data.rules.weighed_poses);
+    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let all = || evidence.explanations.iter().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
+    let is_known = |candidate: &&Candidate| {
+        all().any(|(own, (variant, _))| *variant == candidate.variant && own.says(&candidate.hypothesis))
+    };
+    let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_known).collect();
+    let present: Vec<usize> = (0..own.len())
+        .filter(|&k| best.hypotheses.iter().any(|known| known.says(&own[k].hypothesis) && known.effect().is_some()))
+        .collect();
+    let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
+    let count = configurations.iter().max().map_or(0, |last| last + 1);
+    let again = |seed: u64| {
+        let mut order: Vec<usize> = (0..count).collect();
+        order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
+        let left_out = &order[..count / LEFT_OUT];
+        let poses: Vec<usize> = (0..rows.len()).filter(|&pose| left_out.contains(&configurations[pose])).collect();
+        let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &poses)?;
+        let most = search(&blocks, &target, data.rules, &present).into_iter().next()?;
+        Some(most.members.into_iter().filter_map(|k| own[k].hypothesis.effect().cloned()).collect::<Vec<Effect>>())
+    };
+    let drawn: Vec<Vec<Effect>> = (0..data.rules.drawn_again).into_par_iter().filter_map(again).collect();
+    let share = |effect: &Effect| {
+        let holds = drawn.iter().filter(|all| all.contains(effect)).count();
+        holds as f64 / drawn.len().max(1) as f64
+    };
+    best.effects().into_iter().map(|effect| (effect.clone(), share(&effect))).collect()
+}
+
+/// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
+/// a finite number.
+fn blocks(
+    fitted: &Fitted,
+    data: &Data,
+    hypotheses: &Hypotheses,
+    own: &[&Candidate],
+    left_out: &[usize],
+) -> Option<(Vec<Block>, Target)> {
+    let linearised = hypotheses.linearised.without(left_out);
+    let neighbourhood = fitted.neighbourhood_with(&linearised, &hypotheses.unknowns, None);
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }
     let of_candidate = |candidate: &&Candidate| {
-        let columns = neighbourhood.left_of(&candidate.columns);
+        let mut columns = candidate.columns.clone();
+        left_out.iter().for_each(|&pose| columns.rows_mut(3 * pose, 3).fill(0.0));
+        let columns = neighbourhood.left_of(&columns);
         Block::new(columns, neighbourhood.residual(), candidate.ln_prior, &candidate.never_negative)
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
     let is_declared = fitted.found.noise == Noise::Declared;
-    let without_weight = 3 * rows.iter().filter(|row| fitted.set_aside.contains(row)).count();
+    let is_aside = |&(pose, row): &(usize, &usize)| left_out.contains(&pose) || fitted.set_aside.contains(row);
+    let without_weight = 3 * rows.iter().enumerate().filter(is_aside).count();
     let target = Target {
         residual: neighbourhood.residual().clone(),
         noise: marginal::Noise {
@@ -246,7 +299,7 @@ fn blocks(fitted: &Fitted, data: &Data, hypotheses: &Hypotheses, own: &[&Candida
 pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let rows = data.thinned(data.rules.weighed_poses);
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>())?;
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), &[])?;
     let is_added = |effect: &Effect| hypotheses.added.contains(effect);
     let of = |k: usize| &hypotheses.all[k].hypothesis;
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| of(k).effect().is_some_and(is_added)).collect();

@@ -15,6 +15,7 @@ const CHUNK: usize = 256;
 const TRACE_OF_MASS: f64 = 1e-4;
 
 /// A model linearised with every place where effects may enter.
+#[derive(Clone)]
 pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
     poses: Vec<Pose<'a>>,
@@ -79,6 +80,16 @@ impl<'a> Linearised<'a> {
         let probed = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index));
         let places = known.into_iter().chain(probed).collect();
         Self { problem, poses, places, jacobian, residual, fitted, relaxed }
+    }
+
+    /// The same with poses that say nothing.
+    pub fn without(&self, poses: &[usize]) -> Self {
+        let mut rest = self.clone();
+        for &pose in poses {
+            rest.jacobian.rows_mut(3 * pose, 3).fill(0.0);
+            rest.residual.rows_mut(3 * pose, 3).fill(0.0);
+        }
+        rest
     }
 
     /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).

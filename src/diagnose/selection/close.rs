@@ -2,7 +2,7 @@
 
 use super::super::candidates::Candidates;
 use super::super::data::Data;
-use super::super::evidence::{Claims, Evidence, Explanation, ln_posterior, weigh};
+use super::super::evidence::{Claims, Evidence, Explanation, ln_posterior, stability, weigh};
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
@@ -41,6 +41,8 @@ pub struct Found {
     pub estimates: Vec<Estimate>,
     /// Effects that these data cannot tell from it, best first.
     pub alternatives: Vec<Effect>,
+    /// Part of fits to whole configurations drawn anew that name it; `None` where no evidence could be weighed.
+    pub stability: Option<f64>,
     /// Probability that it or one of the alternatives is at work; `None` where no evidence could be weighed.
     pub one_of_few: Option<f64>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
@@ -234,6 +236,7 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
 /// Every added effect with what is known of it; harmonics may share a prior.
 fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation)>, common_prior: bool) -> Vec<Found> {
     let added = rounds.added(fitted);
+    let stable = best.map(|best| stability(fitted, rounds.data, best, &added)).unwrap_or_default();
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
     let first_with = |effect: &Effect| {
@@ -248,7 +251,9 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
             effect.covers(own) || alternatives.iter().any(|other| other.name_and_place() == own.name_and_place())
         };
         let one_of_few = best.map(|(evidence, _)| evidence.probability(|own| own.effect().is_some_and(few)));
+        let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
         Found {
+            stability: own.reduce(f64::min),
             one_of_few,
             claims: best.and_then(|(evidence, _)| claims(evidence, &effect)),
             p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
