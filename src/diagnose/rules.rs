@@ -65,8 +65,8 @@ pub struct SelectionRules {
     pub looked_at: usize,
     /// Largest principal angle \[rad\] at which two effects are look-alikes: 20°.
     pub alike: f64,
-    /// Look-alikes of each found effect that are fitted in its place.
-    pub look_alikes: usize,
+    /// Other effects that are fitted in the place of each that is found.
+    pub stand_ins: usize,
     /// Poses among which one is sought that tells two look-alikes apart.
     pub telling_poses: usize,
     /// Probability with which an effect of the stated size is found, in `check` and `plan`: 0.8, as usual [Cohen 1988].
@@ -143,7 +143,7 @@ impl SelectionRules {
         ranked: 20,
         looked_at: 8,
         alike: 0.35,
-        look_alikes: 3,
+        stand_ins: 3,
         telling_poses: 400,
         power: 0.8,
         time_step: 60.0,

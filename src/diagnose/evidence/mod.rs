@@ -31,6 +31,8 @@ use search::{Block, Target, Weighted, search};
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
+/// Probability below which an explanation is not looked at in fits to fewer poses.
+const WORTH_A_DRAW: f64 = 1e-3;
 /// One configuration in so many is left out.
 const LEFT_OUT: usize = 5;
 /// Odds to another effect from which on it is named as an alternative.
@@ -65,8 +67,8 @@ impl Explanation {
 pub struct Evidence {
     /// Most probable first.
     pub explanations: Vec<Explanation>,
-    /// For effects of the sure explanation, others that do nearly the same in these poses.
-    look_alikes: Vec<(Effect, Hypothesis)>,
+    /// For effects of the sure explanation, others that do best in their place.
+    stand_ins: Vec<(Effect, Hypothesis)>,
 }
 
 /// What is claimed of a hypothesis, from the least to the most.
@@ -110,8 +112,8 @@ impl Evidence {
         (fewer.max(NEGLIGIBLE) / (1.0 - fewer).max(NEGLIGIBLE)).min(1.0)
     }
 
-    /// Explanations with an effect in the place of another of `best`: the most probable ones, and those with one that does nearly the
-    /// same, which strong effects decide only at a fit of their own.
+    /// Explanations with an effect in the place of another of `best`: the most probable ones, and those that do best in the place of
+    /// each, which strong effects decide only at a fit of their own.
     pub(super) fn exchanged(&self, best: &Explanation, most: usize) -> Vec<Explanation> {
         let differ = |one: &Explanation, other: &Explanation| {
             let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
@@ -122,7 +124,7 @@ impl Evidence {
             other.hypotheses.len() == best.hypotheses.len() && differ(best, other) && differ(other, best)
         };
         let mut all: Vec<Explanation> = self.explanations.iter().filter(is_exchange).take(most).cloned().collect();
-        for (effect, other) in &self.look_alikes {
+        for (effect, other) in &self.stand_ins {
             let Some(place) = best.hypotheses.iter().position(|own| own.effect() == Some(effect)) else { continue };
             let mut exchanged = Explanation { probability: 0.0, ..best.clone() };
             exchanged.hypotheses[place] = other.clone();
@@ -228,9 +230,13 @@ pub(super) fn stability(
     (evidence, best): (&Evidence, &Explanation),
     added: &[Effect],
 ) -> Vec<(Effect, f64)> {
+    if best.effects().is_empty() {
+        return Vec::new();
+    }
     let rows = data.thinned(data.rules.weighed_poses);
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let all = || evidence.explanations.iter().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
+    let worth = || evidence.explanations.iter().filter(|known| known.probability > WORTH_A_DRAW);
+    let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
     let is_known = |candidate: &&Candidate| {
         all().any(|(own, (variant, _))| *variant == candidate.variant && own.says(&candidate.hypothesis))
     };
@@ -328,41 +334,39 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut evidence = Evidence { explanations, look_alikes: Vec::new() };
+    let mut evidence = Evidence { explanations, stand_ins: Vec::new() };
     if let Some(best) = evidence.sure(data.rules.sure) {
-        evidence.look_alikes = look_alikes(&best.effects(), &hypotheses, &blocks, data.rules);
+        evidence.stand_ins = stand_ins(best, &hypotheses, (&blocks, &target), data.rules);
     }
     Some(evidence)
 }
 
-/// For each effect the few others that do nearly the same with everything fitted projected out.
-fn look_alikes(
-    effects: &[Effect],
+/// For each effect of an explanation the few others, one of a family at each place, that do best in its place, if at least half as well.
+fn stand_ins(
+    best: &Explanation,
     hypotheses: &Hypotheses,
-    blocks: &[Block],
+    (blocks, target): (&[Block], &Target),
     rules: &SelectionRules,
 ) -> Vec<(Effect, Hypothesis)> {
-    let of = |effect: &Effect| hypotheses.all.iter().position(|own| own.hypothesis.effect() == Some(effect));
+    let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
+    let tried: Vec<usize> = (0..blocks.len()).filter(|&k| effect(k).is_some()).collect();
+    let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
+        hypotheses.all.iter().position(|known| known.variant == *variant && known.hypothesis.says(own))
+    };
+    let members: Vec<usize> = best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
     let mut all = Vec::new();
-    for effect in effects {
-        let Some(own) = of(effect) else { continue };
-        let angle = |(k, candidate): (usize, &Candidate)| {
-            let other = candidate.hypothesis.effect()?;
-            // Other times of a shift and other orders of a harmonic stand beside each other in the search.
-            if k == own || other.name_and_place() == effect.name_and_place() {
-                return None;
-            }
-            let angle = blocks[own].angle(&blocks[k]).filter(|angle| *angle < rules.alike)?;
-            Some((angle, candidate.hypothesis.clone()))
-        };
-        let mut near: Vec<(f64, Hypothesis)> = hypotheses.all.iter().enumerate().filter_map(angle).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut known: Vec<String> = Vec::new();
-        for (_, hypothesis) in near {
-            let name = hypothesis.effect().map(Effect::name_and_place).unwrap_or_default();
-            if !known.contains(&name) && known.len() < rules.look_alikes {
-                known.push(name);
-                all.push((effect.clone(), hypothesis));
+    for &own in members.iter().filter(|&&k| effect(k).is_some()) {
+        let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
+        let mut gains = search::gains_beside(&others, &tried, (blocks, target), rules);
+        let least = gains.iter().find(|(k, _)| *k == own).map_or(f64::INFINITY, |(_, gain)| 0.5 * gain);
+        gains.retain(|(k, gain)| *gain > least && !members.contains(k));
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
+        let mut known = vec![name(own)];
+        for (k, _) in gains {
+            if !known.contains(&name(k)) && known.len() <= rules.stand_ins {
+                known.push(name(k));
+                all.extend(effect(own).map(|own| (own.clone(), hypotheses.all[k].hypothesis.clone())));
             }
         }
     }

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::neighbourhood::orthonormal;
 use super::super::rules::SelectionRules;
 use super::marginal::{Noise, of_block, over_noise};
 
@@ -30,17 +29,6 @@ impl Block {
         // The narrow side is transposed: this is the product that is fast.
         gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
         Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative: never_negative.to_vec() }
-    }
-
-    /// Largest principal angle \[rad\] to another's columns; `None` where one of them is nothing.
-    pub fn angle(&self, other: &Self) -> Option<f64> {
-        let (a, _) = orthonormal(&self.columns, None);
-        let (b, _) = orthonormal(&other.columns, None);
-        if a.is_empty() || b.is_empty() {
-            return None;
-        }
-        let cosines = a.tr_mul(&b).singular_values();
-        cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 }
 
@@ -139,9 +127,13 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             known.insert(sorted(&set.members), set);
         }
     }
-    let mut front: Vec<Set> = known.values().cloned().collect();
-    let mut promising: Option<Vec<usize>> = None;
-    for _ in 0..rules.together {
+    // What holds more than the search goes to is judged as it is, and with one more.
+    let (longer, front): (usize, Vec<Set>) = match known.get(&sorted(present)) {
+        Some(all) if present.len() > rules.together => (1, vec![all.clone()]),
+        _ => (rules.together, known.values().cloned().collect()),
+    };
+    let (mut front, mut promising): (Vec<Set>, Option<Vec<usize>>) = (front, None);
+    for _ in 0..longer {
         let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
         for (place, set) in front.iter().enumerate() {
             let Some(conditioned) = Conditioned::new(set, blocks, target) else { continue };
@@ -196,6 +188,19 @@ pub(super) fn ln_posterior(blocks: &[Block], target: &Target, rules: &SelectionR
     let all: Vec<usize> = (0..blocks.len()).collect();
     let set = assembled(&all, blocks, target, rules)?;
     Some(set.ln_posterior + over_noise(target.residual.norm_squared(), &target.noise.grid()))
+}
+
+/// For each block that is tried the gain beside some others, its prior among it.
+pub(super) fn gains_beside(
+    others: &[usize],
+    tried: &[usize],
+    (blocks, target): (&[Block], &Target),
+    rules: &SelectionRules,
+) -> Vec<(usize, f64)> {
+    let conditioned = assembled(others, blocks, target, rules).and_then(|set| Conditioned::new(&set, blocks, target));
+    let Some(conditioned) = conditioned else { return Vec::new() };
+    let gain = |&block: &usize| (block, conditioned.gain(&blocks[block], target, rules).0 + blocks[block].ln_prior);
+    tried.par_iter().map(gain).collect()
 }
 
 /// A set with these members, one after the other.

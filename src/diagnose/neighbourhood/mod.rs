@@ -15,5 +15,4 @@ pub(super) use left_out::PartSquares;
 pub(super) use linear::LEAST_DECIDED;
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(crate) use linearised::Linearised;
-pub(super) use orthonormal::orthonormal;
 pub(crate) use scan::{Scan, Tried, tries};

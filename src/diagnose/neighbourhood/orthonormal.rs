@@ -12,10 +12,7 @@ pub(crate) const RANK: f64 = 1e-6;
 /// them take up, have no part in it. `lengths` are those that a column had before others were projected out.
 ///
 /// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are directions of their own.
-pub(in crate::diagnose) fn orthonormal(
-    columns: &DMatrix<f64>,
-    lengths: Option<&[f64]>,
-) -> (DMatrix<f64>, DMatrix<f64>) {
+pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
     let n = columns.ncols();
     let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
     let (kept, first) = independent(columns, &own, lengths.unwrap_or(&own));

@@ -118,21 +118,22 @@ pub fn close_by(
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
     let mut rounds = Rounds::new(&data, options, first.effects());
-    let (fitted, harmonic_sigma) = if data.rows().len() <= rules.weighed_poses {
-        (weighed(&mut rounds, first)?, None)
+    let (fitted, harmonic_sigma, evidence) = if data.rows().len() <= rules.weighed_poses {
+        let (fitted, evidence) = weighed(&mut rounds, first)?;
+        let evidence = evidence.filter(|_| fitted.found.termination.converged());
+        (rounds.settled(fitted)?, None, evidence)
     } else {
         let mut fitted = rounds.run(first)?;
         for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
             let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
             fitted = rounds.run(next)?;
         }
-        harmonics::filled(&rounds, fitted)?
+        let (fitted, sigma) = harmonics::filled(&rounds, fitted)?;
+        (fitted, sigma, None)
     };
     let findings = check_fit(&fitted, &data);
     let added = rounds.added(&fitted);
-    let evidence = weigh(&fitted, &data, &added);
-    let evidence =
-        evidence.map(|evidence| refitted(&rounds, &fitted, evidence)).transpose()?.map(|(evidence, _)| evidence);
+    let evidence = evidence.or_else(|| weigh(&fitted, &data, &added));
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, &added));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
@@ -162,26 +163,42 @@ pub fn close_by(
     })
 }
 
-/// The fit with the effects of the explanation that is sure, weighed again about every fit until that is what the model holds.
-fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<Fitted, IdentifyError> {
+/// The fit with the effects of the explanation that is sure, weighed again about every fit until that is what the model holds; and the
+/// evidence about it.
+fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     rounds.is_new(&first);
     let mut fitted = first;
     while rounds.done.len() < rounds.data.rules.rounds {
-        let Some(evidence) = weigh(&fitted, rounds.data, &rounds.added(&fitted)) else { break };
-        let Some(best) = evidence.sure(rounds.data.rules.sure) else { break };
-        let mut next = rounds.fit(&fitted, &best.effects())?;
-        if !rounds.is_new(&next) {
-            // What the model holds is what is sure; is there a better one at a fit of its own?
-            let Some(better) = refitted(rounds, &fitted, evidence)?.1 else { break };
-            next = better;
-            if !rounds.is_new(&next) {
-                break;
-            }
+        let added = rounds.added(&fitted);
+        let Some(evidence) = weigh(&fitted, rounds.data, &added) else { return Ok((fitted, None)) };
+        let Some(best) = evidence.sure(rounds.data.rules.sure) else { return Ok((fitted, Some(evidence))) };
+        let mut next = None;
+        if !is_held(best, &added) {
+            next = Some(rounds.fit(&fitted, &best.effects())?).filter(|next| rounds.is_new(next));
         }
+        // Where the model holds what is sure: is there a better one at a fit of its own?
+        let next = match next {
+            Some(next) => next,
+            None => {
+                let (evidence, better) = refitted(rounds, &fitted, evidence)?;
+                let Some(better) = better.filter(|better| rounds.is_new(better)) else {
+                    return Ok((fitted, Some(evidence)));
+                };
+                better
+            }
+        };
         rounds.note(&next);
         fitted = next;
     }
-    rounds.settled(fitted)
+    let evidence = weigh(&fitted, rounds.data, &rounds.added(&fitted));
+    Ok((fitted, evidence))
+}
+
+/// Whether the effects of an explanation are those that were added.
+fn is_held(explanation: &Explanation, added: &[Effect]) -> bool {
+    let own = explanation.effects();
+    let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+    own.len() == parts.len() && parts.iter().all(|part| own.contains(part))
 }
 
 /// The evidence with what may stand in the place of an effect weighed at a fit of its own, and the best of these fits where it is
@@ -189,14 +206,8 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<Fitted, IdentifyError> 
 fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evidence, Option<Fitted>), IdentifyError> {
     let (data, rules) = (rounds.data, rounds.data.rules);
     let added = rounds.added(fitted);
-    let holds = |best: &&Explanation| {
-        let own = best.effects();
-        let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
-        own.len() == parts.len() && parts.iter().all(|part| own.contains(part))
-    };
-    let Some(best) = evidence.sure(rules.sure).filter(holds).filter(|_| !added.is_empty()).cloned() else {
-        return Ok((evidence, None));
-    };
+    let held = evidence.sure(rules.sure).filter(|best| !added.is_empty() && is_held(best, &added));
+    let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let functions = best.without_law();
     let Some(own) = ln_posterior(fitted, data, &added, &functions) else { return Ok((evidence, None)) };
     let rivals = evidence.exchanged(&best, rules.rivals);
