@@ -4,10 +4,9 @@ use nalgebra::DVector;
 
 use super::covariate::Covariate;
 use super::data::Data;
-use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part};
+use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part, best_form};
 use super::fitted::Fitted;
 use super::residual_tests::Findings;
-use super::selection::Found;
 use crate::identify::ErrorSummary;
 use crate::problem::Effect;
 use crate::quantity::Unit;
@@ -25,20 +24,6 @@ pub struct Unexplained {
     pub claims: Option<Claims>,
     /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out.
     pub correction: Option<Correction>,
-}
-
-impl Unexplained {
-    /// What is known where an effect of the model stands for a law that is not sure.
-    pub(super) fn of_found(found: &Found) -> Option<Self> {
-        let claims = found.claims.clone()?;
-        Some(Self {
-            part: Some(claims.place.0),
-            depends_on: claims.depends_on.0.clone(),
-            p_value: found.p_value,
-            claims: Some(claims),
-            correction: None,
-        })
-    }
 }
 
 /// A smooth correction of one part's error as a function of what it depends on.
@@ -138,7 +123,7 @@ fn correction(
     let (here, there) = (data.rows(), &data.split.held_out);
     let rows = [here, there.as_slice()].concat();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, here.len());
-    let (own, sigma) = hypotheses.columns(best, hypothesis)?;
+    let (own, sigma) = best_form(fitted, data, (&hypotheses, here.len()), best, hypothesis)?;
     let linearised = fitted.linearised(data, &[]);
     let fit = fitted.neighbourhood(&linearised);
     let first = 3 * here.len();

@@ -252,8 +252,8 @@ fn verdict(closure: &ClosedLoop) -> String {
     };
     let found = match such.len() {
         0 => named,
-        1 => format!("{named}; of one more the place is known and not the law"),
-        more => format!("{named}; of {more} more the places are known and not the laws"),
+        1 => format!("{named}; of one cause the place is known and the law not sure"),
+        more => format!("{named}; of {more} causes the places are known and the laws not sure"),
     };
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),

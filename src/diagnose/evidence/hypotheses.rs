@@ -13,6 +13,11 @@ use crate::diagnose::neighbourhood::Linearised;
 use crate::model::parameter::Slot;
 use crate::problem::Effect;
 
+/// Centres of single bumps and steps along the range.
+const CENTRES: u32 = 16;
+/// Their widths as parts of the range.
+const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
+
 /// A fit linearised at some rows, with every hypothesis.
 pub(in crate::diagnose) struct Hypotheses<'a> {
     pub linearised: Linearised<'a>,
@@ -41,12 +46,37 @@ impl<'a> Hypotheses<'a> {
         Self { linearised, added, unknowns, all, covariates }
     }
 
-    /// The columns of a hypothesis of an explanation, and 1 σ of their coefficients.
-    pub fn columns(&self, explanation: &Explanation, hypothesis: &Hypothesis) -> Option<(&DMatrix<f64>, f64)> {
+    /// The function of a hypothesis that an explanation holds.
+    pub(super) fn candidate(&self, explanation: &Explanation, hypothesis: &Hypothesis) -> Option<&Candidate> {
         let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
-        let (_, &(variant, sigma)) = members.find(|(known, _)| known.says(hypothesis))?;
-        let own = self.all.iter().find(|own| own.variant == variant && own.hypothesis.says(hypothesis))?;
-        Some((&own.columns, sigma))
+        let (_, &(variant, _)) = members.find(|(known, _)| known.says(hypothesis))?;
+        self.all.iter().find(|own| own.variant == variant && own.hypothesis.says(hypothesis))
+    }
+
+    /// Single bumps and steps in the place of a function of one covariate at one coordinate; each as probable as the others.
+    pub(super) fn shapes(&self, hypothesis: &Hypothesis, weighed: usize) -> Vec<Candidate> {
+        let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
+        let Some(known) = Known::of(Covariate::Position, values.to_vec(), weighed) else { return Vec::new() };
+        let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
+        let all = centres.flat_map(|centre| WIDTHS.map(|width| (centre, width)));
+        let both = all.flat_map(|(centre, width)| [(centre, width, true), (centre, width, false)]);
+        let one = |(centre, width, bump): (f64, f64, bool)| {
+            let value = |u: f64| if bump { (-0.5 * u * u).exp() } else { u.tanh() };
+            let mut columns = DMatrix::from_columns(std::slice::from_ref(&lever));
+            for (pose, at) in known.scaled.iter().enumerate() {
+                columns.rows_mut(3 * pose, 3).scale_mut(value((at - centre) / width));
+            }
+            let size = (columns.rows(0, 3 * weighed).norm_squared() / (3 * weighed) as f64).sqrt();
+            columns /= size.max(f64::MIN_POSITIVE);
+            Candidate {
+                hypothesis: hypothesis.clone(),
+                variant: 0,
+                columns,
+                ln_prior: -(f64::from(CENTRES) * 2.0 * WIDTHS.len() as f64).ln(),
+                never_negative: vec![false],
+            }
+        };
+        both.map(one).collect()
     }
 
     /// The covariates that a hypothesis depends on.

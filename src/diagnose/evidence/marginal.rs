@@ -16,13 +16,13 @@ use nalgebra::{DMatrix, DVector};
 const STEPS: i32 = 70;
 const REACH: f64 = 3.5;
 
-/// Degrees of freedom ν of a residual and the half width of the distribution of ln f; no less than 0 for a σ that is declared: what is
-/// smaller is no effect that such an instrument can show.
+/// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
     pub freedom: f64,
     pub trust: f64,
-    pub is_declared: bool,
+    /// The least ln f: that of a declared σ, for what is smaller is no effect that such an instrument can show.
+    pub least: f64,
 }
 
 impl Noise {
@@ -32,8 +32,8 @@ impl Noise {
             let ln_f = REACH * f64::from(step) / f64::from(STEPS);
             (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
         };
-        let first = if self.is_declared { 0 } else { -STEPS };
-        (first..=STEPS).map(at).collect()
+        let is_enough = |step: &i32| REACH * f64::from(*step) >= f64::from(STEPS) * self.least.min(REACH) - 1e-9;
+        (-STEPS..=STEPS).filter(is_enough).map(at).collect()
     }
 }
 

@@ -13,6 +13,7 @@ mod hypothesis;
 mod marginal;
 mod search;
 
+use nalgebra::DMatrix;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
@@ -222,6 +223,28 @@ pub(super) fn ln_posterior(
     search::ln_posterior(&blocks, &target, data.rules)
 }
 
+/// The most probable form of a function without a law, beside what the fit holds: its columns at all poses of `hypotheses`, weighed on the
+/// first of them, and 1 σ of their coefficients.
+pub(super) fn best_form(
+    fitted: &Fitted,
+    data: &Data,
+    (hypotheses, weighed): (&Hypotheses, usize),
+    best: &Explanation,
+    hypothesis: &Hypothesis,
+) -> Option<(DMatrix<f64>, f64)> {
+    let smooth = hypotheses.candidate(best, hypothesis)?;
+    let shapes = hypotheses.shapes(hypothesis, weighed);
+    let forms: Vec<&Candidate> = std::iter::once(smooth).chain(&shapes).collect();
+    let beyond: Vec<usize> = (weighed..hypotheses.linearised.poses().len()).collect();
+    let (blocks, target) = blocks(fitted, data, hypotheses, &forms, &beyond)?;
+    let all: Vec<usize> = (0..blocks.len()).collect();
+    // Half of the chance for the smooth function, half for all shapes together.
+    let gains = search::gains_beside(&[], &all, (&blocks, &target), data.rules);
+    let gain = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
+    let (k, _, size) = gains.into_iter().map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((forms[k].columns.clone(), size))
+}
+
 /// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth left out, whose most probable
 /// explanation holds it; linear about the fit to all.
 pub(super) fn stability(
@@ -286,14 +309,14 @@ fn blocks(
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
     let is_declared = fitted.found.noise == Noise::Declared;
-    let is_aside = |&(pose, row): &(usize, &usize)| left_out.contains(&pose) || fitted.set_aside.contains(row);
-    let without_weight = 3 * rows.iter().enumerate().filter(is_aside).count();
+    let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
+    let without_weight = 3 * (left_out.len() + rows.iter().enumerate().filter(is_aside).count());
     let target = Target {
         residual: neighbourhood.residual().clone(),
         noise: marginal::Noise {
             freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
             trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
-            is_declared,
+            least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
         },
     };
     Some((blocks, target))
@@ -358,12 +381,12 @@ fn stand_ins(
     for &own in members.iter().filter(|&&k| effect(k).is_some()) {
         let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
         let mut gains = search::gains_beside(&others, &tried, (blocks, target), rules);
-        let least = gains.iter().find(|(k, _)| *k == own).map_or(f64::INFINITY, |(_, gain)| 0.5 * gain);
-        gains.retain(|(k, gain)| *gain > least && !members.contains(k));
+        let least = gains.iter().find(|(k, ..)| *k == own).map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
+        gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
         let mut known = vec![name(own)];
-        for (k, _) in gains {
+        for (k, ..) in gains {
             if !known.contains(&name(k)) && known.len() <= rules.stand_ins {
                 known.push(name(k));
                 all.extend(effect(own).map(|own| (own.clone(), hypotheses.all[k].hypothesis.clone())));

@@ -190,16 +190,19 @@ pub(super) fn ln_posterior(blocks: &[Block], target: &Target, rules: &SelectionR
     Some(set.ln_posterior + over_noise(target.residual.norm_squared(), &target.noise.grid()))
 }
 
-/// For each block that is tried the gain beside some others, its prior among it.
+/// For each block that is tried the gain beside some others, its prior among it, and its most probable size.
 pub(super) fn gains_beside(
     others: &[usize],
     tried: &[usize],
     (blocks, target): (&[Block], &Target),
     rules: &SelectionRules,
-) -> Vec<(usize, f64)> {
+) -> Vec<(usize, f64, f64)> {
     let conditioned = assembled(others, blocks, target, rules).and_then(|set| Conditioned::new(&set, blocks, target));
     let Some(conditioned) = conditioned else { return Vec::new() };
-    let gain = |&block: &usize| (block, conditioned.gain(&blocks[block], target, rules).0 + blocks[block].ln_prior);
+    let gain = |&block: &usize| {
+        let (gain, size) = conditioned.gain(&blocks[block], target, rules);
+        (block, gain + blocks[block].ln_prior, size)
+    };
     tried.par_iter().map(gain).collect()
 }
 

@@ -43,8 +43,6 @@ pub struct Found {
     pub alternatives: Vec<Effect>,
     /// Part of fits to whole configurations drawn anew that name it; `None` where no evidence could be weighed.
     pub stability: Option<f64>,
-    /// Probability that it or one of the alternatives is at work; `None` where no evidence could be weighed.
-    pub one_of_few: Option<f64>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
     /// fit where no round is such.
     pub held_out_after: ErrorSummary,
@@ -54,11 +52,6 @@ impl Found {
     /// Whether it is named as found: its law is surer than `stated`. Below that a place is found, and the law is such as this one.
     pub fn is_named(&self, stated: f64) -> bool {
         self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
-    }
-
-    /// Whether at least it or one of its alternatives is the law.
-    fn is_one_of_few(&self, stated: f64) -> bool {
-        self.one_of_few.is_none_or(|probability| probability >= stated)
     }
 }
 
@@ -118,7 +111,8 @@ pub fn close_by(
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
     let mut rounds = Rounds::new(&data, options, first.effects());
-    let (fitted, harmonic_sigma, evidence) = if data.rows().len() <= rules.weighed_poses {
+    let all_weighed = data.rows().len() <= rules.weighed_poses;
+    let (fitted, harmonic_sigma, evidence) = if all_weighed {
         let (fitted, evidence) = weighed(&mut rounds, first)?;
         let evidence = evidence.filter(|_| fitted.found.termination.converged());
         (rounds.settled(fitted)?, None, evidence)
@@ -137,9 +131,6 @@ pub fn close_by(
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, &added));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
-    // Where a place is found and no law is sure, not even that it is one of a few, what is left is not explained.
-    let is_open = |found: &&Found| !found.is_named(rules.stated) && !found.is_one_of_few(rules.stated);
-    unexplained.extend(effects.iter().filter(is_open).filter_map(Unexplained::of_found));
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
@@ -258,15 +249,10 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
     };
     let one = |effect: Effect| {
         let alternatives = best.map_or_else(Vec::new, |(evidence, best)| alternatives(evidence, best, &effect));
-        let few = |own: &Effect| {
-            effect.covers(own) || alternatives.iter().any(|other| other.name_and_place() == own.name_and_place())
-        };
-        let one_of_few = best.map(|(evidence, _)| evidence.probability(|own| own.effect().is_some_and(few)));
         let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
         Found {
             stability: own.reduce(f64::min),
-            one_of_few,
-            claims: best.and_then(|(evidence, _)| claims(evidence, &effect)),
+            claims: best.and_then(|(evidence, _)| claims(evidence, &effect, rounds.data.rules.several_orders)),
             p_value: tested.iter().filter(|part| effect.covers(&part.effect)).map(|part| part.p).fold(1.0, f64::min),
             estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
             held_out_after: first_with(&effect),
@@ -277,11 +263,12 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
     added.iter().cloned().map(one).collect()
 }
 
-/// What is claimed of an effect: of several orders of a harmonic, that of the one that is least sure.
-fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
+/// What is claimed of an effect: of a few orders of a harmonic that of the least sure, of many that some order is at work.
+fn claims(evidence: &Evidence, effect: &Effect, several: usize) -> Option<Claims> {
     let parts = effect.parts();
     let claims = parts.iter().map(|part| evidence.claims_of(part)).collect::<Option<Vec<Claims>>>()?;
-    claims.into_iter().min_by(|a, b| a.law.1.total_cmp(&b.law.1))
+    let by_law = |a: &Claims, b: &Claims| a.law.1.total_cmp(&b.law.1);
+    if parts.len() >= several { claims.into_iter().max_by(by_law) } else { claims.into_iter().min_by(by_law) }
 }
 
 /// What may stand in the place of an effect: of a family at one place the most probable.
