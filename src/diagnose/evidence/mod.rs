@@ -168,6 +168,9 @@ impl Evidence {
         };
         let with: f64 =
             self.explanations.iter().filter(|known| has(known, effect)).map(|known| known.probability).sum();
+        if with == 0.0 {
+            return Vec::new();
+        }
         let mut others: Vec<(&Effect, f64)> = Vec::new();
         for explanation in self.explanations.iter().filter(|known| !has(known, effect)) {
             for other in explanation.hypotheses.iter().filter_map(Hypothesis::effect).filter(|other| !has(best, other))

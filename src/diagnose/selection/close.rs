@@ -17,6 +17,9 @@ use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Opt
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
 
+/// A model is crowded that holds so many times the effects that an explanation may.
+const CROWD: usize = 4;
+
 /// What the loop came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -127,9 +130,12 @@ pub fn close_by(
     };
     let findings = check_fit(&fitted, &data);
     let added = rounds.added(&fitted);
-    let evidence = evidence.or_else(|| weigh(&fitted, &data, &added));
+    // Of very many effects none is taken out again: what is left beside all of them is weighed.
+    let crowded = added.iter().flat_map(Effect::parts).count() > CROWD * rules.together;
+    let taken_out: &[Effect] = if crowded { &[] } else { &added };
+    let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out));
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
-    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, &added));
+    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, taken_out));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
