@@ -146,14 +146,13 @@ fn disturbed(data: Dataset, kind: Kind, seed: u64) -> Dataset {
     for row in 0..measurements.len() {
         let white = three(&mut rng, &normal);
         let noise = match kind {
-            Kind::White | Kind::JointReadings => white,
             Kind::HeavyTails => three(&mut rng, &|rng| StudentT::new(3.0).unwrap().sample(rng) / 3.0_f64.sqrt()),
             Kind::Correlated => {
                 last = last * 0.8 + white * 0.6;
                 last
             }
             Kind::Outliers if rng.random_bool(0.03) => white * 50.0,
-            Kind::Outliers => white,
+            Kind::White | Kind::JointReadings | Kind::Outliers => white,
             Kind::FiveTimes => white * 5.0,
             Kind::Fifth => white / 5.0,
             Kind::ThreePoints => {

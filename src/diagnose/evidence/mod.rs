@@ -92,7 +92,7 @@ impl Evidence {
     /// Probability that some hypothesis of a kind is at work.
     pub fn probability(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
         let holds = |explanation: &&Explanation| explanation.hypotheses.iter().any(&of);
-        self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
+        self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum::<f64>().min(1.0)
     }
 
     /// The most probable explanation that claims no more than is sure: with as many hypotheses as there are with probability
@@ -201,7 +201,8 @@ impl Evidence {
             explanation.hypotheses.iter().any(|other| other.law == of.law && other.part == of.part)
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
-        let law = self.explanations.iter().filter(has_law).map(|explanation| explanation.probability).sum();
+        let law =
+            self.explanations.iter().filter(has_law).map(|explanation| explanation.probability).sum::<f64>().min(1.0);
         Claims { place: (of.part, place), depends_on: (of.depends_on.clone(), depends_on), law: (of.clone(), law) }
     }
 }
@@ -305,7 +306,9 @@ fn blocks(
     }
     let of_candidate = |candidate: &&Candidate| {
         let mut columns = candidate.columns.clone();
-        left_out.iter().for_each(|&pose| columns.rows_mut(3 * pose, 3).fill(0.0));
+        for &pose in left_out {
+            columns.rows_mut(3 * pose, 3).fill(0.0);
+        }
         let columns = neighbourhood.left_of(&columns);
         Block::new(columns, neighbourhood.residual(), candidate.ln_prior, &candidate.never_negative)
     };
@@ -346,17 +349,13 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
                 && own.iter().all(|own| others.iter().any(|other| own.says(other)))
                 && others.iter().all(|other| own.iter().any(|own| own.says(other)))
         };
-        match explanations.iter_mut().find(is_same) {
-            Some(known) => known.probability += probability,
-            None => {
-                let own = own.into_iter().cloned().collect();
-                let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
-                explanations.push(Explanation {
-                    hypotheses: own,
-                    probability,
-                    functions: variants.zip(sizes).collect(),
-                });
-            }
+        if let Some(known) = explanations.iter_mut().find(is_same) {
+            known.probability += probability;
+        } else {
+            let own = own.into_iter().cloned().collect();
+            let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
+            let functions = variants.zip(sizes).collect();
+            explanations.push(Explanation { hypotheses: own, probability, functions });
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));

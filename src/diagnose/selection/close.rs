@@ -174,15 +174,14 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
             next = Some(rounds.fit(&fitted, &best.effects())?).filter(|next| rounds.is_new(next));
         }
         // Where the model holds what is sure: is there a better one at a fit of its own?
-        let next = match next {
-            Some(next) => next,
-            None => {
-                let (evidence, better) = refitted(rounds, &fitted, evidence)?;
-                let Some(better) = better.filter(|better| rounds.is_new(better)) else {
-                    return Ok((fitted, Some(evidence)));
-                };
-                better
-            }
+        let next = if let Some(next) = next {
+            next
+        } else {
+            let (evidence, better) = refitted(rounds, &fitted, evidence)?;
+            let Some(better) = better.filter(|better| rounds.is_new(better)) else {
+                return Ok((fitted, Some(evidence)));
+            };
+            better
         };
         rounds.note(&next);
         fitted = next;
@@ -208,7 +207,8 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     let functions = best.without_law();
     let Some(own) = ln_posterior(fitted, data, &added, &functions) else { return Ok((evidence, None)) };
     let rivals = evidence.exchanged(&best, rules.rivals);
-    let (mut odds, mut better): (Vec<(Explanation, f64)>, Option<(f64, Fitted)>) = (Vec::new(), None);
+    let mut odds: Vec<(Explanation, f64)> = Vec::new();
+    let mut better: Option<(f64, Fitted)> = None;
     for rival in rivals {
         let next = rounds.fit(fitted, &rival.effects())?;
         let Some(other) = ln_posterior(&next, data, &rounds.added(&next), &functions) else { continue };
@@ -283,7 +283,8 @@ fn alternatives(evidence: &Evidence, best: &Explanation, effect: &Effect) -> Vec
     for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best)) {
         let is_known = |known: &Effect| known.name_and_place() == other.name_and_place();
         // Other times of the same shift are the same effect; other orders of a harmonic are not.
-        if !all.iter().any(is_known) && !(effect.is_searched() && is_known(effect)) {
+        let is_own = effect.is_searched() && is_known(effect);
+        if !is_own && !all.iter().any(is_known) {
             all.push(other);
         }
     }

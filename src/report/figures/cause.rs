@@ -319,7 +319,9 @@ pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
     let width = curve.last()?.0 - curve.first()?.0;
     let area: f64 = curve.windows(2).map(trapezoid).sum();
     let mean = if width > 0.0 { area / width } else { 0.0 };
-    curve.iter_mut().for_each(|(_, y)| *y -= mean);
+    for (_, y) in &mut curve {
+        *y -= mean;
+    }
     let across = match of.covariate {
         Covariate::Temperature => Quantity::temperature(),
         Covariate::Time => Quantity::elapsed(range(curve.iter().map(|at| at.0)).1),
