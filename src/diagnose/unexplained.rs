@@ -29,9 +29,9 @@ pub struct Unexplained {
 /// A smooth correction of one part's error as a function of what it depends on.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Range of each covariate that the identification poses cover, in its unit: nothing is corrected beyond it.
+    /// Range of each covariate that the identification poses cover, in its unit: beyond it the correction keeps its last value.
     pub ranges: Vec<(Covariate, (f64, f64))>,
-    /// Held-out poses beyond it, which stay uncorrected.
+    /// Held-out poses beyond it.
     pub beyond: usize,
     /// Root mean squared error of identification poses left out in turn, before and with the correction \[m\].
     pub cross_validated: (f64, f64),
@@ -120,6 +120,12 @@ fn correction(
     hypothesis: &Hypothesis,
     added: &[Effect],
 ) -> Option<Correction> {
+    // The peak of what is narrow may have been set aside; poses that are left out tell a peak from an outlier.
+    let mut whole = fitted.clone();
+    if fitted.problem.robust.is_none() {
+        whole.set_aside.clear();
+    }
+    let fitted = &whole;
     let (here, there) = (data.rows(), &data.split.held_out);
     let rows = [here, there.as_slice()].concat();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, here.len());
@@ -142,7 +148,8 @@ fn correction(
     let moved = held_out.fitted() * parameters + beyond * coefficients;
     let reached = hypotheses.reached(hypothesis, here.len());
     let mut errors = fitted.errors(data, there);
-    for (pose, error) in errors.iter_mut().enumerate().filter(|(pose, _)| reached[*pose]) {
+    // What was fitted beside the function holds everywhere; beyond its range the function keeps its last value.
+    for (pose, error) in errors.iter_mut().enumerate() {
         *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
     }
     let function = own * coefficients;

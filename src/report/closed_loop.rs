@@ -97,7 +97,7 @@ object! {
 }
 object! {
     CorrectionEntry(own: &Correction) {
-        /// Of each covariate that it depends on, SI; beyond it nothing is corrected.
+        /// Of each covariate that it depends on, SI; beyond it the correction keeps its last value.
         ranges: Vec<(String, [f64; 2])> = own.ranges.iter().map(|(of, range)| (of.to_string(), (*range).into())).collect(),
         held_out_beyond: usize = own.beyond,
         /// Root mean squared error of poses left out in turn, before and with the correction.
@@ -469,7 +469,7 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     let ranges: Vec<String> = ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
     if !ranges.is_empty() {
         sentences.push(format!(
-            "It holds for {}, as far as the identification poses reach; nothing is corrected beyond ({beyond} of {} held-out poses).",
+            "It holds for {}, as far as the identification poses reach; beyond, it keeps its last value ({beyond} of {} held-out poses).",
             ranges.join(", "),
             held_out.n
         ));

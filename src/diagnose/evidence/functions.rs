@@ -11,6 +11,47 @@ const MARGIN: f64 = 0.25;
 /// Variance of a basis function, of that of the first, below which it is left out.
 const NEGLIGIBLE: f64 = 1e-3;
 
+/// Centres of single bumps and steps along the range.
+const CENTRES: u32 = 16;
+/// Their widths as parts of the range.
+const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
+/// Steps of a finer search about one, of the centre as parts of the width, and factors of the width.
+const FINER: ([f64; 9], [f64; 5]) = ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4, 0.6], [0.7, 0.85, 1.0, 1.2, 1.4]);
+
+/// A single bump exp(−u²/2) or step tanh u with u = (x − centre) / width, x from 0 to 1 over the range.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    is_bump: bool,
+    centre: f64,
+    width: f64,
+}
+
+impl Shape {
+    /// All over the range.
+    pub fn all() -> Vec<Self> {
+        let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
+        let of_centre = |centre| {
+            WIDTHS.into_iter().flat_map(move |width| [true, false].map(|is_bump| Self { is_bump, centre, width }))
+        };
+        centres.flat_map(of_centre).collect()
+    }
+
+    /// Those about this one.
+    pub fn finer(self) -> Vec<Self> {
+        let (steps, factors) = FINER;
+        let at = |step: f64| {
+            let centre = self.centre + step * self.width;
+            factors.map(|factor| Self { centre, width: self.width * factor, ..self })
+        };
+        steps.into_iter().flat_map(at).collect()
+    }
+
+    pub fn value(self, x: f64) -> f64 {
+        let u = (x - self.centre) / self.width;
+        if self.is_bump { (-0.5 * u * u).exp() } else { u.tanh() }
+    }
+}
+
 /// A covariate at every pose.
 pub(super) struct Known {
     pub covariate: Covariate,

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidate, Columns, slots};
-use super::functions::Known;
+use super::functions::{Known, Shape};
 use super::{Explanation, Hypothesis};
 use crate::diagnose::candidates::Candidates;
 use crate::diagnose::covariate::Covariate;
@@ -12,11 +12,6 @@ use crate::diagnose::fitted::Fitted;
 use crate::diagnose::neighbourhood::Linearised;
 use crate::model::parameter::Slot;
 use crate::problem::Effect;
-
-/// Centres of single bumps and steps along the range.
-const CENTRES: u32 = 16;
-/// Their widths as parts of the range.
-const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
 
 /// A fit linearised at some rows, with every hypothesis.
 pub(in crate::diagnose) struct Hypotheses<'a> {
@@ -49,34 +44,25 @@ impl<'a> Hypotheses<'a> {
     /// The function of a hypothesis that an explanation holds.
     pub(super) fn candidate(&self, explanation: &Explanation, hypothesis: &Hypothesis) -> Option<&Candidate> {
         let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
-        let (_, &(variant, _)) = members.find(|(known, _)| known.says(hypothesis))?;
-        self.all.iter().find(|own| own.variant == variant && own.hypothesis.says(hypothesis))
+        let (_, &(variant, _)) = members.find(|(known, _)| *known == hypothesis)?;
+        self.all.iter().find(|own| own.variant == variant && own.hypothesis == *hypothesis)
     }
 
-    /// Single bumps and steps in the place of a function of one covariate at one coordinate; each as probable as the others.
-    pub(super) fn shapes(&self, hypothesis: &Hypothesis, weighed: usize) -> Vec<Candidate> {
+    /// Single bumps and steps in the place of a function of one covariate at one coordinate; all together as probable as the function.
+    pub(super) fn shaped(&self, hypothesis: &Hypothesis, weighed: usize, shapes: &[Shape]) -> Vec<Candidate> {
         let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
         let Some(known) = Known::of(Covariate::Position, values.to_vec(), weighed) else { return Vec::new() };
-        let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
-        let all = centres.flat_map(|centre| WIDTHS.map(|width| (centre, width)));
-        let both = all.flat_map(|(centre, width)| [(centre, width, true), (centre, width, false)]);
-        let one = |(centre, width, bump): (f64, f64, bool)| {
-            let value = |u: f64| if bump { (-0.5 * u * u).exp() } else { u.tanh() };
+        let ln_prior = -(Shape::all().len() as f64).ln();
+        let one = |shape: &Shape| {
             let mut columns = DMatrix::from_columns(std::slice::from_ref(&lever));
             for (pose, at) in known.scaled.iter().enumerate() {
-                columns.rows_mut(3 * pose, 3).scale_mut(value((at - centre) / width));
+                columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
             }
             let size = (columns.rows(0, 3 * weighed).norm_squared() / (3 * weighed) as f64).sqrt();
             columns /= size.max(f64::MIN_POSITIVE);
-            Candidate {
-                hypothesis: hypothesis.clone(),
-                variant: 0,
-                columns,
-                ln_prior: -(f64::from(CENTRES) * 2.0 * WIDTHS.len() as f64).ln(),
-                never_negative: vec![false],
-            }
+            Candidate { hypothesis: hypothesis.clone(), variant: 0, columns, ln_prior, never_negative: vec![false] }
         };
-        both.map(one).collect()
+        shapes.iter().map(one).collect()
     }
 
     /// The covariates that a hypothesis depends on.

@@ -26,12 +26,15 @@ use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
 use columns::Candidate;
+use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
 use search::{Block, Target, Weighted, search};
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
+/// Shapes that are looked at more closely.
+const FINEST: usize = 4;
 /// Probability below which an explanation is not looked at in fits to fewer poses.
 const WORTH_A_DRAW: f64 = 1e-3;
 /// One configuration in so many is left out.
@@ -220,7 +223,7 @@ pub(super) fn ln_posterior(
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
-        None => functions.iter().any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis.says(own)),
+        None => functions.iter().any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis == *own),
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
     let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &[])?;
@@ -237,15 +240,26 @@ pub(super) fn best_form(
     hypothesis: &Hypothesis,
 ) -> Option<(DMatrix<f64>, f64)> {
     let smooth = hypotheses.candidate(best, hypothesis)?;
-    let shapes = hypotheses.shapes(hypothesis, weighed);
-    let forms: Vec<&Candidate> = std::iter::once(smooth).chain(&shapes).collect();
     let beyond: Vec<usize> = (weighed..hypotheses.linearised.poses().len()).collect();
-    let (blocks, target) = blocks(fitted, data, hypotheses, &forms, &beyond)?;
-    let all: Vec<usize> = (0..blocks.len()).collect();
+    let gains = |forms: &[&Candidate]| {
+        let (blocks, target) = blocks(fitted, data, hypotheses, forms, &beyond)?;
+        let all: Vec<usize> = (0..blocks.len()).collect();
+        let mut gains = search::gains_beside(&[], &all, (&blocks, &target), data.rules);
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Some(gains)
+    };
+    let mut shapes = Shape::all();
+    let coarse = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let best_of = |(k, ..): &(usize, f64, f64)| shapes[*k].finer();
+    if !coarse.is_empty() {
+        let found = gains(&coarse.iter().collect::<Vec<_>>())?;
+        shapes = found.iter().take(FINEST).flat_map(best_of).collect();
+    }
+    let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let forms: Vec<&Candidate> = std::iter::once(smooth).chain(&finer).collect();
     // Half of the chance for the smooth function, half for all shapes together.
-    let gains = search::gains_beside(&[], &all, (&blocks, &target), data.rules);
-    let gain = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
-    let (k, _, size) = gains.into_iter().map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let even = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
+    let (k, _, size) = gains(&forms)?.into_iter().map(even).max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some((forms[k].columns.clone(), size))
 }
 
@@ -265,7 +279,7 @@ pub(super) fn stability(
     let worth = || evidence.explanations.iter().filter(|known| known.probability > WORTH_A_DRAW);
     let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
     let is_known = |candidate: &&Candidate| {
-        all().any(|(own, (variant, _))| *variant == candidate.variant && own.says(&candidate.hypothesis))
+        all().any(|(own, (variant, _))| *variant == candidate.variant && *own == candidate.hypothesis)
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_known).collect();
     let present: Vec<usize> = (0..own.len())
@@ -376,7 +390,7 @@ fn stand_ins(
     let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
     let tried: Vec<usize> = (0..blocks.len()).filter(|&k| effect(k).is_some()).collect();
     let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
-        hypotheses.all.iter().position(|known| known.variant == *variant && known.hypothesis.says(own))
+        hypotheses.all.iter().position(|known| known.variant == *variant && known.hypothesis == *own)
     };
     let members: Vec<usize> = best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
     let mut all = Vec::new();
