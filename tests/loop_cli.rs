@@ -170,7 +170,7 @@ fn structure_without_a_name_is_said_to_be_left() {
     is_summary(&left["held_out_with_empirical_correction"], 50);
     // Lines break anywhere.
     let told = bench.told(&["loop", "arm"]).split_whitespace().collect::<Vec<_>>().join(" ");
-    for words in ["Unexplained", "What remains", left["where"].as_str().unwrap(), "nothing is corrected beyond"] {
+    for words in ["Unexplained", "What remains", left["where"].as_str().unwrap(), "it keeps its last value"] {
         assert!(told.contains(words), "{words:?} missing in:\n{told}");
     }
 }
