@@ -67,7 +67,8 @@ impl Fitted {
         };
         let set_aside = found.outliers.iter().map(|outlier| outlier.row).collect();
         let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside };
-        if fitted.problem.robust.is_none() {
+        // The rounds on many poses fit too often for it.
+        if fitted.problem.robust.is_none() && data.rows().len() <= data.rules.weighed_poses {
             fitted.set_aside = outliers(&fitted, data);
         }
         Ok(fitted)

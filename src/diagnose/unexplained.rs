@@ -8,7 +8,6 @@ use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law
 use super::fitted::Fitted;
 use super::residual_tests::Findings;
 use crate::identify::ErrorSummary;
-use crate::problem::Effect;
 use crate::quantity::Unit;
 
 /// Structure that is left.
@@ -72,7 +71,6 @@ pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
     (evidence, best): (&Evidence, &Explanation),
-    added: &[Effect],
 ) -> Vec<Unexplained> {
     let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
@@ -91,7 +89,7 @@ pub(super) fn without_law(
     let first = all.iter().position(|(hypothesis, _)| hypothesis.law != Law::PerPose);
     if let Some(first) = first {
         let hypothesis = all[first].0.clone();
-        all[first].1.correction = correction(fitted, data, best, &hypothesis, added);
+        all[first].1.correction = correction(fitted, data, best, &hypothesis);
     }
     all.into_iter().map(|(_, found)| found).collect()
 }
@@ -113,13 +111,7 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
 
 /// The most probable function of a hypothesis, applied to the held-out poses; `None` where poses that are left out gain
 /// nothing worth stating.
-fn correction(
-    fitted: &Fitted,
-    data: &Data,
-    best: &Explanation,
-    hypothesis: &Hypothesis,
-    added: &[Effect],
-) -> Option<Correction> {
+fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hypothesis) -> Option<Correction> {
     // The peak of what is narrow may have been set aside; poses that are left out tell a peak from an outlier.
     let mut whole = fitted.clone();
     if fitted.problem.robust.is_none() {
@@ -128,7 +120,7 @@ fn correction(
     let fitted = &whole;
     let (here, there) = (data.rows(), &data.split.held_out);
     let rows = [here, there.as_slice()].concat();
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, here.len());
+    let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
     let (own, sigma) = best_form(fitted, data, (&hypotheses, here.len()), best, hypothesis)?;
     let linearised = fitted.linearised(data, &[]);
     let fit = fitted.neighbourhood(&linearised);

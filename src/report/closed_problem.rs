@@ -6,7 +6,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString,
 
 use super::effect::values;
 use super::quantity::p_value;
-use crate::diagnose::{ClosedLoop, Found, HARMONICS, Trace};
+use crate::diagnose::{ClosedLoop, Found, HARMONICS, SelectionRules, Trace};
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
 
@@ -172,8 +172,9 @@ fn arguments(effect: &Effect) -> Value {
 
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found, trace: &Trace) -> Vec<String> {
+    let sure = if found.is_named(SelectionRules::DEFAULT.stated) { "" } else { "; that this is the law is not sure" };
     let first =
-        format!("Found by flexcal loop: {}, p-value {}.", trace.describe(&found.effect), p_value(found.p_value));
+        format!("Found by flexcal loop: {}, p-value {}{sure}.", trace.describe(&found.effect), p_value(found.p_value));
     // A custom effect may say of itself what it likes, in several lines.
     std::iter::once(first).chain(values(found)).map(|line| one_line(&line.replace('\n', " "))).collect()
 }

@@ -53,6 +53,8 @@ pub(super) struct Columns<'a, 'l> {
     pub rules: &'a SelectionRules,
     /// Poses, the first ones, that hypotheses are weighed on; at those behind them they are predicted.
     pub weighed: usize,
+    /// Functions of one hypothesis alone are wanted.
+    only: Option<&'a Hypothesis>,
     candidates: Vec<Candidate>,
     /// Family of each candidate and its share of the family's chance.
     shares: Vec<(String, f64)>,
@@ -61,23 +63,27 @@ pub(super) struct Columns<'a, 'l> {
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Effects with their columns and functions of unknown law; and the covariates of those functions.
+    /// Effects with their columns and functions of unknown law, or those of one hypothesis alone; and the covariates of those functions.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
         (time_measured, rules, weighed): (bool, &'a SelectionRules, usize),
         effects: &[(Effect, DMatrix<f64>)],
+        only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<Known>) {
         let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
-        let mut all = Self { problem, linearised, time_measured, rules, weighed, candidates, shares, covariates };
+        let mut all = Self { problem, linearised, time_measured, rules, weighed, only, candidates, shares, covariates };
         all.effects(effects);
         all.functions();
         all.weighted()
     }
 
-    fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: DMatrix<f64>) {
+    fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: impl FnOnce() -> DMatrix<f64>) {
+        if self.only.is_some_and(|only| *only != hypothesis) {
+            return;
+        }
         // Names of effects, one's own among them, have no space before them.
-        self.entered(&format!(" {family}"), share, hypothesis, columns, Vec::new());
+        self.entered(&format!(" {family}"), share, hypothesis, columns(), Vec::new());
     }
 
     fn entered(
@@ -92,7 +98,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let size = (weighed.norm_squared() / weighed.nrows().max(1) as f64).sqrt();
         if size > 0.0 && size.is_finite() {
             columns /= size;
-            let same = self.candidates.last().filter(|last| last.hypothesis.says(&hypothesis));
+            let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
             let variant = same.map_or(0, |last| last.variant + 1);
             self.candidates.push(Candidate { hypothesis, variant, columns, ln_prior: 0.0, never_negative });
             self.shares.push((family.to_owned(), share));
@@ -212,17 +218,18 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         for &length in lengths.iter().filter(|_| of.levels > 3) {
-            self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&of.scaled, length)));
+            self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, length)));
         }
+        let longest = self.rules.smooth_lengths[0];
         if of.levels == 3 {
-            self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&of.scaled, self.rules.smooth_lengths[0])));
+            self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, longest)));
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) {
             // What settles changes fast at first.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
             if let Some(warped) = Known::of(of.covariate, logarithm, self.weighed) {
-                self.add(family, 1.0, hypothesis(Law::Smooth), times(at, &basis(&warped.scaled, 0.25)));
+                self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&warped.scaled, 0.25)));
             }
         }
     }
@@ -242,12 +249,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         let mut depends_on = vec![one.covariate, other.covariate];
         depends_on.sort();
         let hypothesis = Hypothesis { law: Law::Smooth, part: Part::of(slot), slot: Some(slot), depends_on };
-        self.add(
-            family,
-            1.0,
-            hypothesis,
-            times(at, &products_of(&[&one.scaled, &other.scaled], self.rules.surface_length)),
-        );
+        let length = self.rules.surface_length;
+        self.add(family, 1.0, hypothesis, || times(at, &products_of(&[&one.scaled, &other.scaled], length)));
     }
 
     /// Another error in every pose.
@@ -255,7 +258,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let poses = at.len() / 3;
         let hypothesis =
             Hypothesis { law: Law::PerPose, part: Part::of(slot), slot: Some(slot), depends_on: Vec::new() };
-        self.add("per pose", 1.0, hypothesis, times(&[at], &DMatrix::identity(poses, poses)));
+        self.add("per pose", 1.0, hypothesis, || times(&[at], &DMatrix::identity(poses, poses)));
     }
 
     /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums of neighbouring ones.
@@ -274,7 +277,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             });
             let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate]);
             let hypothesis = Hypothesis { law, part: Part::Joint(joint), slot: Some(slot), depends_on };
-            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, times(&[at], &waves));
+            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || times(&[at], &waves));
         }
     }
 
@@ -300,10 +303,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         });
         let hypothesis =
             |law| Hypothesis { law, part: Part::Measurement, slot: None, depends_on: vec![Covariate::Position] };
-        self.add("field", 1.0, hypothesis(Law::Linear), times(&at, &linear));
+        self.add("field", 1.0, hypothesis(Law::Linear), || times(&at, &linear));
         if let [x, y, z] = coordinates.as_slice() {
             let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
-            self.add("field", 1.0, hypothesis(Law::Smooth), times(&at, &plane));
+            self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);
     }
@@ -319,9 +322,9 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         let of_pose = |row: usize, group: usize| numbers.get(row) == Some(&group);
-        let indicators = DMatrix::from_fn(poses.len(), count, |row, group| f64::from(u8::from(of_pose(row, group))));
+        let indicators = || DMatrix::from_fn(poses.len(), count, |row, group| f64::from(u8::from(of_pose(row, group))));
         let hypothesis = Hypothesis { law: Law::PerPose, part: Part::Arm, slot: None, depends_on: Vec::new() };
-        self.add("per pose", 1.0, hypothesis, times(&axes.iter().collect::<Vec<_>>(), &indicators));
+        self.add("per pose", 1.0, hypothesis, || times(&axes.iter().collect::<Vec<_>>(), &indicators()));
     }
 
     /// Curvature and strain of beams by other functions than the temperature's multiple.

@@ -37,8 +37,16 @@ impl<'a> Hypotheses<'a> {
         let new = candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.chain(new).collect();
         let how = (data.measurements.time_measured, data.rules, weighed);
-        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &effects);
+        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &effects, None);
         Self { linearised, added, unknowns, all, covariates }
+    }
+
+    /// The functions of one hypothesis alone, about what the whole fit leaves.
+    pub fn only(fitted: &'a Fitted, data: &Data<'a>, rows: &[usize], weighed: usize, of: &Hypothesis) -> Self {
+        let linearised = fitted.linearised_with(data, rows, &[], &slots(&fitted.problem));
+        let how = (data.measurements.time_measured, data.rules, weighed);
+        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
+        Self { linearised, added: Vec::new(), unknowns: Vec::new(), all, covariates }
     }
 
     /// The function of a hypothesis that an explanation holds.

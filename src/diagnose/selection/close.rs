@@ -135,7 +135,7 @@ pub fn close_by(
     let taken_out: &[Effect] = if crowded { &[] } else { &added };
     let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out));
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
-    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best, taken_out));
+    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
