@@ -8,6 +8,8 @@ mod common;
 mod arm;
 #[path = "paper/elastic.rs"]
 mod elastic;
+#[path = "paper/fingerprint.rs"]
+mod fingerprint;
 #[path = "paper/geometry.rs"]
 mod geometry;
 #[path = "paper/identification.rs"]

@@ -21,7 +21,7 @@ use super::{diagnostic, output};
 within the limits of the joints or the ranges of a TRUTH.toml; without both they are those of the measurements.
 
 Examples:
-  flexcal check problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
+  flexcal check problems/lunar-sampler --truth problems/lunar-sampler/TRUTH.toml --poses 28
   flexcal check my-arm --candidates out/my-arm/plan.csv
   flexcal check problems/lunar-sampler --json"
 )]

@@ -23,7 +23,7 @@ use super::{diagnostic, output};
 a table. The plan is plan.csv: measure it, add the columns x_mm, y_mm, z_mm, and identify.
 
 Examples:
-  flexcal plan problems/lunar-sampler --truth tests/cases/truth.toml --poses 28
+  flexcal plan problems/lunar-sampler --truth problems/lunar-sampler/TRUTH.toml --poses 28
   flexcal plan my-arm --poses 40 --candidates reachable.csv --criterion D
   flexcal plan my-arm --poses 10 --data first.csv --seed 7
   flexcal plan my-arm --poses 12 --separate 'gear-ratio = { joint = 3 }' 'joint-harmonic = { joint = 3, orders = [1] }'"

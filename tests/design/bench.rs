@@ -15,7 +15,7 @@ use super::common::made::{model_of, normal};
 
 /// The lunar sampler and what the test rig knows about it.
 pub fn lunar() -> (Problem, Truth) {
-    let problem = Problem::read(&path("problems/lunar-sampler")).unwrap();
+    let problem = Problem::read(&path("tests/cases")).unwrap();
     let truth = Truth::read(Path::new(&path("tests/cases/truth.toml")), &problem).unwrap();
     (problem, truth)
 }

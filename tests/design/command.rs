@@ -54,7 +54,7 @@ fn flexcal(arguments: &[&str]) -> Command {
 fn a_plan_can_be_checked_and_measured() {
     let bench = Bench::new();
     let table = bench.write("some.csv", &drawn(60));
-    let (out, _) = bench.run(0, "plan problems/lunar-sampler --poses 20 --candidates", &[&table]);
+    let (out, _) = bench.run(0, "plan tests/cases --poses 20 --candidates", &[&table]);
     for expected in ["20 poses, from 60 candidates", "joint2.stiffness", "times smaller", "rank 31 of 32", "plan.csv"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
@@ -69,7 +69,7 @@ fn a_plan_can_be_checked_and_measured() {
     let plan: Value = serde_json::from_str(&fs::read_to_string(bench.path("plan.json")).unwrap()).unwrap();
     assert!(plan["gain"].as_f64().unwrap() > 1.0 && plan["sufficient"] == true && plan["criterion"] == "S");
     let path = bench.path("plan.csv").display().to_string();
-    let (out, _) = bench.run(0, "check problems/lunar-sampler --json --candidates", &[&path]);
+    let (out, _) = bench.run(0, "check tests/cases --json --candidates", &[&path]);
     let check: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((check["poses"].as_u64(), check["rank"].as_u64()), (Some(20), Some(31)));
     let found = |json: &Value, name: &str| {
@@ -94,11 +94,11 @@ fn drawn(count: usize) -> String {
 #[test]
 fn a_check_takes_measured_poses_or_draws_them() {
     let bench = Bench::new();
-    let (out, _) = bench.run(0, "check problems/lunar-sampler", &[]);
+    let (out, _) = bench.run(0, "check tests/cases", &[]);
     for expected in ["32 parameters, 28 poses", "in the held-out poses", "these", "joint1.beta + 0.71 joint2.theta"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
-    let (out, _) = bench.run(0, "check problems/lunar-sampler --truth tests/cases/truth.toml --poses 12 --json", &[]);
+    let (out, _) = bench.run(0, "check tests/cases --truth tests/cases/truth.toml --poses 12 --json", &[]);
     let check: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(check["poses"], 12);
     let steps = check["growth"].as_array().unwrap();
@@ -111,7 +111,7 @@ fn a_check_takes_measured_poses_or_draws_them() {
 #[test]
 fn a_check_names_what_would_be_found() {
     let bench = Bench::new();
-    let (out, _) = bench.run(0, "check problems/lunar-sampler", &[]);
+    let (out, _) = bench.run(0, "check tests/cases", &[]);
     for expected in
         ["How large an effect must be", "gear-ratio = { joint = 4 }", "Not with these poses", "tracker-scale"]
     {
@@ -134,7 +134,7 @@ fn a_plan_tells_two_effects_apart() {
     let bench = Bench::new();
     let table = bench.write("some.csv", &drawn(60));
     let pair = ["--separate", "gear-ratio = { joint = 3 }", "hoist-force", "--candidates", &table];
-    let (out, _) = bench.run(0, "plan problems/lunar-sampler --poses 20", &pair);
+    let (out, _) = bench.run(0, "plan tests/cases --poses 20", &pair);
     for expected in
         ["told apart", "angle between them", "hoist-force = true", "gear-ratio[3].error", "p beside the other"]
     {
@@ -154,7 +154,7 @@ fn a_plan_tells_two_effects_apart() {
         (["tracker-drift", "hoist-force"], "an effect of time"),
     ] {
         let more = ["--separate", pair[0], pair[1], "--candidates", &table];
-        let (_, err) = bench.run(2, "plan problems/lunar-sampler --poses 20", &more);
+        let (_, err) = bench.run(2, "plan tests/cases --poses 20", &more);
         assert!(err.contains(expected), "{expected} missing in:\n{err}");
         assert_eq!(err.contains(" | "), pair[0].contains('='), "only what somebody wrote is shown:\n{err}");
     }
@@ -193,7 +193,7 @@ fn bad_input_names_file_and_key_or_the_option() {
     let bad = bench.write("bad.csv", "q1_deg,q2_deg,q3_deg,q4_deg\n1,2,3,4\n1,2,x,4\n");
     let short = bench.write("short.csv", "q1_deg,q2_deg,q3_deg\n1,2,3\n");
     let three = bench.write("three.csv", "q1_deg,q2_deg,q3_deg,q4_deg\n1,2,3,4\n5,6,7,8\n9,10,11,12\n");
-    let lunar = fs::read_to_string("problems/lunar-sampler/problem.toml").unwrap();
+    let lunar = fs::read_to_string("tests/cases/problem.toml").unwrap();
     let sigma = bench.write("no-sigma.toml", &lunar.replace("position_sigma_mm = 0.05\n", ""));
     let fixed = lunar.split("[parameters]").next().unwrap().to_owned() + "[data]\nposition_sigma_mm = 0.05\n";
     let fixed = bench.write("fixed.toml", &fixed);
@@ -201,14 +201,14 @@ fn bad_input_names_file_and_key_or_the_option() {
                 target_m = [1, 0, 0]\n[data]\nposition_sigma_mm = 1\n";
     let half = bench.write("half.toml", half);
     let cases: [(&str, &[&str], &[&str]); 10] = [
-        ("plan problems/lunar-sampler --poses 28", &[], &["joint[1].min_deg: missing", "--truth", "--candidates"]),
+        ("plan tests/cases --poses 28", &[], &["joint[1].min_deg: missing", "--truth", "--candidates"]),
         ("check --poses 28", &[&half], &["half.toml:5: joint[1].max_deg: missing"]),
-        ("plan problems/lunar-sampler --poses 28 --candidates", &[&bad], &["bad.csv:3: column q3_deg", "\"x\""]),
-        ("plan problems/lunar-sampler --poses 28 --candidates", &[&short], &["short.csv:1: column q4", "missing"]),
-        ("plan problems/lunar-sampler --poses 28 --candidates", &[&three], &["--poses 28", "only 3 candidates"]),
-        ("check problems/lunar-sampler --poses 28 --candidates", &[&three], &["--poses 28", "only 3 rows"]),
-        ("plan problems/lunar-sampler --poses 0", &[], &["--poses"]),
-        ("plan problems/lunar-sampler --poses 9 --criterion Q", &[], &["--criterion", "'Q'"]),
+        ("plan tests/cases --poses 28 --candidates", &[&bad], &["bad.csv:3: column q3_deg", "\"x\""]),
+        ("plan tests/cases --poses 28 --candidates", &[&short], &["short.csv:1: column q4", "missing"]),
+        ("plan tests/cases --poses 28 --candidates", &[&three], &["--poses 28", "only 3 candidates"]),
+        ("check tests/cases --poses 28 --candidates", &[&three], &["--poses 28", "only 3 rows"]),
+        ("plan tests/cases --poses 0", &[], &["--poses"]),
+        ("plan tests/cases --poses 9 --criterion Q", &[], &["--criterion", "'Q'"]),
         ("plan --poses 2 --candidates", &[&three, "--", &sigma], &["no-sigma.toml: data.position_sigma_mm"]),
         ("plan --poses 2 --candidates", &[&three, "--", &fixed], &["fixed.toml: parameters: no parameter is free"]),
     ];
@@ -227,10 +227,9 @@ fn bad_input_names_file_and_key_or_the_option() {
 fn quiet_is_quiet_and_progress_keeps_to_standard_error() {
     let bench = Bench::new();
     let table = bench.write("some.csv", &drawn(30));
-    let (out, err) = bench.run(0, "plan problems/lunar-sampler --poses 20 --quiet --candidates", &[&table]);
+    let (out, err) = bench.run(0, "plan tests/cases --poses 20 --quiet --candidates", &[&table]);
     assert!(out.is_empty() && err.is_empty(), "{out}{err}");
-    let (out, err) =
-        bench.run(0, "plan problems/lunar-sampler --poses 20 --json --criterion d --candidates", &[&table]);
+    let (out, err) = bench.run(0, "plan tests/cases --poses 20 --json --criterion d --candidates", &[&table]);
     let json: Value = serde_json::from_str(&out).unwrap();
     assert!(json["criterion"] == "D" && err.is_empty(), "{err}");
 }
