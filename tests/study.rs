@@ -1,7 +1,10 @@
 //! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that mean what they say; and
 //! bad input.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test that fails may panic; figures are shown")]
+
+#[path = "study/misprints.rs"]
+mod misprints;
 
 use std::fs;
 use std::path::PathBuf;

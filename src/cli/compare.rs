@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::identify;
+use flexcal::identify::{self, CompareOptions};
 use flexcal::report::{self, PlotData};
 
 use super::input::{Common, Input};
@@ -20,6 +20,9 @@ use super::{diagnostic, output};
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
+    /// Let the procedure of [Chen2021] take part; it does anyway where the problem declares the paper's arm
+    #[arg(long)]
+    paper: bool,
 }
 
 /// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
@@ -28,7 +31,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Input { problem, data, results } = common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
     let line = common.talks().then(Line::new);
     let sink = line.as_ref().map(Line::sink);
-    let result = identify::compare(&problem, &data, sink.as_ref());
+    let options = CompareOptions { paper: arguments.paper, progress: sink };
+    let result = identify::compare(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();
     }

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::files::at_most;
+use flexcal::identify::{self, Strategy};
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::{identify, report};
+use flexcal::report;
 use serde::Deserialize;
 
 use super::input::Common;
@@ -44,6 +45,7 @@ struct Estimates {
     problem: String,
     /// Not there in what older versions wrote.
     arm_digest: Option<String>,
+    strategy: Option<String>,
     trusted: bool,
     parameters: Vec<Estimated>,
 }
@@ -101,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let placement = identify::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
-    let (values, trusted) = read(&arguments.estimate, &problem, &model)?;
+    let (values, trusted, model) = read(&arguments.estimate, &problem, model)?;
     if !trusted && !common.quiet {
         diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
     }
@@ -120,8 +122,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
 }
 
-/// Estimates by name, once they are known to be of this problem, and whether they are to be trusted.
-fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String, f64>, bool), EstimateError> {
+/// Estimates by name, once they are known to be of this problem, whether they are to be trusted, and the model that they are
+/// of, given the declared one.
+fn read(file: &Path, problem: &Problem, model: Model) -> Result<(HashMap<String, f64>, bool, Model), EstimateError> {
     let file = file.to_owned();
     let text = match at_most(&file, LARGEST_MIB << 20) {
         Ok(text) => text,
@@ -136,6 +139,8 @@ fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String
     if estimates.problem != problem.name {
         return Err(EstimateError::OtherProblem { file, found: estimates.problem, expected: problem.name.clone() });
     }
+    let rigid = estimates.strategy.as_deref() == Some(Strategy::Rigid.as_str());
+    let model = if rigid { Strategy::Rigid.model(model) } else { model };
     let mut names = HashSet::new();
     for entry in &estimates.parameters {
         if !names.insert(entry.name.as_str()) {
@@ -160,5 +165,5 @@ fn read(file: &Path, problem: &Problem, model: &Model) -> Result<(HashMap<String
         return Err(EstimateError::OtherArm { file });
     }
     let values = estimates.parameters.into_iter().map(|entry| (entry.name, entry.estimate)).collect();
-    Ok((values, estimates.trusted))
+    Ok((values, estimates.trusted, model))
 }

@@ -4,11 +4,11 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::monte_carlo::{self, CellResult, Shard, Store, Study};
+use flexcal::monte_carlo::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 use flexcal::report;
 
 use super::outcome::Outcome;
-use super::output::{self, Results, WriteError};
+use super::output::{self, REPORT, Results, WriteError};
 use super::progress::FitBar;
 
 /// Arguments of `flexcal study`.
@@ -20,7 +20,8 @@ Examples:
   flexcal study problems/lunar-sampler/STUDY.toml
   flexcal study STUDY.toml --out results --shard 1/2
   flexcal study STUDY.toml --out results --shard 2/2
-  flexcal study merge STUDY.toml --out results")]
+  flexcal study merge STUDY.toml --out results
+  flexcal study problems/lunar-sampler/MISPRINTS.toml")]
 pub struct Arguments {
     #[command(subcommand)]
     merge: Option<Merge>,
@@ -74,8 +75,13 @@ const NAMES: [&str; 4] = ["study.json", "parameters.csv", "timing.csv", "study.c
 impl Common {
     /// Where the results go.
     fn results(&self, study: &Study) -> Result<Results, WriteError> {
-        let folder = self.out.clone().unwrap_or_else(|| Path::new("out").join(&study.name));
-        Results::claim("study", folder, study.files.clone(), &NAMES, (self.force, self.quiet))
+        self.claim(&study.name, &study.files, &NAMES)
+    }
+
+    /// The same of a study called `name`, which reads `files` and writes `names`.
+    fn claim(&self, name: &str, files: &[PathBuf], names: &[&str]) -> Result<Results, WriteError> {
+        let folder = self.out.clone().unwrap_or_else(|| Path::new("out").join(name));
+        Results::claim("study", folder, files.to_vec(), names, (self.force, self.quiet))
     }
 
     /// Whether people read along.
@@ -99,7 +105,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     // Without a subcommand clap asks for these.
     let Some(common) = &arguments.common else { return Ok(Outcome::Done) };
-    let study = Study::read(&common.study)?;
+    let study = match Request::read(&common.study)? {
+        Request::Fits(study) => *study,
+        Request::Misprints(study) if arguments.shard.is_none() => return misprints(common, &study),
+        // Reads it as what has shares, which says what is wrong.
+        _ => Study::read(&common.study)?,
+    };
     let results = common.results(&study)?;
     let store = Store::new(&results.folder);
     fit(common, &study, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
@@ -109,6 +120,26 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if common.talks() {
         let (file, folder) = (common.study.display(), results.folder.display());
         output::print(&format!("Share done. After the last: flexcal study merge {file} --out {folder}\n"))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Does a study of the misprints; writes `misprints.json` and the reports, and prints the tables.
+fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
+    let names = ["misprints.json", REPORT[0], REPORT[1]];
+    let results = common.claim(&study.name, &study.files, &names)?;
+    let bar = common.talks().then(|| FitBar::new((study.specimens * study.links_over_joints.len()) as u64, 0));
+    let found = monte_carlo::replicate(study, || bar.iter().for_each(FitBar::advance));
+    bar.iter().for_each(FitBar::clear);
+    let found = found?;
+    let json = report::replica_json(study, &found);
+    results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
+    if common.json {
+        output::print_json(&json)?;
+    } else if common.talks() {
+        output::print(&report::replica_text(study, &found))?;
+        let folder = results.folder.display();
+        output::print(&format!("\nWritten to {folder}: misprints.json, report.md, report.html\n"))?;
     }
     Ok(Outcome::Done)
 }

@@ -47,7 +47,7 @@ impl Fitted {
     /// A problem that was fitted to the identification rows before.
     pub fn of(problem: Problem, data: &Data, found: Identification) -> Result<Self, IdentifyError> {
         let placement = Placement::of(data.measurements);
-        let model = Model::new(&problem, &placement.bases, &placement.targets)?;
+        let model = found.strategy.model(Model::new(&problem, &placement.bases, &placement.targets)?);
         let free = |&k: &usize| {
             let name = &model.parameters[k].name;
             found.unknowns.contains(name) && found.estimates[k].at_bound.is_none()

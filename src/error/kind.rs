@@ -209,6 +209,8 @@ pub enum InputErrorKind {
     Repeated,
     #[error("the list is empty; write at least one value")]
     EmptyList,
+    #[error("a study of misprints is done at once, with neither shares nor parts; leave out --shard and merge")]
+    NotOfFits,
     #[error("the study says how many poses there are; leave it out")]
     PosesOfStudy,
     #[error("the model makes no measurements with effects that the problem does not declare; write data = \"rig\"")]

@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use nalgebra::Vector3;
 
+use super::procedure::{Procedure, TableEntry, paper_name};
 use super::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
-use crate::measurement::Dataset;
-use crate::paper::{self, EndPoint, Form, Measured};
+use crate::measurement::{Dataset, Measurements};
+use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
 use crate::problem::{PoseView, Problem};
 
 /// What the paper's closed forms and its iteration make of the data.
@@ -15,8 +16,14 @@ use crate::problem::{PoseView, Problem};
 pub struct Baseline {
     /// As printed, or without the misprints.
     pub form: Form,
+    /// Where the stiffness came from.
+    pub stage: StiffnessStage,
+    /// Table 2: α, a, θ, d, β of each joint.
+    pub geometry: Vec<[TableEntry; 5]>,
     /// Errors of the identified arm, predicted by the same closed forms.
     pub errors: Errors,
+    /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
+    pub held_out: Vec<Vector3<f64>>,
     /// Steps of the iteration of eq. 45.
     pub iterations: u64,
     /// Evaluations of its residual.
@@ -29,53 +36,85 @@ pub struct Baseline {
 
 impl Baseline {
     /// Name beside the strategies.
-    pub fn strategy(&self) -> &'static str {
-        match self.form {
-            Form::Corrected => "paper",
-            Form::Printed => "paper-as-printed",
-        }
+    pub fn name(&self) -> String {
+        paper_name(self.form, self.stage)
+    }
+
+    /// It in the terms of the paper, with what the rigid one leaves.
+    pub(super) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
+        let ignoring = rigid.map(|rigid| rigid.held_out.clone());
+        let paper = Some((self.form, self.stage));
+        Procedure { paper, geometry: self.geometry.clone(), after: self.held_out.clone(), ignoring }
     }
 }
 
-/// Stiffness, then geometry, in one sweep, from the identification rows [Chen2021, eq. 1-45].
+/// Every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow: its closed forms corrected and
+/// as printed, the stiffness known, from positions, or from load differences; and once with elasticity ignored, the first.
 ///
-/// `None` where the procedure does not apply: it knows base and target, so that there are no sessions or targets, and it
-/// needs as many equations as it has geometric parameters.
-pub(super) fn baseline(problem: &Problem, data: &Dataset, form: Form) -> Option<Baseline> {
-    let Dataset { measurements: data, split } = data;
-    if data.session.names.len() > 1 || data.target.is_some() {
-        return None;
+/// None where the procedure does not apply: it knows base and target, so that there are no sessions or targets, and it
+/// needs as many equations as it has geometric parameters. Without elasticity there is the rigid one alone.
+pub(super) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
+    let Dataset { measurements, .. } = data;
+    if measurements.session.names.len() > 1 || measurements.target.is_some() {
+        return Vec::new();
     }
+    let rigid = (Form::Corrected, StiffnessStage::Rigid);
+    let elastic = [Form::Corrected, Form::Printed].into_iter().flat_map(|form| {
+        let stages = StiffnessStage::EACH.into_iter().filter(|&stage| stage != StiffnessStage::Rigid);
+        stages.map(move |stage| (form, stage))
+    });
+    let elastic = elastic.filter(|_| problem.is_elastic());
+    std::iter::once(rigid).chain(elastic).filter_map(|(form, stage)| baseline(problem, data, form, stage)).collect()
+}
+
+/// Some rows as the procedure takes them.
+fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
+    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
+    rows.iter()
+        .map(|&row| Measured {
+            setup: PoseView {
+                configuration: data.configuration(row),
+                payload: value(&data.payload, row),
+                hoist: value(&data.hoist, row),
+                ..PoseView::default()
+            },
+            position: data.positions[row],
+        })
+        .collect()
+}
+
+fn baseline(problem: &Problem, data: &Dataset, form: Form, stage: StiffnessStage) -> Option<Baseline> {
+    let Dataset { measurements, split } = data;
     let clock = Instant::now();
-    let poses = |rows: &[usize]| -> Vec<Measured> {
-        let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
-        rows.iter()
-            .map(|&row| Measured {
-                setup: PoseView {
-                    configuration: data.configuration(row),
-                    payload: value(&data.payload, row),
-                    hoist: value(&data.hoist, row),
-                    ..PoseView::default()
-                },
-                position: data.positions[row],
-            })
-            .collect()
+    let options = paper::Options::new(form, stage);
+    let found = paper::identify(problem, &poses(measurements, &split.identification), &options).ok()?;
+    let errors = |rows: &[usize]| -> Vec<Vector3<f64>> {
+        let error = |pose: &Measured| {
+            let end = EndPoint::new(problem, &found.parameters, &pose.setup, &options.reading);
+            pose.position - end.position(&found.parameters)
+        };
+        poses(measurements, rows).iter().map(error).collect()
     };
-    let options = paper::Options::from(form);
-    let found = paper::identify(problem, &poses(&split.identification), &options).ok()?;
-    let summary = |rows: &[usize]| {
-        let errors: Vec<Vector3<f64>> = poses(rows)
-            .iter()
-            .map(|pose| {
-                let end = EndPoint::new(problem, &found.parameters, &pose.setup, &options.reading);
-                pose.position - end.position(&found.parameters)
-            })
-            .collect();
-        ErrorSummary::of(&errors)
-    };
+    let held_out = errors(&split.held_out);
+    let joints = problem.joints.iter().zip(&found.parameters.geometry).enumerate();
+    let geometry = joints.map(|(joint, (declared, identified))| {
+        let (mut nominal, mut identified) = (Mdh::nominal(declared), *identified);
+        let (nominal, identified) = (nominal.fields_mut().map(|v| *v), identified.fields_mut().map(|v| *v));
+        std::array::from_fn(|field| TableEntry {
+            nominal: nominal[field],
+            identified: identified[field],
+            seen: Some(found.seen[5 * joint + field]),
+        })
+    });
     Some(Baseline {
         form,
-        errors: Errors { identification: summary(&split.identification), held_out: summary(&split.held_out) },
+        stage,
+        geometry: geometry.collect(),
+        errors: Errors {
+            identification: ErrorSummary::of(&errors(&split.identification)),
+            held_out: ErrorSummary::of(&held_out),
+        },
+        held_out,
         iterations: found.iteration.iterations,
         evaluations: found.iteration.evaluations(),
         seconds: clock.elapsed().as_secs_f64(),

@@ -156,7 +156,7 @@ pub enum IdentifyError {
 /// Problem, data, strategy and solver do not fit each other.
 pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<Identification, IdentifyError> {
     let placement = Placement::of(&data.measurements);
-    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let model = options.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
     identify_model(&model, problem, data, options)
 }
 
@@ -176,7 +176,7 @@ fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), I
     Ok(())
 }
 
-/// As [`identify`], with a model of the problem that the caller has changed.
+/// As [`identify`], with a model of the problem that the caller has changed, as [`Strategy::model`] does for a strategy.
 ///
 /// # Errors
 /// Problem, data, strategy and solver do not fit each other.

@@ -36,7 +36,7 @@ impl Identification {
     /// problem lacks; configurations of another number of joints.
     pub fn predict(&self, problem: &Problem, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
         let placement = Placement::of(rows);
-        let model = Model::new(problem, &placement.bases, &placement.targets)?;
+        let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         self.predict_with(&model, rows)
     }
 
@@ -56,7 +56,7 @@ impl Identification {
     pub fn residuals(&self, problem: &Problem, data: &Dataset) -> Result<Vec<Residual>, IdentifyError> {
         let Dataset { measurements, split } = data;
         let placement = Placement::of(measurements);
-        let model = Model::new(problem, &placement.bases, &placement.targets)?;
+        let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let errors = self.errors(&model, measurements)?;
         let sigma = |row: usize| measurements.sigma.as_ref().map_or(self.sigma, |own| own[row]);
         let residual = |(row, position): (usize, Vector3<f64>)| Residual {

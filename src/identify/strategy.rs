@@ -1,6 +1,7 @@
 //! Which parameters are fitted together.
 
 use crate::model::parameter::Parameter;
+use crate::model::{Ablation, Model};
 
 /// Which parameters are fitted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,12 +18,14 @@ pub enum Strategy {
     GeometryOnly,
     /// Stiffnesses; geometry stays at its nominal values.
     StiffnessOnly,
+    /// Geometry of an arm in which nothing gives way: what the paper calls ignoring elasticity.
+    Rigid,
 }
 
 impl Strategy {
     /// Every strategy.
-    pub const EACH: [Self; 5] =
-        [Self::Joint, Self::Sequential, Self::OneSweep, Self::GeometryOnly, Self::StiffnessOnly];
+    pub const EACH: [Self; 6] =
+        [Self::Joint, Self::Sequential, Self::OneSweep, Self::GeometryOnly, Self::StiffnessOnly, Self::Rigid];
 
     /// Their names.
     pub const NAMES: [&str; Self::EACH.len()] = {
@@ -43,6 +46,7 @@ impl Strategy {
             Self::OneSweep => ("sequential-one-sweep", "Stiffness, then geometry, once: the paper's order"),
             Self::GeometryOnly => ("geometry-only", "Geometry; stiffnesses stay nominal"),
             Self::StiffnessOnly => ("stiffness-only", "Stiffnesses; geometry stays nominal"),
+            Self::Rigid => ("rigid", "Geometry, of an arm in which nothing gives way: elasticity ignored"),
         }
     }
 
@@ -56,6 +60,12 @@ impl Strategy {
         self.words().1
     }
 
+    /// The model that is fitted: as declared, or without its elasticity and the parameters that describe it.
+    #[must_use]
+    pub fn model(self, declared: Model) -> Model {
+        if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
+    }
+
     /// The stages of one sweep, each as a choice of parameters; bases and targets take part in every stage.
     pub fn stages(self) -> &'static [fn(&Parameter) -> bool] {
         const ALL: fn(&Parameter) -> bool = |_| true;
@@ -64,7 +74,7 @@ impl Strategy {
         match self {
             Self::Joint => &[ALL],
             Self::Sequential | Self::OneSweep => &[STIFFNESS, GEOMETRY],
-            Self::GeometryOnly => &[GEOMETRY],
+            Self::GeometryOnly | Self::Rigid => &[GEOMETRY],
             Self::StiffnessOnly => &[STIFFNESS],
         }
     }

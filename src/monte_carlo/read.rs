@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::effects;
+use super::input::{beside, count, distinct, problem_of};
+use super::replica::MisprintStudy;
 use super::study::{Cell, Source, Study};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::identify::{SolverChoice, Strategy};
 use crate::model::Model;
 use crate::problem::item::{Document, Item};
@@ -16,11 +18,18 @@ use crate::simulate::{HeldOutRows, RandomRule, Truth};
 
 /// Poses held out where the file says nothing.
 const HELD_OUT: usize = 50;
-/// Most poses, held-out ones, repetitions.
-const MOST: u64 = 1_000_000;
 
-impl Study {
-    /// Reads a study; `path` is its file, or the folder that holds a `STUDY.toml`.
+/// What a study file asks for.
+#[derive(Debug, Clone)]
+pub enum Request {
+    /// `kind = "fits"`, or no kind: many fits by strategies and solvers.
+    Fits(Box<Study>),
+    /// `kind = "misprints"`: replicas of the paper's experiment.
+    Misprints(Box<MisprintStudy>),
+}
+
+impl Request {
+    /// Reads a study of either kind; `path` is its file, or the folder that holds a `STUDY.toml`.
     ///
     /// # Errors
     /// The first mistake found, in it or in the files that it names; a file that cannot be read among them.
@@ -28,7 +37,27 @@ impl Study {
         let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
         let document = Document::read(&file, InputErrorKind::StudyMissing)?;
         let table = document.table()?;
-        study(Section::new(&document, String::new(), 0..0, table.get_ref()), &file)
+        let mut root = Section::new(&document, String::new(), 0..0, table.get_ref());
+        if root.word("kind", &["fits", "misprints"], &[false, true])?.unwrap_or(false) {
+            return Ok(Self::Misprints(Box::new(MisprintStudy::of_document(root, &file)?)));
+        }
+        Ok(Self::Fits(Box::new(study(root, &file)?)))
+    }
+}
+
+impl Study {
+    /// Reads a study of fits; `path` is its file, or the folder that holds a `STUDY.toml`.
+    ///
+    /// # Errors
+    /// The first mistake found, in it or in the files that it names; a file that cannot be read among them.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        match Request::read(path)? {
+            Request::Fits(study) => Ok(*study),
+            Request::Misprints(study) => {
+                let file = study.files.first().map_or(path, PathBuf::as_path);
+                Err(Location::file(file).error(InputErrorKind::NotOfFits))
+            }
+        }
     }
 }
 
@@ -37,7 +66,7 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let name = name(&mut root)?;
     let title = root.text("title")?.unwrap_or(&name).to_owned();
     let (problem, problem_text, problem_file) =
-        problem(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
+        problem_of(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
     let model = Model::new(&problem, &[String::new()], &[String::new()])?;
     let source = source(&mut root)?;
     let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
@@ -88,21 +117,6 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
         cells,
         problem_text,
     })
-}
-
-fn problem(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem, String, PathBuf), InputError> {
-    let mut file = beside(item, folder)?;
-    if file.is_dir() {
-        file.push("problem.toml");
-    }
-    let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
-    Ok((Problem::parse(&document.text, &file)?, document.text.to_string(), file))
-}
-
-/// A file that the study names.
-fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
-    let path = folder.join(item.text()?);
-    if path.exists() { Ok(path) } else { Err(item.error(InputErrorKind::StudyFileMissing { path })) }
 }
 
 /// The file that is meant by a path to it or to its folder.
@@ -156,12 +170,6 @@ fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     })
 }
 
-fn count(item: &Item<'_, '_>) -> Result<usize, InputError> {
-    let value = item.whole(1)?;
-    let fits = usize::try_from(value).ok().filter(|_| value <= MOST);
-    fits.ok_or_else(|| item.error(InputErrorKind::TooLarge { value, most: MOST }))
-}
-
 fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> {
     let strategy = word(item, &Strategy::NAMES, &Strategy::EACH)?;
     let varies = |choose: &fn(&_) -> bool| model.parameters.iter().any(|p| !p.slot.is_placement() && choose(p));
@@ -185,21 +193,4 @@ fn word<T: Copy>(item: &Item<'_, '_>, known: &'static [&'static str], meanings: 
     let word = item.text()?;
     let meaning = known.iter().zip(meanings).find(|(known, _)| **known == word).map(|(_, meaning)| *meaning);
     meaning.ok_or_else(|| item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known }))
-}
-
-/// A list of distinct values, at least one.
-fn distinct<'a, 'i, T: PartialEq>(
-    item: &Item<'a, 'i>,
-    read: impl Fn(&Item<'a, 'i>) -> Result<T, InputError>,
-) -> Result<Vec<T>, InputError> {
-    let items = item.list("a list")?;
-    let mut values = Vec::with_capacity(items.len());
-    for item in &items {
-        let value = read(item)?;
-        if values.contains(&value) {
-            return Err(item.error(InputErrorKind::Repeated));
-        }
-        values.push(value);
-    }
-    if values.is_empty() { Err(item.error(InputErrorKind::EmptyList)) } else { Ok(values) }
 }

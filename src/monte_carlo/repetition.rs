@@ -38,7 +38,7 @@ pub(super) fn fit(study: &Study, problem: &Problem, cell: &Cell, repetition: usi
         // The files fit each other: what is left is a nominal arm that does not stand in one of the poses.
         Err(IdentifyError::Input(_)) => (Score::Failed("no-equilibrium"), 0.0),
         Err(_) => (Score::Failed("cannot-be-fitted"), 0.0),
-        Ok(found) => (score(&data, &found), found.seconds),
+        Ok(found) => (score(study, &data, &found), found.seconds),
     }
 }
 
@@ -119,7 +119,7 @@ pub fn table(rows: &[Row]) -> Measurements {
     }
 }
 
-fn score(data: &Data, found: &Identification) -> Score {
+fn score(study: &Study, data: &Data, found: &Identification) -> Score {
     match &found.quality_flag {
         Some(QualityFlag::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
         Some(QualityFlag::NotConverged(_) | QualityFlag::HeldOutNotConverged(_)) => {
@@ -140,8 +140,12 @@ fn score(data: &Data, found: &Identification) -> Score {
     if !held_out.rms.norm.is_finite() {
         return Score::Failed("no-equilibrium");
     }
-    let parameters = found.estimates.iter().zip(found.x.iter()).zip(&data.truth).map(|((estimate, x), truth)| {
-        truth.map(|truth| ParameterScore { error: x - truth, std_error: of_x(estimate) })
+    // What a strategy leaves out of the model is as if it were nominal.
+    let estimate = |name: &str| found.estimates.iter().zip(&found.x).find(|(estimate, _)| estimate.name == name);
+    let parameters = study.parameters.iter().zip(&data.truth).map(|(parameter, truth)| {
+        let found = estimate(&parameter.name);
+        let (x, std_error) = found.map_or((0.0, None), |(estimate, x)| (*x, of_x(estimate)));
+        truth.map(|truth| ParameterScore { error: x - truth, std_error })
     });
     Score::Fitted(Fitted {
         held_out_mean: held_out.mean.norm,

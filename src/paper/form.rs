@@ -13,39 +13,35 @@ pub enum Form {
 
 /// A misprint that changes a formula; each is documented where the formula stands.
 ///
-/// Sizes: the largest change of the end point on the lunar sampler over the 40 poses of `tests/golden`, of a deflection of up
-/// to 62 mm at nominal geometry, or of 49 mm of geometric error at table 2.
+/// How much each moves the end point of the lunar sampler, and what it does to a calibration, stands in `docs/paper.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Misprint {
-    /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³; 2.8 mm.
+    /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³.
     TipForceLever,
-    /// Eq. 4: the hoist stretches link B but does not bend it; 3.1 mm.
+    /// Eq. 4: the hoist stretches link B but does not bend it.
     HoistBending,
-    /// Eq. 4, 5, 7: slopes stand in each other's places, or without their sign; 3.4 mm.
+    /// Eq. 4, 5, 7: slopes stand in each other's places, or without their sign.
     SlopePlaces,
-    /// Eq. 6: q l²/(EA) for q l²/(2EA); 0.0012 mm.
+    /// Eq. 6: q l²/(EA) for q l²/(2EA).
     Stretch,
-    /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it; 28 mm.
+    /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
     HoistBeyond,
-    /// Eq. 10: joint 2 has the length of joint 3; none for the nominal arm, 2.2 mm with the offsets of table 2.
+    /// Eq. 10: joint 2 has the length of joint 3; nothing where both are as long, as in the nominal arm.
     JointTwoLength,
-    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same for β = 0, 0.0009 mm at table 2.
+    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same for β = 0.
     JointAxis,
-    /// Eq. 16: `U_i` for `U_{i+1}`; 21 mm.
+    /// Eq. 16: `U_i` for `U_{i+1}`.
     TransferIndex,
-    /// Eq. 21: the deflection acts at the link's root, not at its tip; 31 mm.
+    /// Eq. 21: the deflection acts at the link's root, not at its tip.
     LinkSide,
-    /// Eq. 23-25: carried to the end point by the frames before the link, not by those after it; 49 mm as in eq. 25,
-    /// 44 mm as in eq. 24.
+    /// Eq. 23, 25: carried to the end point by the frames before the link, not by those after it.
     LinkTransfer,
-    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` for `T_i` `Δ_i`; 101 mm at table 2.
+    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` for `T_i` `Δ_i`.
     GeometricSide,
-    /// Eq. 37, 39: motions of the end frame are taken for motions in the measuring frame; 92 mm of deflection,
-    /// 92 mm of geometric error at table 2.
+    /// Eq. 37, 39: motions of the end frame are taken for motions in the measuring frame.
     EndFrame,
-    /// Eq. 45: `E_j` has no β. Those of table 2 move the end point by 21 mm; other parameters make up for most of it where
-    /// the axes are parallel: 0.03 mm more are left after eq. 45.
+    /// Eq. 45: `E_j` has no β.
     BetaLeftOut,
 }
 
@@ -66,6 +62,49 @@ impl Misprint {
         Self::EndFrame,
         Self::BetaLeftOut,
     ];
+
+    /// Those that the paper itself contradicts elsewhere: nobody who ran its formulas can have kept them.
+    ///
+    /// Eq. 17 and 18 are right against 16; eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states in the inertial frame, as
+    /// the text to eq. 26 says, so that in eq. 23 and 25 only T or the frame is on the wrong side; eq. 33-37 are right against
+    /// 28 and 29; the inertial frame of eq. 26 is against the end frame of eq. 37 and 39; and table 2 identifies the β
+    /// that the text to eq. 45 leaves out.
+    pub const CONTRADICTED: [Self; 5] =
+        [Self::TransferIndex, Self::LinkTransfer, Self::GeometricSide, Self::EndFrame, Self::BetaLeftOut];
+
+    /// Name in results, where it stands, and what it says in a few words.
+    const fn words(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            Self::TipForceLever => ("tip-force-lever", "eq. 4", "tip force times l² for l³"),
+            Self::HoistBending => ("hoist-bending", "eq. 4", "the hoist does not bend link B"),
+            Self::SlopePlaces => ("slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign"),
+            Self::Stretch => ("stretch", "eq. 6", "stretch by own weight twice"),
+            Self::HoistBeyond => ("hoist-beyond", "eq. 6", "link A does not feel the hoist on link B"),
+            Self::JointTwoLength => ("joint-two-length", "eq. 10", "joint 2 with the length of joint 3"),
+            Self::JointAxis => ("joint-axis", "eq. 8-10", "joints give way about z after Ry(β)"),
+            Self::TransferIndex => ("transfer-index", "eq. 16", "U_i for U_{i+1}"),
+            Self::LinkSide => ("link-side", "eq. 21", "links deflect about their root"),
+            Self::LinkTransfer => ("link-transfer", "eq. 23, 25", "V⁻¹ΔV: carried by the frames before the link"),
+            Self::GeometricSide => ("geometric-side", "eq. 28, 29", "Δ_i T_i for T_i Δ_i"),
+            Self::EndFrame => ("end-frame", "eq. 37, 39", "end frame taken for the measuring frame"),
+            Self::BetaLeftOut => ("beta-left-out", "eq. 45", "β is not identified"),
+        }
+    }
+
+    /// Name in results.
+    pub const fn as_str(self) -> &'static str {
+        self.words().0
+    }
+
+    /// The equations that it stands in.
+    pub const fn place(self) -> &'static str {
+        self.words().1
+    }
+
+    /// What it says, in a few words.
+    pub const fn summary(self) -> &'static str {
+        self.words().2
+    }
 }
 
 /// A choice of form for every misprint.
@@ -93,14 +132,18 @@ impl Reading {
     }
 }
 
-/// Everything corrected, or everything as printed.
-///
-/// Where the paper contradicts itself, `Printed` follows the later formula, from which the matrices are built: eq. 17, 18
-/// against 16, and eq. 33-37 against 28, 29. Those two misprints have their effect only when chosen by name.
+/// Everything corrected, or everything as printed that the authors can have run: `Printed` keeps every misprint but those of
+/// [`Misprint::CONTRADICTED`], which have their effect only when chosen by name.
 impl From<Form> for Reading {
     fn from(form: Form) -> Self {
-        Self { forms: [form; Misprint::ALL.len()] }
-            .with(Misprint::TransferIndex, Form::Corrected)
-            .with(Misprint::GeometricSide, Form::Corrected)
+        let all = Self { forms: [form; Misprint::ALL.len()] };
+        Misprint::CONTRADICTED.into_iter().fold(all, |reading, misprint| reading.with(misprint, Form::Corrected))
+    }
+}
+
+/// One misprint kept, everything else corrected.
+impl From<Misprint> for Reading {
+    fn from(misprint: Misprint) -> Self {
+        Self::default().with(misprint, Form::Printed)
     }
 }

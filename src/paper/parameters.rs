@@ -55,6 +55,13 @@ impl Parameters {
         }
     }
 
+    /// As the problem declares the geometry, with nothing that gives way.
+    pub fn rigid(problem: &Problem) -> Self {
+        let n = problem.joints.len();
+        let geometry = problem.joints.iter().map(Mdh::nominal).collect();
+        Self { geometry, joints: vec![0.0; n], links: vec![LinkFlexibility::default(); n] }
+    }
+
     /// No geometry, and one flexibility of 1.
     pub(super) fn unit(joints: usize, which: Flexibility) -> Self {
         let mut out =

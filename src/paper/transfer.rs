@@ -48,9 +48,9 @@ pub fn joint_transfer(chain: &Chain, k: usize, reading: &Reading) -> Matrix6<f64
 /// dT = T₁ … `T_i1` Δ `T_i2` … T_n = T Δ_L with Δ_L = (`T_i2` `U_{i+1}`)⁻¹ Δ (`T_i2` `U_{i+1}`).
 ///
 /// Printed differently: `LinkSide`, eq. 21 has `T'_i1` = (I + Δ) `T_i1`, which turns the link about its root and adds
-/// slope × length at the tip: Δ_L = `U_i`⁻¹ Δ `U_i`. `LinkTransfer`, eq. 23 and 24 replace T⁻¹ dT by V Δ V⁻¹ with
-/// V = T₁ … T_{i−1}, and eq. 25 evaluates V⁻¹ Δ V; eq. 25 is what makes up `J_L`, so it is the printed form here
-/// (see [`link_transfer_of_eq24`]); where it is kept, eq. 21 no longer matters.
+/// slope × length at the tip: Δ_L = `U_i`⁻¹ Δ `U_i`. With eq. 22 that is dT = (V Δ V⁻¹) T, V = T₁ … T_{i−1}: eq. 24, in the
+/// inertial frame, as the text to eq. 26 says, where eq. 23 has T on the other side ([`inertial_link_transfer`] is the same
+/// motion in that frame). `LinkTransfer`: eq. 25 evaluates V⁻¹ Δ V instead; where it is kept, eq. 21 no longer matters.
 pub fn link_transfer(chain: &Chain, k: usize, reading: &Reading) -> Matrix6<f64> {
     if reading.keeps(Misprint::LinkTransfer) {
         transfer(&chain.before[k])
@@ -61,8 +61,9 @@ pub fn link_transfer(chain: &Chain, k: usize, reading: &Reading) -> Matrix6<f64>
     }
 }
 
-/// V Δ V⁻¹ with V = T₁ … T_{i−1}, as eq. 24 stands                                      [Chen2021, eq. 24]
-pub fn link_transfer_of_eq24(chain: &Chain, k: usize) -> Matrix6<f64> {
+/// V Δ V⁻¹ with V = T₁ … T_{i−1}, as eq. 24 stands: the motion by eq. 21 of what is fixed to the end frame, seen at the origin
+/// of the inertial frame and in its axes                                                    [Chen2021, eq. 24, 26]
+pub fn inertial_link_transfer(chain: &Chain, k: usize) -> Matrix6<f64> {
     let (axes, origin) = split(&chain.before[k]);
     let mut inverse = axes.transpose().to_homogeneous();
     inverse.fixed_view_mut::<3, 1>(0, 3).copy_from(&-(axes.tr_mul(&origin)));

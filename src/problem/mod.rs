@@ -60,6 +60,14 @@ pub struct Problem {
     pub robust: Option<Robust>,
 }
 
+impl Problem {
+    /// Whether something of the declared arm gives way: a joint with a stiffness, or a beam with a rigidity.
+    pub fn is_elastic(&self) -> bool {
+        let bends = |beam: &Beam| [beam.ea, beam.ei_y, beam.ei_z, beam.gj].iter().any(Option::is_some);
+        self.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
+    }
+}
+
 /// `[statics]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statics {

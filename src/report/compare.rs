@@ -1,4 +1,6 @@
-//! What `compare` says and writes: the paper's tables 2 and 3 for the problem at hand, every strategy and every ablation.
+//! What `compare` says and writes: every strategy, solver and ablation, and the paper's tables 2 and 3 from each procedure.
+
+use std::borrow::Cow;
 
 use serde::{Serialize, Serializer};
 
@@ -6,37 +8,13 @@ use super::document::{Block, Headline, Table, code};
 use super::figures::{Figure, PlotData};
 use super::identify::{beware, change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
 use super::json::{Both, object, to_text};
+use super::paper_tables::{Tables, table_2, table_3, title};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
-use crate::identify::{AxisValues, Baseline, Comparison, ErrorSummary, Errors, Identification, SolverChoice};
+use crate::identify::{Baseline, Comparison, Errors, Identification, SolverChoice};
 use crate::model::Ablation;
 use crate::problem::Problem;
 
-/// Table 3 of [Chen2021], 50 poses, mm: before, with elasticity, geometry alone; x, y, z and sum of each.
-const PUBLISHED: [(&str, [[f64; 4]; 3]); 2] = [
-    ("max", [[20.91, 22.72, 39.54, 48.9644], [2.5783, 3.4383, 4.3451, 5.5416], [7.8739, 4.1964, 5.9496, 6.4815]]),
-    ("mean", [[6.1646, 13.3304, 21.9786, 27.2506], [0.6845, 0.9578, 1.5093, 2.1358], [1.1303, 1.7519, 2.6873, 3.9673]]),
-];
-const TABLE_3: [&str; 8] =
-    ["held out, mm", "axis", "before", "with elasticity", "ignoring it", "paper: before", "with", "ignoring"];
-const TABLE_2: [&str; 16] = [
-    "joint",
-    "α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-    "→ α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-    "Δ α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-];
 /// Columns of the rows of a comparison, after the first; the time differs from run to run.
 const ROWS: [&str; 9] =
     ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", "ms", "condition", "termination"];
@@ -46,7 +24,7 @@ const TIME: usize = 7;
 /// One fit among others.
 #[derive(Debug, Serialize)]
 struct Row<'a> {
-    strategy: &'a str,
+    strategy: Cow<'a, str>,
     solver: &'a str,
     #[serde(flatten, serialize_with = "both")]
     errors: &'a Errors,
@@ -62,7 +40,7 @@ struct Row<'a> {
 impl<'a> From<&'a Identification> for Row<'a> {
     fn from(own: &'a Identification) -> Self {
         Self {
-            strategy: own.strategy.as_str(),
+            strategy: own.strategy.as_str().into(),
             solver: own.solver.as_str(),
             errors: &own.fitted,
             iterations: own.iterations,
@@ -79,7 +57,7 @@ impl<'a> From<&'a Identification> for Row<'a> {
 impl<'a> From<&'a Baseline> for Row<'a> {
     fn from(own: &'a Baseline) -> Self {
         Self {
-            strategy: own.strategy(),
+            strategy: own.name().into(),
             solver: SolverChoice::PseudoInverse.as_str(),
             errors: &own.errors,
             iterations: own.iterations,
@@ -108,6 +86,7 @@ object! {
         registered: Both = Both::of(&comparison.joint.registered),
         rows: Vec<Row<'a>> = fits(comparison),
         ablations: Vec<Ablated<'a>> = comparison.ablations.iter().map(Ablated::of).collect(),
+        procedures: Vec<Tables> = comparison.procedures.iter().map(|own| Tables::of(comparison, own)).collect(),
     }
 }
 object! {
@@ -127,21 +106,24 @@ pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
 
 /// A comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
-    let Comparison { joint, rigid, paper, ablations, .. } = comparison;
+    let joint = &comparison.joint;
     let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
-    let mut blocks = vec![
-        Block::lines(format!("{}\n{poses} poses to identify, {held_out} held out", problem.title)),
-        Block::heading("Geometry, nominal → identified, and the difference"),
-        Block::Table(geometry(problem, joint)),
-        Block::Table(table_3(joint, rigid, paper.iter().any(|_| ablations.len() > 1))),
-    ];
+    let mut blocks = vec![Block::lines(format!("{}\n{poses} poses to identify, {held_out} held out", problem.title))];
+    blocks.extend(in_the_papers_shape(comparison));
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(strategies(comparison)));
-    if !paper.is_empty() && !problem.effects.is_empty() {
+    if !comparison.paper.is_empty() && !problem.effects.is_empty() {
         blocks.push(Block::lines("  paper: its own closed forms, without the declared effects"));
     }
     blocks.push(Block::Table(parts(comparison)));
     text(&blocks)
+}
+
+/// Tables 2 and 3 from each procedure.
+fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
+    let tables =
+        |own| [Block::heading(&title(own)), Block::Table(table_2(own)), Block::Table(table_3(comparison, own))];
+    comparison.procedures.iter().flat_map(tables).collect()
 }
 
 /// The report of `compare`.
@@ -158,7 +140,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         facts: vec![
             poses(joint),
             fitted_parameters(joint),
-            ("Geometry alone", format!("{} mm", short_mm(comparison.rigid.fitted.held_out.mean.norm))),
+            ("Elasticity ignored", format!("{} mm", short_mm(comparison.rigid.fitted.held_out.mean.norm))),
             size("Residual against σ", joint),
         ],
     };
@@ -174,8 +156,15 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         Block::heading("What each part of the elasticity is worth"),
         Block::Figures(vec![Figure::Ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
-        Block::heading("Everything fitted at once"),
+        Block::heading("Tables 2 and 3 and figure 13 of the paper, from each procedure"),
     ];
+    for own in &comparison.procedures {
+        blocks.push(Block::Text(format!("{}.", title(own))));
+        blocks.extend([Block::Table(table_2(own)), Block::Table(table_3(comparison, own))]);
+        // The errors of the joint fit stand further below.
+        blocks.extend(own.paper.map(|_| Block::Figures(vec![Figure::Procedure(&comparison.before, own)])));
+    }
+    blocks.push(Block::heading("Everything fitted at once"));
     blocks.extend(errors(joint));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
     blocks.extend(remainder(problem, joint, plots, &format!("the estimate.json of {}", code("flexcal identify"))));
@@ -184,7 +173,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
 
 /// One row for each strategy and solver.
 fn strategies(comparison: &Comparison) -> Table {
-    side_by_side("strategy", fits(comparison).iter().map(|fit| cells(fit.strategy, fit)).collect())
+    side_by_side("strategy", fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect())
 }
 
 /// The same without times, with further errors.
@@ -228,48 +217,4 @@ fn cells(name: &str, fit: &Row) -> Vec<String> {
         or_dash(fit.condition_number, |condition| format!("{condition:.1e}")),
         fit.termination.to_owned(),
     ]
-}
-
-/// Table 2: nominal, identified, error of each joint's geometry.
-fn geometry(problem: &Problem, joint: &Identification) -> Table {
-    let row = |(index, declared): (usize, &crate::problem::Joint)| {
-        let nominal = [declared.alpha, declared.a, declared.theta, declared.d, declared.beta];
-        let identified: Vec<f64> = ["alpha", "a", "theta", "d", "beta"]
-            .iter()
-            .zip(nominal)
-            .map(|(field, nominal)| {
-                let name = format!("joint{}.{field}", index + 1);
-                joint.estimates.iter().find(|estimate| estimate.name == name).map_or(nominal, |found| found.estimate)
-            })
-            .collect();
-        let change: Vec<f64> = identified.iter().zip(nominal).map(|(found, nominal)| found - nominal).collect();
-        let show = |(k, value): (usize, &f64)| if k % 2 == 0 { number(value.to_degrees(), 3) } else { mm(*value, 2) };
-        let values = [&nominal[..], &identified, &change].into_iter().flat_map(|set| set.iter().enumerate().map(show));
-        std::iter::once((index + 1).to_string()).chain(values).collect()
-    };
-    Table::new(&TABLE_2, problem.joints.iter().enumerate().map(row).collect(), &[])
-}
-
-/// Table 3: errors before, with elasticity, ignoring it; the published figures beside them.
-fn table_3(joint: &Identification, rigid: &Identification, beside_the_paper: bool) -> Table {
-    let columns = [&joint.registered.held_out, &joint.fitted.held_out, &rigid.fitted.held_out];
-    let of_kind = |summary: &ErrorSummary, kind: &str| -> [f64; 4] {
-        let AxisValues { x, y, z, norm } = if kind == "max" { summary.max } else { summary.mean };
-        [x, y, z, norm]
-    };
-    let mut body = Vec::new();
-    for (kind, published) in PUBLISHED {
-        for (axis, name) in ["x", "y", "z", "norm"].iter().enumerate() {
-            let mut row = vec![if axis == 0 { kind.to_owned() } else { String::new() }, (*name).to_owned()];
-            row.extend(columns.iter().map(|summary| mm(of_kind(summary, kind)[axis], 4)));
-            if beside_the_paper {
-                row.extend(published.iter().map(|values| number(values[axis], 4)));
-            }
-            body.push(row);
-        }
-    }
-    if !beside_the_paper {
-        return Table::new(&TABLE_3[..5], body, &[0, 1]);
-    }
-    Table::new(&TABLE_3, body, &[0, 1]).noted(&["paper: published in [Chen2021, table 3], measured on another arm"])
 }

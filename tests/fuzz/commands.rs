@@ -18,15 +18,16 @@ use super::mutation::mutated;
 use super::run::{LONGEST, Ran, files, flexcal};
 
 /// Commands with what each reads; the first file is mutated most.
-const COMMANDS: [(&str, &[&str]); 16] = [
+const COMMANDS: [(&str, &[&str]); 17] = [
     ("identify .", &["problem.toml", "rows.csv"]),
     ("identify . --strategy sequential", &["problem.toml", "rows.csv"]),
     ("identify . --strategy stiffness-only --solver bounded", &["problem.toml", "rows.csv"]),
+    ("identify . --strategy rigid", &["problem.toml", "rows.csv"]),
     ("identify . --solver gauss-newton", &["rows.csv", "problem.toml"]),
     ("identify . --solver pseudo-inverse", &["rows.csv", "problem.toml"]),
     ("trace .", &["rows.csv", "problem.toml"]),
     ("loop .", &["rows.csv", "problem.toml"]),
-    ("compare .", &["rows.csv", "problem.toml"]),
+    ("compare . --paper", &["rows.csv", "problem.toml"]),
     ("compensate . --estimate estimate.json --data targets.csv", &["targets.csv", "estimate.json", "problem.toml"]),
     ("compensate . --estimate estimate.json --data targets.csv", &["estimate.json", "targets.csv"]),
     ("check .", &["rows.csv", "problem.toml"]),

@@ -37,7 +37,7 @@ fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
     let measured = |q: &'_ [f64]| Chain::new(&problem, &truth.geometry, q).position();
     let poses: Vec<Measured> =
         configurations.iter().map(|q| Measured { setup: PoseView::of(q), position: measured(q) }).collect();
-    let options = Options { stiffness: StiffnessStage::Nominal, ..Form::Corrected.into() };
+    let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
     let found = identify(&problem, &poses, &options).unwrap();
     assert!(found.iteration.termination.converged() && found.iteration.cost < 1e-18);
     let pairs = found.parameters.geometry.into_iter().zip(nominal.geometry);

@@ -36,7 +36,7 @@ impl<'a> Poses<'a> {
     /// The arm of `problem` as identified.
     pub fn arm(&self, problem: &Problem, found: &Identification) -> Result<Arm, IdentifyError> {
         let model = Model::new(problem, &self.placement.bases, &self.placement.targets)?;
-        Ok(Arm { model, x: found.x.clone() })
+        Ok(Arm { model: found.strategy.model(model), x: found.x.clone() })
     }
 
     /// Numbers of all rows.

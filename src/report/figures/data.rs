@@ -6,9 +6,9 @@ use super::arm::{Arm, Poses};
 use super::cause::{self, Cause};
 use crate::diagnose::{ClosedLoop, Findings, examine};
 use crate::error::Warning;
-use crate::identify::{Comparison, Correlations, Identification, IdentifyError, Strategy};
+use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
 use crate::measurement::Dataset;
-use crate::model::{Ablation, Model};
+use crate::model::Model;
 use crate::problem::Problem;
 
 /// What has been done for the arm.
@@ -17,8 +17,10 @@ use crate::problem::Problem;
 pub enum Stage {
     /// Nothing but to find where base and target are, where these are free.
     Registered,
-    /// Geometry identified, elasticity left out of the model.
-    GeometryOnly,
+    /// Nothing: the nominal arm, without elasticity, in the measured frames; what the paper calls before.
+    Before,
+    /// Geometry identified, elasticity ignored: the model is rigid.
+    Ignoring,
     /// Geometry and elasticity identified.
     Elastic,
     /// Identified, where there is nothing to say on elasticity.
@@ -84,19 +86,15 @@ impl PlotData {
         Ok(Self::of(&poses, stages, &fitted, found, examine(problem, data, found)?))
     }
 
-    /// Of a comparison: of its joint fit, and of geometry alone.
+    /// Of a comparison: of its joint fit, beside what the paper calls before and ignoring elasticity.
     ///
     /// # Errors
     /// Problem and data do not fit each other.
     pub fn of_comparison(problem: &Problem, data: &Dataset, comparison: &Comparison) -> Result<Self, IdentifyError> {
         let (poses, joint) = (Poses::new(data), &comparison.joint);
         let fitted = poses.arm(problem, joint)?;
-        let mut stages = vec![registered(&poses, &fitted, joint)];
-        if is_elastic(&fitted.model) {
-            let rigid = Arm { model: fitted.model.ablated(Ablation::Rigid), x: comparison.rigid.x.clone() };
-            stages.push(stage(&poses, Stage::GeometryOnly, &rigid));
-        }
-        stages.push(identified(&poses, &fitted, joint));
+        let stages = comparison.procedures.first().map(|own| own_stages(&comparison.before, own));
+        let stages = stages.unwrap_or_default();
         Ok(Self::of(&poses, stages, &fitted, joint, examine(problem, data, joint)?))
     }
 
@@ -141,6 +139,15 @@ impl PlotData {
             trend: None,
         }
     }
+}
+
+/// Errors before and after a procedure, and with elasticity ignored: figure 13 of the paper.
+pub(super) fn own_stages(before: &Before, own: &Procedure) -> Vec<StageErrors> {
+    let of = |stage, errors: &Vec<Vector3<f64>>| StageErrors { stage, errors: errors.clone() };
+    let mut stages = vec![of(Stage::Before, &before.errors)];
+    stages.extend(own.ignoring.iter().map(|errors| of(Stage::Ignoring, errors)));
+    stages.push(of(if own.ignoring.is_some() { Stage::Elastic } else { Stage::Identified }, &own.after));
+    stages
 }
 
 fn stage(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {

@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 use plotters::prelude::*;
 
-use super::data::{PlotData, Stage, StageErrors};
+use super::data::{PlotData, Stage, StageErrors, own_stages};
 use super::frame::{
     ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, Mark, WIDTH, chart, every, figure, left_out, legend, line,
     radius, range, stacked, thinned,
 };
+use crate::identify::{Before, Procedure};
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.
@@ -19,8 +20,8 @@ const PANEL: i32 = 118;
 /// A state of the arm in words.
 fn stage_name(stage: Stage) -> &'static str {
     match stage {
-        Stage::Registered => "before",
-        Stage::GeometryOnly => "geometry only",
+        Stage::Registered | Stage::Before => "before",
+        Stage::Ignoring => "elasticity ignored",
         Stage::Elastic => "with elasticity",
         Stage::Identified => "identified",
         Stage::Closed => "after the loop",
@@ -39,7 +40,17 @@ fn colour(place: usize, count: usize) -> RGBColor {
 
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
 pub fn errors(data: &PlotData) -> Drawing {
-    let states = &data.stages;
+    drawn("held-out-errors", "Error of each held-out pose", &data.stages)
+}
+
+/// The same of one procedure of a comparison, by its name.
+pub fn of_procedure(before: &Before, own: &Procedure) -> Drawing {
+    let name = own.name();
+    let title = format!("Error of each held-out pose: {name}");
+    drawn(&format!("held-out-errors-{name}"), &title, &own_stages(before, own))
+}
+
+fn drawn(name: &str, title: &str, states: &[StageErrors]) -> Drawing {
     let count = states.first().map_or(0, |state| state.errors.len());
     let step = every(count, MOST);
     let size = (WIDTH, 24 + 4 * PANEL + 34);
@@ -62,9 +73,8 @@ pub fn errors(data: &PlotData) -> Drawing {
         let labels = ["|Δx| [mm]", "|Δy| [mm]", "|Δz| [mm]", "norm [mm]"];
         for (axis, (label, panel)) in labels.into_iter().zip(&panels).enumerate() {
             let last = axis == 3;
-            let bottom =
-                Axis::linear((0.0, states[0].errors.len() as f64 + 1.0), if last { "held-out pose" } else { "" })
-                    .numbers(if last { 8 } else { 0 });
+            let bottom = Axis::linear((0.0, count as f64 + 1.0), if last { "held-out pose" } else { "" })
+                .numbers(if last { 8 } else { 0 });
             let left = Axis::logarithmic(extent, label).numbers(4);
             draw(panel, &bottom, &left, states, (axis, step))?;
         }
@@ -81,7 +91,7 @@ pub fn errors(data: &PlotData) -> Drawing {
         left_out(without),
         thinned(step)
     );
-    Drawing::new("held-out-errors", "Error of each held-out pose", caption, svg)
+    Drawing::new(name, title, caption, svg)
 }
 
 fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[StageErrors], (axis, step): (usize, usize)) -> Result<(), Failure> {

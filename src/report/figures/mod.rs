@@ -7,6 +7,7 @@ mod data;
 mod errors;
 mod frame;
 mod histogram;
+mod misprints;
 mod order;
 mod ranking;
 mod spectrum;
@@ -16,8 +17,9 @@ mod vectors;
 pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 
 use crate::diagnose::Trace;
-use crate::identify::Comparison;
+use crate::identify::{Before, Comparison, Procedure};
 use crate::least_squares::Identifiability;
+use crate::monte_carlo::{MisprintStudy, ReplicaResults};
 
 pub use cause::{Cause, Point, Quantity};
 pub use data::{PlotData, PoseError, Stage, StageErrors};
@@ -33,8 +35,11 @@ pub enum Figure<'a> {
     Correlations(&'a PlotData),
     SingularValues(&'a Identifiability),
     Ranking(&'a Trace),
+    /// The held-out errors of one procedure of a comparison.
+    Procedure(&'a Before, &'a Procedure),
     Strategies(&'a Comparison),
     Ablations(&'a Comparison),
+    Misprints(&'a MisprintStudy, &'a ReplicaResults),
     /// Of an effect, with its number from 1.
     Cause(&'a Cause, usize),
     Trend(&'a Cause),
@@ -51,19 +56,22 @@ impl Figure<'_> {
             Self::Correlations(data) => correlation::correlation(&data.correlations),
             Self::SingularValues(found) => spectrum::spectrum(found),
             Self::Ranking(trace) => ranking::ranking(trace),
+            Self::Procedure(before, own) => Some(errors::of_procedure(before, own)),
             Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
             Self::Ablations(comparison) => strategies::ablations(comparison),
+            Self::Misprints(study, found) => Some(misprints::misprints(study, found)),
             Self::Cause(own, number) => Some(own.draw_effect(number)),
             Self::Trend(own) => Some(own.draw_unexplained()),
         }
     }
 }
 
-/// Every name but those of effects, which are numbered.
-const NAMES: [&str; 10] = [
+/// Every name but those of effects, which are numbered, and of procedures, which are named.
+const NAMES: [&str; 11] = [
     "ablations",
     "correlations",
     "held-out-errors",
+    "misprints",
     "ranking",
     "residual-histogram",
     "residual-order",
@@ -77,5 +85,8 @@ const NAMES: [&str; 10] = [
 pub fn is_figure(file: &str) -> bool {
     let Some(name) = file.strip_suffix(".svg") else { return false };
     let numbered = |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    NAMES.contains(&name) || name.strip_prefix("effect-").is_some_and(numbered)
+    let named = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-');
+    NAMES.contains(&name)
+        || name.strip_prefix("effect-").is_some_and(numbered)
+        || name.strip_prefix("held-out-errors-").is_some_and(named)
 }

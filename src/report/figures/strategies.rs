@@ -11,7 +11,7 @@ use crate::report::quantity::{decimals, number};
 
 const ROW: i32 = 22;
 /// Room for names.
-const NAMES: i32 = 214;
+const NAMES: i32 = 236;
 /// Room for numbers.
 const NUMBERS: i32 = 66;
 const TOP: i32 = 26;
@@ -44,7 +44,8 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
             entries.push(Entry { strategy, name, solvers: 1, errors });
         }
     }
-    entries.extend(comparison.paper.iter().map(|own| entry(own.strategy(), own.errors)));
+    let papers: Vec<String> = comparison.paper.iter().map(|own| own.name()).collect();
+    entries.extend(papers.iter().zip(&comparison.paper).map(|(name, own)| entry(name, own.errors)));
     let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
                    wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
                    share a row.";

@@ -1,0 +1,140 @@
+//! Stage one: where the stiffness comes from, before the geometry is identified (§3.3).
+
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
+
+use super::form::Reading;
+use super::residuals::Measured;
+use super::{EndPoint, Flexibility, Parameters};
+use crate::least_squares::solver::minimum_norm_step;
+use crate::least_squares::{Block, Triangle};
+use crate::problem::Problem;
+
+/// Where the stiffness comes from. The paper says that elastic parameters are calibrated first, and not how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum StiffnessStage {
+    /// Nothing gives way: what the paper calls ignoring elasticity.
+    Rigid,
+    /// It is known: as the problem declares it.
+    Nominal,
+    /// By linear least squares from the measured positions, the geometry held at nominal.
+    Positions,
+    /// The same from differences between poses of one configuration under different loads: the geometry cancels.
+    LoadDifferences,
+}
+
+impl StiffnessStage {
+    /// All of them.
+    pub const EACH: [Self; 4] = [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
+
+    /// Singular values of the elastic Jacobian, its columns multiplied by the nominal flexibilities, up to this fraction of the
+    /// largest are dropped: those combinations keep their nominal value.
+    pub const TOLERANCE: f64 = 1e-2;
+
+    /// Name in results.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Nominal => "nominal-stiffness",
+            Self::Positions => "from-positions",
+            Self::LoadDifferences => "from-load-differences",
+        }
+    }
+}
+
+/// x = A⁺ b with singular values up to `tolerance`·σ₁ dropped                             [Chen2021, eq. 43, 44]
+///
+/// `None` where A or b is not finite, or they differ in rows.
+pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
+    if a.nrows() != b.len() || !a.iter().chain(b.iter()).all(|value| value.is_finite()) {
+        return None;
+    }
+    let mut block = Block::zeros(a.nrows(), a.ncols());
+    for (j, column) in a.column_iter().enumerate() {
+        block.column_mut(j).iter_mut().zip(&column).for_each(|(to, from)| *to = *from);
+    }
+    block.column_mut(a.ncols()).iter_mut().zip(b).for_each(|(to, from)| *to = -from);
+    let mut triangle = Triangle::new(a.ncols());
+    triangle.absorb(&mut block);
+    Some(minimum_norm_step(&triangle.into_linearisation(), tolerance))
+}
+
+/// What a pose says of the flexibilities: ∂`D_f`/∂ln c, shape = (3, flexibilities), and `PE_meas` − `PE_nom` − `D_f` \[m\].
+type Equations = (Matrix3xX<f64>, Vector3<f64>);
+
+/// Flexibilities by linear least squares at nominal geometry, where `D_f` is linear in them:
+/// c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
+///
+/// From load differences each pose counts less the mean of its configuration, which takes away what the loads do not change:
+/// all errors of the geometry but their part in `J_f` (eq. 40). Poses of a configuration that was measured under one load say
+/// nothing then.
+///
+/// `None` where something is not finite, and from load differences where no configuration was measured under several loads.
+pub fn stiffness(
+    problem: &Problem,
+    poses: &[Measured],
+    reading: &Reading,
+    stage: StiffnessStage,
+) -> Option<Parameters> {
+    let mut parameters = Parameters::nominal(problem);
+    let unknowns = match stage {
+        StiffnessStage::Rigid => return Some(Parameters::rigid(problem)),
+        StiffnessStage::Nominal => return Some(parameters),
+        StiffnessStage::Positions | StiffnessStage::LoadDifferences => parameters.flexibilities(),
+    };
+    let mut equations: Vec<Equations> =
+        poses.iter().map(|pose| equations_of(problem, &parameters, &unknowns, pose, reading)).collect();
+    if stage == StiffnessStage::LoadDifferences {
+        equations = differences(poses, equations)?;
+    }
+    let mut columns = DMatrix::zeros(3 * equations.len(), unknowns.len());
+    let mut rest = DVector::zeros(3 * equations.len());
+    for (row, (derivatives, left)) in equations.iter().enumerate() {
+        columns.fixed_rows_mut::<3>(3 * row).copy_from(derivatives);
+        rest.fixed_rows_mut::<3>(3 * row).copy_from(left);
+    }
+    let relative = least_squares(&columns, &rest, StiffnessStage::TOLERANCE)?;
+    for (&which, change) in unknowns.iter().zip(&relative) {
+        parameters.set(which, parameters.get(which) * (1.0 + change));
+    }
+    Some(parameters)
+}
+
+fn equations_of(
+    problem: &Problem,
+    parameters: &Parameters,
+    unknowns: &[Flexibility],
+    pose: &Measured,
+    reading: &Reading,
+) -> Equations {
+    let end = EndPoint::new(problem, parameters, &pose.setup, reading);
+    let derivative = |which: &Flexibility| end.displacement(&end.elastic.derivative(*which)) * parameters.get(*which);
+    let columns: Vec<Vector3<f64>> = unknowns.iter().map(derivative).collect();
+    (Matrix3xX::from_columns(&columns), pose.position - end.position(parameters))
+}
+
+/// Each pose less the mean of its configuration, for configurations that were measured under several loads; `None` where
+/// there is none.
+fn differences(poses: &[Measured], equations: Vec<Equations>) -> Option<Vec<Equations>> {
+    let load = |pose: &Measured| (pose.setup.payload, pose.setup.hoist);
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (k, pose) in poses.iter().enumerate() {
+        let same = |group: &&mut Vec<usize>| poses[group[0]].setup.configuration == pose.setup.configuration;
+        match groups.iter_mut().find(same) {
+            Some(group) => group.push(k),
+            None => groups.push(vec![k]),
+        }
+    }
+    groups.retain(|group| group.iter().any(|&k| load(&poses[k]) != load(&poses[group[0]])));
+    let mut out = Vec::new();
+    for group in &groups {
+        let n = group.len() as f64;
+        let (mut columns, mut rest) = equations[group[0]].clone();
+        for &k in &group[1..] {
+            columns += &equations[k].0;
+            rest += equations[k].1;
+        }
+        out.extend(group.iter().map(|&k| (&equations[k].0 - &columns / n, equations[k].1 - rest / n)));
+    }
+    (!out.is_empty()).then_some(out)
+}

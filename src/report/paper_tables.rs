@@ -1,0 +1,179 @@
+//! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any procedure.
+
+use nalgebra::Vector3;
+
+use super::document::Table;
+use super::json::{Summary, object};
+use super::quantity::{mm, number, or_dash};
+use crate::identify::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
+use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
+use crate::paper::{Form, StiffnessStage};
+
+/// A parameter of which the data gave less than this part by itself is marked.
+const SEEN: f64 = 0.9;
+
+const TABLE_2: [&str; 16] = [
+    "joint",
+    "α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+    "→ α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+    "Δ α °",
+    "a mm",
+    "θ °",
+    "d mm",
+    "β °",
+];
+
+object! {
+    /// Errors and parameters of one procedure in the paper's terms.
+    Tables(comparison: &Comparison, own: &Procedure) {
+        procedure: String = own.name(),
+        table_2: Vec<JointEntry> = own.geometry.iter().zip(1..).map(|(row, joint)| JointEntry::of(joint, row)).collect(),
+        table_3: Errors = Errors::of(&comparison.before, own),
+        figure_13: Poses = Poses::of(&comparison.before, own),
+    }
+}
+object! {
+    JointEntry(joint: usize, row: &[TableEntry; 5]) {
+        joint: usize = joint,
+        alpha_deg: Entry = Entry::of(&row[0], f64::to_degrees),
+        a_mm: Entry = Entry::of(&row[1], millimetres),
+        theta_deg: Entry = Entry::of(&row[2], f64::to_degrees),
+        d_mm: Entry = Entry::of(&row[3], millimetres),
+        beta_deg: Entry = Entry::of(&row[4], f64::to_degrees),
+    }
+}
+object! {
+    Entry(entry: &TableEntry, to: fn(f64) -> f64) {
+        nominal: f64 = to(entry.nominal),
+        identified: f64 = to(entry.identified),
+        change: f64 = to(entry.identified - entry.nominal),
+        seen: Option<f64> = entry.seen,
+    }
+}
+object! {
+    /// Of the held-out poses; before: nominal arm without elasticity, in the measured frames.
+    Errors(before: &Before, own: &Procedure) {
+        before_registered: bool = before.registered,
+        before: Summary = Summary::of(&ErrorSummary::of(&before.errors)),
+        after: Summary = Summary::of(&ErrorSummary::of(&own.after)),
+        ignoring_elasticity: Option<Summary> =
+            own.ignoring.as_ref().map(|errors| Summary::of(&ErrorSummary::of(errors))),
+    }
+}
+object! {
+    /// x, y, z of measured − predicted of each held-out pose \[mm\].
+    Poses(before: &Before, own: &Procedure) {
+        before_mm: Vec<[f64; 3]> = by_pose(&before.errors),
+        after_mm: Vec<[f64; 3]> = by_pose(&own.after),
+        ignoring_elasticity_mm: Option<Vec<[f64; 3]>> = own.ignoring.as_ref().map(|errors| by_pose(errors)),
+    }
+}
+
+fn millimetres(length: f64) -> f64 {
+    length * 1e3
+}
+
+fn by_pose(errors: &[Vector3<f64>]) -> Vec<[f64; 3]> {
+    errors.iter().map(|error| (error * 1e3).into()).collect()
+}
+
+/// What a procedure is, in words.
+pub(super) fn title(own: &Procedure) -> String {
+    let Some((form, stage)) = own.paper else { return "Everything fitted at once (joint)".to_owned() };
+    let form = match form {
+        Form::Printed => "as printed",
+        _ => "misprints corrected",
+    };
+    let stage = match stage {
+        StiffnessStage::Rigid => "elasticity ignored",
+        StiffnessStage::Nominal => "stiffness taken as declared",
+        StiffnessStage::Positions => "stiffness from positions at nominal geometry",
+        _ => "stiffness from load differences",
+    };
+    format!("The paper's closed forms and eq. 45, {form}, {stage} ({})", own.name())
+}
+
+/// Table 2: nominal, identified, error of each joint's geometry; what the data do not see by itself in brackets.
+pub(super) fn table_2(own: &Procedure) -> Table {
+    let show = |place: usize, value: f64| {
+        if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
+    };
+    let marked = |entry: &TableEntry, text: String| match entry.seen {
+        Some(seen) if seen < SEEN => format!("({text})"),
+        _ => text,
+    };
+    let row = |(entries, joint): (&[TableEntry; 5], usize)| {
+        let fields = || entries.iter().enumerate();
+        let nominal = fields().map(|(place, entry)| show(place, entry.nominal));
+        let identified = fields().map(|(place, entry)| marked(entry, show(place, entry.identified)));
+        let change = fields().map(|(place, entry)| {
+            let text = show(place, entry.identified - entry.nominal);
+            or_dash(entry.seen, |_| marked(entry, text))
+        });
+        std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
+    };
+    let rows = own.geometry.iter().zip(1..).map(row).collect();
+    Table::new(&TABLE_2, rows, &[])
+        .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified"])
+}
+
+/// Table 3: errors of the held-out poses before, with elasticity, ignoring it, and the reductions; for the paper's arm its
+/// figures beside them.
+pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
+    let before = ErrorSummary::of(&comparison.before.errors);
+    let (after, ignoring) = (ErrorSummary::of(&own.after), own.ignoring.as_deref().map(ErrorSummary::of));
+    let elastic = ignoring.is_some();
+    let mut header = vec!["held out, mm", "axis", "before"];
+    header.extend(if elastic { ["with elasticity", "− %"] } else { ["identified", "− %"] });
+    header.extend(elastic.then_some(["ignoring it", "− %"]).into_iter().flatten());
+    let beside = comparison.is_papers_arm && elastic;
+    let published = ["paper: before", "with elasticity", "− %", "ignoring it", "− %"];
+    header.extend(beside.then_some(published).into_iter().flatten());
+    let mut rows = Vec::new();
+    for (kind, of, printed) in KINDS {
+        for (axis, name) in ["x", "y", "z", "sum"].into_iter().enumerate() {
+            let value = |summary: &ErrorSummary| on(of(summary), axis) * 1e3;
+            let mut row = vec![if axis == 0 { kind.to_owned() } else { String::new() }, name.to_owned()];
+            row.extend(reduced(value(&before), [Some(value(&after)), ignoring.as_ref().map(value)]));
+            if beside {
+                let [before, with, without] = [&BEFORE, &WITH_ELASTICITY, &IGNORING_IT].map(|own| printed(own)[axis]);
+                row.extend(reduced(before, [Some(with), Some(without)]));
+            }
+            rows.push(row);
+        }
+    }
+    let mut notes = vec![match (elastic, comparison.before.registered) {
+        (true, false) => "before: nominal arm without elasticity, base and tool as declared",
+        (false, false) => "before: nominal arm, base and tool as declared",
+        (true, true) => {
+            "before: nominal arm without elasticity, base and tool fitted first, since the problem leaves them open"
+        }
+        (false, true) => "before: nominal arm, base and tool fitted first, since the problem leaves them open",
+    }];
+    notes.extend(
+        beside.then_some("paper: published in [Chen2021, table 3], measured on another specimen, under other loads"),
+    );
+    Table::new(&header, rows, &[0, 1]).noted(&notes)
+}
+
+/// Which values of table 3: its word, ours, and the published ones.
+type Kind = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
+const KINDS: [Kind; 2] = [("max", |own| &own.max, |own| own.max), ("mean", |own| &own.mean, |own| own.mean)];
+
+fn on(values: &AxisValues, axis: usize) -> f64 {
+    [values.x, values.y, values.z, values.norm][axis]
+}
+
+/// A value \[mm\], and each of those after it with its reduction.
+fn reduced(before: f64, after: [Option<f64>; 2]) -> Vec<String> {
+    let pair = |after: f64| [number(after, 4), number(100.0 * (1.0 - after / before), 2)];
+    std::iter::once(number(before, 4)).chain(after.into_iter().flatten().flat_map(pair)).collect()
+}

@@ -1,0 +1,227 @@
+//! What a study of the misprints says and writes.
+
+use super::document::{Block, Headline, Table};
+use super::figures::Figure;
+use super::json::{Summary, object, to_text};
+use super::quantity::{mm, number, or_dash};
+use super::render::{Report, report, text};
+use crate::identify::ErrorSummary;
+use crate::monte_carlo::{Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
+use crate::paper::Misprint;
+use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
+
+/// What a stage takes for the stiffness, in the order of a replica's results.
+const STAGES: [&str; 4] = ["stiffness known", "as declared", "from positions", "from load differences"];
+
+object! {
+    Document<'a>(study: &'a MisprintStudy, found: &'a ReplicaResults) {
+        study: &'a str = &study.name,
+        problem: &'a str = &study.problem.name,
+        seed: u64 = study.seed,
+        specimens: usize = study.specimens,
+        identification_poses: usize = study.identification,
+        held_out_poses: usize = study.held_out,
+        position_sigma_mm: f64 = study.truth.noise_sigma * 1e3,
+        rigid_leaves_mm: f64 = study.rigid_leaves * 1e3,
+        misprints: Vec<Size<'a>> = Misprint::ALL.iter().zip(&found.sizes).map(Size::of).collect(),
+        shares: Vec<Share<'a>> =
+            study.links_over_joints.iter().map(|&share| Share::of(share, found)).collect(),
+    }
+}
+object! {
+    Size<'a>(own: (&Misprint, &f64)) {
+        misprint: &'a str = own.0.as_str(),
+        place: &'a str = own.0.place(),
+        moves_mm: f64 = own.1 * 1e3,
+    }
+}
+object! {
+    Share<'a>(links_over_joints: f64, found: &'a ReplicaResults) {
+        links_over_joints: f64 = links_over_joints,
+        specimens: Vec<Specimen<'a>> =
+            found.of_share(links_over_joints).map(|own| Specimen::of(own, found)).collect(),
+    }
+}
+object! {
+    /// Held-out errors of one specimen; null where an iteration does not converge.
+    Specimen<'a>(own: &'a Replica, found: &'a ReplicaResults) {
+        scale: f64 = own.scale,
+        before: Summary = Summary::of(&own.before),
+        rigid: Option<Summary> = own.rigid.as_ref().map(Summary::of),
+        geometry_only: Summary = Summary::of(&own.geometry_only),
+        joint: Summary = Summary::of(&own.joint),
+        joint_both_loads: Summary = Summary::of(&own.joint_twice),
+        readings: Vec<ReadingEntry<'a>> =
+            found.readings.iter().zip(&own.by_reading).map(|(named, left)| ReadingEntry::of(&named.name, left)).collect(),
+        rivals: Vec<RivalEntry<'a>> = Rival::EACH.into_iter().zip(&own.by_rival).map(RivalEntry::of).collect(),
+    }
+}
+object! {
+    ReadingEntry<'a>(name: &'a str, left: &[Left; 4]) {
+        reading: &'a str = name,
+        stiffness_known: Option<Summary> = left[0].as_ref().map(Summary::of),
+        as_declared: Option<Summary> = left[1].as_ref().map(Summary::of),
+        from_positions: Option<Summary> = left[2].as_ref().map(Summary::of),
+        from_load_differences: Option<Summary> = left[3].as_ref().map(Summary::of),
+    }
+}
+object! {
+    RivalEntry<'a>(own: (Rival, &Left)) {
+        rival: &'a str = own.0.words().0,
+        held_out: Option<Summary> = own.1.as_ref().map(Summary::of),
+    }
+}
+
+/// A study of the misprints as JSON text, ending in a line break.
+pub fn replica_json(study: &MisprintStudy, found: &ReplicaResults) -> String {
+    to_text(&Document::of(study, found))
+}
+
+/// The same as text, ending in a line break.
+pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
+    let mut blocks = vec![Block::lines(format!("{}\n{}", study.title, counts(study)))];
+    blocks.extend(tables(study, found));
+    text(&blocks)
+}
+
+/// The report of a study of the misprints.
+pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
+    let share = main_share(study);
+    let error = |pick: fn(&Replica) -> Left| {
+        let spread = Spread::of(found.of_share(share).map(|own| Some(pick(own)?.mean.norm)));
+        or_dash(spread, |spread| mm(spread.mean, 3))
+    };
+    let head = Headline {
+        change: (error(|own| own.rigid), error(|own| own.left(0, 0))),
+        of: "held-out poses, elasticity ignored and by the corrected formulas with the stiffness known".to_owned(),
+        facts: vec![("Everything fitted at once", format!("{} mm", error(|own| Some(own.joint))))],
+    };
+    let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];
+    blocks.push(Block::Figures(vec![Figure::Misprints(study, found)]));
+    blocks.extend(tables(study, found));
+    report(&study.problem, "misprints", &blocks)
+}
+
+fn counts(study: &MisprintStudy) -> String {
+    format!(
+        "{} specimens for each of {} shares of flexibility, measured by the virtual test rig: {} poses to identify, {} held out, \
+         noise {} mm per axis; as elastic as makes the rigid fit leave {} mm",
+        study.specimens,
+        study.links_over_joints.len(),
+        study.identification,
+        study.held_out,
+        mm(study.truth.noise_sigma, 2),
+        mm(study.rigid_leaves, 4),
+    )
+}
+
+/// The share of flexibility nearest to the declared one.
+pub(super) fn main_share(study: &MisprintStudy) -> f64 {
+    let distance = |share: &f64| share.ln().abs();
+    study.links_over_joints.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(1.0)
+}
+
+fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
+    vec![
+        Block::heading("Procedures and readings: mean error of the held-out poses, mm"),
+        Block::Table(procedures(study, found)),
+        Block::heading("Beside them"),
+        Block::Table(others(study, found)),
+        Block::heading("Over what the rigid fit leaves, stiffness known"),
+        Block::Table(ratios(study, found)),
+    ]
+}
+
+/// Mean ± standard deviation; how many converged where not all did.
+fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
+    let Some(Spread { mean, deviation, count: (there, all) }) = spread else { return "diverges".to_owned() };
+    let few = if there < all { format!(" ({there} of {all})") } else { String::new() };
+    format!("{} ± {}{few}", show(mean), show(deviation))
+}
+
+fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+    let share = main_share(study);
+    let row = |(place, named): (usize, &crate::monte_carlo::NamedReading)| {
+        let size = Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
+        let cell = |stage: usize| {
+            let means = found.of_share(share).map(|own| Some(own.left(place, stage)?.mean.norm));
+            shown(Spread::of(means), |value| mm(value, 3))
+        };
+        let head = [named.name.clone(), named.place.clone(), or_dash(size, |(_, size)| mm(*size, 3))];
+        head.into_iter().chain((0..STAGES.len()).map(cell)).collect()
+    };
+    let rows = found.readings.iter().enumerate().map(row).collect();
+    let header = ["as printed", "where", "moves, mm", STAGES[0], STAGES[1], STAGES[2], STAGES[3]];
+    Table::new(&header, rows, &[0, 1]).noted(&[
+        "moves: largest change of the end point at the errors of the truth, on the arm as declared; ± standard deviation",
+        "over specimens; links and joints share their flexibility as declared; diverges: eq. 45 does not converge",
+    ])
+}
+
+fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+    let share = main_share(study);
+    let row = |name: &str, of: fn(&Replica) -> Left, published: Option<&Published>| {
+        let of_kind = |kind: fn(&ErrorSummary) -> f64| {
+            shown(Spread::of(found.of_share(share).map(|own| of(own).as_ref().map(kind))), |value| mm(value, 3))
+        };
+        let [mean, max] = [published.map(|own| own.mean[3]), published.map(|own| own.max[3])];
+        let paper = [mean, max].map(|value| or_dash(value, |value| number(value, 3)));
+        let own = [of_kind(|own| own.mean.norm), of_kind(|own| own.max.norm), of_kind(|own| own.mean.z)];
+        let z = or_dash(published, |own| number(own.mean[2], 3));
+        let [mean, max] = paper;
+        [vec![name.to_owned()], own.to_vec(), vec![mean, max, z]].concat()
+    };
+    let rows = vec![
+        row("before: nominal arm, rigid", |own| Some(own.before), Some(&BEFORE)),
+        row("elasticity ignored, eq. 45", |own| own.rigid, Some(&IGNORING_IT)),
+        row("elasticity considered", |own| own.left(0, 0), Some(&WITH_ELASTICITY)),
+        row("geometry-only, this model", |own| Some(own.geometry_only), None),
+        row("joint fit, this model", |own| Some(own.joint), None),
+        row("joint fit, both loads", |own| Some(own.joint_twice), None),
+    ];
+    let header = ["held out, mm", "mean", "max", "mean |z|", "paper: mean", "max", "mean |z|"];
+    Table::new(&header, rows, &[0]).noted(&[
+        "elasticity considered: here misprints corrected and stiffness known; geometry-only: stiffness as declared",
+    ])
+}
+
+fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+    let main = main_share(study);
+    let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> Left| {
+        let ratio = |&share: &f64| {
+            let ratios = found.of_share(share).map(|own| own.ratio(left(own)));
+            shown(Spread::of(ratios), |value| number(value, 3))
+        };
+        let of_z = |own: &Replica| left(own).map(|left| left.mean.z / left.mean.norm);
+        let along = shown(Spread::of(found.of_share(main).map(of_z)), |value| number(value, 2));
+        let largest = Spread::of(found.of_share(main).map(|own| own.largest_ratio(left(own))));
+        let shares: Vec<String> = study.links_over_joints.iter().map(ratio).collect();
+        let largest = shown(largest, |value| number(value, 2));
+        [vec![name.to_owned(), summary.to_owned()], shares, vec![along, largest]].concat()
+    };
+    let mut rows: Vec<Vec<String>> = found
+        .readings
+        .iter()
+        .enumerate()
+        .map(|(place, named)| row(&named.name, &named.summary, &|own| own.left(place, 0)))
+        .collect();
+    rows.extend(Rival::EACH.map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))));
+    let [with, without] = [&WITH_ELASTICITY, &IGNORING_IT];
+    let paper = [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
+    let [ratio, along, largest] = paper;
+    let mut last = vec!["the paper".to_owned(), "table 3".to_owned()];
+    last.extend(study.links_over_joints.iter().map(|_| number(ratio, 3)));
+    last.extend([number(along, 2), number(largest, 2)]);
+    rows.push(last);
+    let shares = study.links_over_joints.len();
+    let mut header = vec!["as printed, or assumed", ""];
+    header.extend(std::iter::repeat_n("mean/mean", shares));
+    header.extend(["z/sum", "max/max"]);
+    let words: Vec<String> = study.links_over_joints.iter().map(|share| number(*share, 2)).collect();
+    let note = format!(
+        "mean/mean: flexibility of links over that of joints {} times as declared; the last two at {}",
+        words.join(", "),
+        number(main, 2)
+    );
+    Table::new(&header, rows, &[0, 1]).noted(&[&note])
+}

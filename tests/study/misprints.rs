@@ -1,0 +1,108 @@
+//! Replicas of the paper's experiment: what they show, that they repeat, and what docs/paper.md says of them.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use flexcal::monte_carlo::{MisprintStudy, ReplicaResults, Request, Spread, replicate};
+use flexcal::report;
+
+const FILE: &str = "problems/lunar-sampler/MISPRINTS.toml";
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn study() -> MisprintStudy {
+    match Request::read(&root().join(FILE)).unwrap() {
+        Request::Misprints(study) => *study,
+        Request::Fits(_) => unreachable!("it says kind = \"misprints\""),
+    }
+}
+
+/// Mean of what a reading leaves over what the rigid fit leaves.
+fn ratio(found: &ReplicaResults, name: &str, stage: usize) -> f64 {
+    let place = found.readings.iter().position(|own| own.name == name).unwrap();
+    let ratios = found.replicas.iter().map(|own| own.ratio(own.left(place, stage)));
+    Spread::of(ratios).unwrap().mean
+}
+
+#[test]
+fn replicas_repeat_and_tell_readings_and_stages_apart() {
+    let mut study = study();
+    (study.specimens, study.links_over_joints) = (2, vec![1.0]);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| replicate(&study, || {}).unwrap())
+    };
+    let found = on(1);
+    assert_eq!(report::replica_json(&study, &found), report::replica_json(&study, &on(3)));
+    for own in &found.replicas {
+        assert!((own.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
+    }
+    let [known, declared, positions, differences] = [0, 1, 2, 3].map(|stage| ratio(&found, "corrected", stage));
+    println!("corrected: known {known:.3}, declared {declared:.3}, positions {positions:.3}, differences {differences:.3}");
+    assert!(known < 0.1 && differences < 0.1, "{known} {differences}");
+    assert!(declared > 1.5 * known && positions > 5.0 * differences, "{declared} {positions}");
+    let side = ratio(&found, "link-side", 0);
+    println!("eq. 21 as printed: {side:.3}");
+    assert!(side > 4.0 * known, "{side}");
+}
+
+#[test]
+fn mistakes_in_a_study_of_misprints_are_named() {
+    let text = std::fs::read_to_string(root().join(FILE)).unwrap();
+    let text = text.replace("\"problem.toml\"", &format!("\"{}\"", root().join("problems/lunar-sampler").display()));
+    let cases = [
+        ("\"misprints\"", "\"mistakes\"", "kind: \"mistakes\" is none of fits, misprints"),
+        ("specimens = 8", "specimens = 0", "specimens"),
+        ("specimens = 8", "specimen = 8", "specimens: missing"),
+        ("rigid_leaves_mm = 3.9673", "rigid_leaves_mm = 0", "rigid_leaves_mm"),
+        ("[0.25, 1.0, 4.0]", "[0.25, 0.0]", "links_over_joints[2]"),
+        ("payload_kg = 4.0\nhoist_N = 58.0", "", "second_load.payload_kg: missing"),
+        ("seed = 1", "seed = 1\nrepetitions = 5", "repetitions: unknown key"),
+    ];
+    for (from, to, expected) in cases {
+        assert!(text.contains(from), "{from}");
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("STUDY.toml"), text.replacen(from, to, 1)).unwrap();
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let assert = flexcal.current_dir(folder.path()).args(["study", "."]).assert().code(2);
+        let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(message.contains(expected), "{to}: {expected} missing in: {message}");
+        assert!(!folder.path().join("out").exists());
+    }
+    for arguments in [&["study", FILE, "--shard", "1/2"][..], &["study", "merge", FILE]] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().display().to_string();
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let assert = flexcal.current_dir(root()).args(arguments).args(["--out", &out]).assert().code(2);
+        assert!(String::from_utf8_lossy(&assert.get_output().stderr).contains("done at once"));
+    }
+}
+
+/// Minutes without optimisation: `cargo test --release --test study -- --ignored the_page`.
+#[test]
+#[ignore = "half a minute in a release build"]
+fn the_page_on_the_paper_shows_what_the_study_prints() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let assert = flexcal.current_dir(root()).args(["study", FILE, "--out", &out]).assert().success();
+    let printed = String::from_utf8(assert.get_output().stdout.clone()).unwrap();
+    let (printed, _) = printed.split_once("\nWritten to").unwrap();
+    let page = root().join("docs/paper.md");
+    let text = std::fs::read_to_string(&page).unwrap();
+    let mark = "<!-- misprints -->\n```text\n";
+    let (before, after) = text.split_once(mark).unwrap();
+    let (shown, after) = after.split_once("\n```").unwrap();
+    let drawn = std::fs::read_to_string(folder.path().join("figures/misprints.svg")).unwrap();
+    if std::env::var_os("FLEXCAL_REFILL").is_some() {
+        std::fs::write(&page, format!("{before}{mark}{}\n```{after}", printed.trim_end())).unwrap();
+        std::fs::write(root().join("docs/misprints.svg"), &drawn).unwrap();
+        return;
+    }
+    assert_eq!(shown, printed.trim_end(), "FLEXCAL_REFILL=1 fills it anew");
+    let shapes = |svg: &str| svg.replace(|c: char| c.is_ascii_digit() || c == '.', "");
+    let kept = std::fs::read_to_string(root().join("docs/misprints.svg")).unwrap();
+    assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
+}
