@@ -56,6 +56,12 @@
 //! [`monte_carlo`], the readers of [`measurement`] and [`simulate`], the command line). What reckons does: its indices are those of arrays that one
 //! constructor made of one length from what was read.
 
+// The command line names this library as any other program does.
+extern crate self as flexcal;
+
+#[deny(clippy::indexing_slicing)]
+#[doc(hidden)]
+pub mod cli;
 pub mod design;
 pub mod diagnose;
 #[deny(clippy::indexing_slicing)]

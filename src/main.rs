@@ -1,10 +1,7 @@
 //! The flexcal command line.
 
-#[deny(clippy::indexing_slicing)]
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::run()
+    ExitCode::from(flexcal::cli::run(std::env::args_os()))
 }

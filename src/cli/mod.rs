@@ -18,7 +18,7 @@ mod simulate;
 mod study;
 mod trace;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
@@ -68,14 +68,15 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Runs the command line: exit status 0 done, 1 the fit is not to be trusted, 2 bad input.
-pub fn run() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs the command line, `arguments` being the program's name and what follows it: exit status 0 done, 1 the fit is not to be
+/// trusted, 2 bad input.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Nothing is left to tell when even that cannot be printed.
             let _ = error.print();
-            return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
+            return if error.use_stderr() { 2 } else { 0 };
         }
     };
     let outcome = match cli.command {
@@ -92,11 +93,11 @@ pub fn run() -> ExitCode {
         Command::Man(arguments) => man::run(&arguments, Cli::command()),
     };
     match outcome {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::NotTrusted) => ExitCode::from(1),
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::NotTrusted) => 1,
         Err(error) => {
             diagnostic::print(error.as_ref());
-            ExitCode::from(2)
+            2
         }
     }
 }

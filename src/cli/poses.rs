@@ -6,7 +6,7 @@ use clap::Args;
 use flexcal::design::DesignError;
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
-use flexcal::problem::{Effect, PoseRanges, Problem};
+use flexcal::problem::{PoseRanges, Problem};
 use flexcal::simulate::Truth;
 
 use super::diagnostic;
@@ -53,11 +53,7 @@ impl Source {
 
     /// The same without temperatures and sides on which no declared effect depends: they need not be set.
     pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
-        let all = self.all_ranges(problem)?;
-        let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
-        let thermal = declared(Effect::is_thermal);
-        let sided = declared(Effect::has_sides);
-        Ok(PoseRanges { temperature: all.temperature.filter(|_| thermal), approach: all.approach && sided, ..all })
+        Ok(self.all_ranges(problem)?.that_matter(problem))
     }
 
     /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.

@@ -251,6 +251,8 @@ pub enum InputErrorKind {
     RepeatedColumn { first: String },
     #[error("{}; give every file the same columns", difference(other, *has))]
     ColumnsDiffer { other: PathBuf, has: bool },
+    #[error("{found} values for {expected} rows")]
+    ColumnLength { expected: usize, found: usize },
     #[error("the row has {found} fields, the header {expected}")]
     RowLength { expected: usize, found: usize },
     #[error("a quote is opened and never closed")]

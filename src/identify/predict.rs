@@ -83,7 +83,7 @@ impl Identification {
     }
 
     /// The full parameter vector of a model with the parameters that were identified, by their names.
-    fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+    pub(super) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
             place.map(|k| self.x[k]).ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })

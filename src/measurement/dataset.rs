@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Measurements, Split};
+use super::{ColumnTable, Measurements, Split};
 use crate::error::{InputError, Warning};
 use crate::problem::Problem;
 
@@ -55,6 +55,16 @@ impl Dataset {
     /// The first mistake found in the files or in their division.
     pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
+        warnings.extend(measurements.repeated_rows());
+        Ok((Self::of(problem, measurements)?, warnings))
+    }
+
+    /// As [`read`](Self::read), from a table in memory.
+    ///
+    /// # Errors
+    /// The first mistake found in the table or in its division.
+    pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
         warnings.extend(measurements.repeated_rows());
         Ok((Self::of(problem, measurements)?, warnings))
     }

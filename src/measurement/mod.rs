@@ -2,6 +2,8 @@
 
 mod builder;
 #[deny(clippy::indexing_slicing)]
+mod column_table;
+#[deny(clippy::indexing_slicing)]
 mod columns;
 mod dataset;
 #[deny(clippy::indexing_slicing)]
@@ -25,6 +27,7 @@ use nalgebra::Vector3;
 use crate::error::{Location, Warning};
 
 pub use builder::{DatasetBuilder, DatasetError};
+pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
 pub(crate) use repeats::different;
 pub use split::Split;

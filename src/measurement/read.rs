@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::columns::{Column, Columns, Role};
 use super::limits::Commands;
 use super::table::{Table, shortened};
-use super::{Labels, Measurements};
+use super::{ColumnTable, Labels, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, Warning};
 use crate::files::same_file;
 use crate::problem::Problem;
@@ -30,26 +30,80 @@ impl Measurements {
         Self::read_table(files, problem, false)
     }
 
+    /// Reads a table in memory, and says which columns were passed over.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_column_table(table, problem, true)
+    }
+
+    /// Reads poses that may still be to measure from a table in memory: as [`Measurements::read_columns`], with positions zero
+    /// where there are none.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn read_pose_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_column_table(table, problem, false)
+    }
+
     fn read_table(files: &[PathBuf], problem: &Problem, measured: bool) -> Result<(Self, Vec<Warning>), InputError> {
-        let mut warnings = Vec::new();
-        let mut builder: Option<Builder> = None;
+        let mut tables = Tables::new(files, problem, measured);
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 return Err(named_by(file, problem).error(InputErrorKind::RepeatedFile { path: file.clone() }));
             }
-            let mut table = Table::open(file, || missing(file, problem))?;
-            let columns = Columns::find(&table, problem, measured, &mut warnings)?;
-            let rows = builder.get_or_insert_with(|| Builder::new(files, &table, &columns, problem));
-            rows.same_columns(&table, &columns)?;
-            let before = rows.measurements.len();
-            while table.next_row()? {
-                rows.push(index, &table, &columns)?;
-            }
-            if rows.measurements.len() == before {
-                let line = table.line();
-                return Err(Location::file(file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
-            }
+            tables.read(index, Table::open(file, || missing(file, problem))?)?;
         }
+        tables.finish()
+    }
+
+    fn read_column_table(
+        table: ColumnTable,
+        problem: &Problem,
+        measured: bool,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
+        let name = table.name().to_owned();
+        let mut tables = Tables::new(std::slice::from_ref(&name), problem, measured);
+        tables.read(0, Table::of_text(&name, Box::new(table.into_text()))?)?;
+        tables.finish()
+    }
+}
+
+/// Tables that are read one after the other.
+struct Tables<'a> {
+    files: &'a [PathBuf],
+    problem: &'a Problem,
+    /// Whether the poses have been measured.
+    measured: bool,
+    warnings: Vec<Warning>,
+    builder: Option<Builder>,
+}
+
+impl<'a> Tables<'a> {
+    fn new(files: &'a [PathBuf], problem: &'a Problem, measured: bool) -> Self {
+        Self { files, problem, measured, warnings: Vec::new(), builder: None }
+    }
+
+    /// Reads all rows of a table, that of the file with this number.
+    fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
+        let columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
+        let rows = self.builder.get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
+        rows.same_columns(&table, &columns)?;
+        let before = rows.measurements.len();
+        while table.next_row()? {
+            rows.push(index, &table, &columns)?;
+        }
+        if rows.measurements.len() == before {
+            let line = table.line();
+            return Err(Location::file(&table.file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
+        }
+        Ok(())
+    }
+
+    /// Everything that was read.
+    fn finish(self) -> Result<(Measurements, Vec<Warning>), InputError> {
+        let Self { problem, measured, mut warnings, builder, .. } = self;
         match builder {
             Some(builder) => {
                 let (mut measurements, columns) = builder.finish();

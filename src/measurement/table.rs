@@ -1,7 +1,7 @@
 //! A CSV file, record by record, with its lines counted.
 
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub(super) struct Table {
     /// The names in the header line, without white space at their ends.
     pub header: Vec<String>,
     header_line: usize,
-    reader: Reader<Lines<BufReader<File>>>,
+    reader: Reader<Lines<BufReader<Box<dyn Read>>>>,
     record: ByteRecord,
     line: usize,
 }
@@ -32,6 +32,11 @@ impl Table {
             io::ErrorKind::NotFound => missing(),
             _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
         })?;
+        Self::of_text(file, Box::new(input))
+    }
+
+    /// Reads the header of a text that stands in no file; messages call it `file`.
+    pub fn of_text(file: &Path, input: Box<dyn Read>) -> Result<Self, InputError> {
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)

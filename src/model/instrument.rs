@@ -37,4 +37,13 @@ impl Instrument {
         }
         seen
     }
+
+    /// What the command of a joint, counted from 0, changes in the shifts \[m/rad\] or \[m/m\].
+    pub fn slope(&self, setup: &PoseView, joint: usize) -> Vector3<f64> {
+        let mut slope = Vector3::zeros();
+        for &(axis, driver, size) in &self.shifts {
+            slope[axis] += size * driver.slope(setup, joint);
+        }
+        slope
+    }
 }

@@ -3,6 +3,7 @@
 
 mod ablation;
 mod command;
+mod command_jacobian;
 mod derivative;
 mod driven;
 pub mod effect;

@@ -1,5 +1,7 @@
 //! Under which conditions a pose is measured, and from which ranges poses are drawn.
 
+use super::{Effect, Problem};
+
 /// What the controller and the test bench set for one pose.
 ///
 /// V holds one number per joint: a `Vec<f64>` where poses are made, a `&[f64]` where they are read ([`PoseView`]).
@@ -59,4 +61,14 @@ pub struct PoseRanges {
     pub temperature: Option<(f64, f64)>,
     /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
     pub approach: bool,
+}
+
+impl PoseRanges {
+    /// The same without temperatures and sides on which no declared effect depends: they need not be set.
+    #[must_use]
+    pub fn that_matter(self, problem: &Problem) -> Self {
+        let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
+        let (thermal, sided) = (declared(Effect::is_thermal), declared(Effect::has_sides));
+        Self { temperature: self.temperature.filter(|_| thermal), approach: self.approach && sided, ..self }
+    }
 }

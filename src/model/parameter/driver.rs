@@ -112,6 +112,27 @@ impl Driver {
         }
     }
 
+    /// Derivative of its value by the command of a joint, counted from 0.
+    pub fn slope(self, setup: &PoseView, joint: usize) -> f64 {
+        let order = |order: u32| f64::from(order);
+        match self {
+            Self::Command(own) | Self::Travel(own) if own == joint => 1.0,
+            Self::Sine(own, k) if own == joint => order(k) * (order(k) * setup.configuration[joint]).cos(),
+            Self::Cosine(own, k) if own == joint => -order(k) * (order(k) * setup.configuration[joint]).sin(),
+            Self::Spline { of: Quantity::Command(own), begin, step } if own == joint => {
+                cubic_slope((setup.configuration[joint] - begin) / step) / step
+            }
+            Self::Bump { of: Quantity::Command(own), centre, width } if own == joint => {
+                let u = (setup.configuration[joint] - centre) / width;
+                -u / width * (-0.5 * u * u).exp()
+            }
+            Self::Step { of: Quantity::Command(own), centre, width } if own == joint => {
+                (1.0 - ((setup.configuration[joint] - centre) / width).tanh().powi(2)) / width
+            }
+            _ => 0.0,
+        }
+    }
+
     /// Whether it depends on what the joints are told.
     pub fn follows_commands(self) -> bool {
         match self {
@@ -142,9 +163,48 @@ fn cubic(u: f64) -> f64 {
     }
 }
 
+/// The derivative of [`cubic`].
+fn cubic_slope(u: f64) -> f64 {
+    let v = 2.0 - (u - 2.0).abs();
+    let slope = match v {
+        v if v <= 0.0 => 0.0,
+        v if v <= 1.0 => v * v / 2.0,
+        v => {
+            let w = 2.0 - v;
+            2.0 * w - 1.5 * w * w
+        }
+    };
+    if u > 2.0 { -slope } else { slope }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slopes_are_those_of_the_values() {
+        let of = Quantity::Command(1);
+        let drivers = [
+            Driver::Command(1),
+            Driver::Travel(0),
+            Driver::Sine(1, 3),
+            Driver::Cosine(1, 2),
+            Driver::Elapsed,
+            Driver::Spline { of, begin: -1.0, step: 0.7 },
+            Driver::Spline { of: Quantity::Payload, begin: -1.0, step: 0.7 },
+            Driver::Bump { of, centre: 0.4, width: 0.3 },
+            Driver::Step { of, centre: 0.4, width: 0.3 },
+        ];
+        for driver in drivers {
+            for k in -20..20 {
+                let at = |q: f64| driver.value(&PoseView::of(&[0.2, q]));
+                let (q, step) = (0.093 * f64::from(k), 1e-5);
+                let expected = (at(q + step) - at(q - step)) / (2.0 * step);
+                let slope = driver.slope(&PoseView::of(&[0.2, q]), 1);
+                assert!((slope - expected).abs() < 1e-8, "{driver:?} at {q}: {slope}, not {expected}");
+            }
+        }
+    }
 
     #[test]
     fn splines_add_up_to_one() {

@@ -1,0 +1,147 @@
+//! Tables that are in memory already, column by column; they are read as if they stood in a file.
+
+use std::fmt::Write as _;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use super::Labels;
+use crate::error::{InputError, InputErrorKind, Location};
+
+/// Text that is made at a time [bytes].
+const CHUNK: usize = 1 << 15;
+
+/// A table in memory: what a file of measurements holds, with the names that its columns have there. Its rows go by the lines
+/// that they would have in a file: the first one is on line 2.
+///
+/// ```
+/// use std::path::Path;
+/// use flexcal::measurement::{ColumnTable, ColumnValues, Dataset};
+/// use flexcal::problem::Problem;
+///
+/// let text = "name = \"arm\"\njoint = [{ a_m = 1.0 }]\ndata.held_out = { column = \"split\" }";
+/// let problem = Problem::parse(text, Path::new("arm.toml"))?;
+/// let numbers = |values: [f64; 2]| ColumnValues::Numbers(values.to_vec());
+/// let columns = vec![
+///     ("q1_deg".to_owned(), numbers([0.0, 90.0])),
+///     ("x_mm".to_owned(), numbers([1000.0, 0.1])),
+///     ("y_mm".to_owned(), numbers([0.2, 1000.0])),
+///     ("z_mm".to_owned(), numbers([0.0, 0.0])),
+///     ("split".to_owned(), ColumnValues::Words(["identification", "validation"].into_iter().collect())),
+/// ];
+/// let (data, _warnings) = Dataset::read_columns(ColumnTable::new("data", columns)?, &problem)?;
+/// assert_eq!(data.measurements.positions[1].y, 1.0);
+/// # Ok::<(), flexcal::error::InputError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct ColumnTable {
+    name: PathBuf,
+    columns: Vec<(String, ColumnValues)>,
+    rows: usize,
+}
+
+/// The values of a column, one a row.
+#[derive(Debug, Clone)]
+pub enum ColumnValues {
+    /// Numbers, in the unit that the column's name says.
+    Numbers(Vec<f64>),
+    /// Words, as the cells of a file hold them.
+    Words(Labels),
+}
+
+impl ColumnTable {
+    /// From columns with their names; messages call the table `name`.
+    ///
+    /// # Errors
+    /// A column of another length than the first.
+    pub fn new(name: impl Into<PathBuf>, columns: Vec<(String, ColumnValues)>) -> Result<Self, InputError> {
+        let name = name.into();
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        for (column, values) in &columns {
+            if values.len() != rows {
+                let kind = InputErrorKind::ColumnLength { expected: rows, found: values.len() };
+                return Err(Location::file(name).with_key(format!("column {column}")).error(kind));
+            }
+        }
+        Ok(Self { name, columns, rows })
+    }
+
+    /// What messages call it.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    /// Its text as it would stand in a file.
+    pub(super) fn into_text(self) -> impl Read {
+        let header = self.columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",") + "\n";
+        Text { table: self, row: 0, chunk: header, read: 0 }
+    }
+}
+
+impl ColumnValues {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(values) => values.len(),
+            Self::Words(labels) => labels.of_row.len(),
+        }
+    }
+
+    /// Writes the cell of a row; numbers so that they are read again to the last bit.
+    fn write(&self, row: usize, text: &mut String) {
+        match self {
+            // A String takes whatever is written to it.
+            Self::Numbers(values) => _ = values.get(row).map(|value| write!(text, "{value:?}")),
+            Self::Words(labels) => {
+                let word = labels.of_row.get(row).and_then(|&label| labels.names.get(label));
+                text.push_str(&quoted(word.map_or("", String::as_str)));
+            }
+        }
+    }
+}
+
+/// A table as text, made a few rows at a time.
+struct Text {
+    table: ColumnTable,
+    /// The next row.
+    row: usize,
+    chunk: String,
+    read: usize,
+}
+
+impl Text {
+    fn next_rows(&mut self) {
+        self.chunk.clear();
+        self.read = 0;
+        while self.row < self.table.rows && self.chunk.len() < CHUNK {
+            for (k, (_, values)) in self.table.columns.iter().enumerate() {
+                if k > 0 {
+                    self.chunk.push(',');
+                }
+                values.write(self.row, &mut self.chunk);
+            }
+            self.chunk.push('\n');
+            self.row += 1;
+        }
+    }
+}
+
+impl Read for Text {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.read == self.chunk.len() {
+            self.next_rows();
+        }
+        let left = self.chunk.as_bytes().get(self.read..).unwrap_or_default();
+        let count = left.len().min(out.len());
+        out.iter_mut().zip(left).for_each(|(out, byte)| *out = *byte);
+        self.read += count;
+        Ok(count)
+    }
+}
+
+/// A cell of a file; an empty one is a cell too.
+fn quoted(word: &str) -> String {
+    if word.is_empty() || word.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", word.replace('"', "\"\""))
+    } else {
+        word.to_owned()
+    }
+}
