@@ -1,0 +1,31 @@
+"""Identify the geometric and elastic parameters of robot arms from measured end-point positions.
+
+>>> import flexcal
+>>> problem = flexcal.Problem("problems/lunar-sampler")
+>>> result = problem.identify()
+>>> result.parameters.loc["joint2.stiffness", ["nominal", "estimate", "std_error"]]
+>>> loop = problem.loop()          # finds what the model lacks
+>>> loop                           # in a notebook: headline, effects, figure
+
+Lengths are in metres, angles in radian, everything else in SI units as well, except where the name of a column or key says
+otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
+"""
+
+from __future__ import annotations
+
+from ._problem import Problem
+from ._progress import Progress
+from ._results import Check, ClosedLoop, Identification, Plan, Trace
+from .errors import FlexcalWarning, InputError
+
+__all__ = [
+    "Check",
+    "ClosedLoop",
+    "FlexcalWarning",
+    "Identification",
+    "InputError",
+    "Plan",
+    "Problem",
+    "Progress",
+    "Trace",
+]

@@ -1,0 +1,75 @@
+"""Arms that predict."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._tables import configurations, warn
+
+Array = npt.NDArray[np.float64]
+
+
+class _Predicts(Protocol):
+    def predict(self, poses: _core.Poses) -> bytearray: ...
+
+    def jacobian(self, poses: _core.Poses) -> bytearray: ...
+
+
+class Forward:
+    """Positions and their derivatives as a function of the configuration."""
+
+    _forward: _Predicts
+    _reader: _core.Problem
+
+    def predict(self, q: Any, **columns: Any) -> Array:
+        """Positions of the measured point, measuring frame [m].
+
+        Parameters
+        ----------
+        q
+            Configurations, shape (poses, joints) or (joints,), [rad] and of joints that slide [m]; joints are those that move, or
+            all. Or a table of poses, as for data: a path, a DataFrame or a dict of arrays with their columns and units.
+        columns
+            What else is known of the poses, by the names of columns: ``payload_kg``, ``hoist_N``, ``temperature_C``, ``time_s``,
+            ``session``, ``target``, ``approach`` …; one value a pose, or one for all.
+
+        Returns
+        -------
+        Shape (poses, 3), or (3,) for one configuration; NaN where the arm has no equilibrium.
+
+        Raises
+        ------
+        InputError
+            A mistake in the poses; a session or target of which nothing is known.
+        """
+        poses, single = self._poses(q, columns)
+        positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
+        return positions[0] if single else positions
+
+    def jacobian(self, q: Any, **columns: Any) -> Array:
+        """Derivatives of the positions by the configuration, measuring frame [m/rad], of joints that slide [m/m].
+
+        Parameters are those of :meth:`predict`. Loads and effects that follow the configuration are differentiated through; the
+        side from which a joint comes stays.
+
+        Returns
+        -------
+        Shape (poses, 3, joints), or (3, joints) for one configuration; joints that move, or all if ``q`` has all of them (0 at
+        fixed ones); NaN where the arm has no equilibrium.
+        """
+        poses, single = self._poses(q, columns)
+        units = self._reader.units
+        whole = np.frombuffer(self._forward.jacobian(poses), dtype=np.float64).reshape(-1, 3, len(units))
+        if np.shape(q)[-1:] != (len(units),):
+            whole = whole[:, :, [k for k, unit in enumerate(units) if unit is not None]]
+        return whole[0] if single else whole
+
+    def _poses(self, q: Any, columns: dict[str, Any]) -> tuple[_core.Poses, bool]:
+        source, single = configurations(q, self._reader.units, columns)
+        poses = self._reader.poses(source)
+        warn(poses.warnings, stacklevel=3)
+        return poses, single

@@ -1,0 +1,203 @@
+"""Problems, and what can be done with them."""
+
+from __future__ import annotations
+
+import os
+from typing import Literal, TypeAlias
+
+from . import _core
+from ._forward import Forward
+from ._progress import Told, told
+from ._results import Check, ClosedLoop, Identification, Plan, Trace
+from ._tables import Data, Path, source, warn
+
+Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only"]
+Solver: TypeAlias = Literal["auto", "levenberg-marquardt", "gauss-newton", "pseudo-inverse", "bounded"]
+Criterion: TypeAlias = Literal["S", "A", "D", "E"]
+
+
+class Problem(Forward):
+    """An arm as declared, what is free of it, and where its measurements are.
+
+    As a forward model (:meth:`predict`, :meth:`jacobian`) it is the nominal arm.
+
+    Parameters
+    ----------
+    problem
+        A problem.toml, the folder that holds one, or its text (anything with a line break is text; the data files that a text
+        names are looked for in the current folder).
+
+    Raises
+    ------
+    InputError
+        The first mistake found, with file, line and key.
+    """
+
+    def __init__(self, problem: str | os.PathLike[str]) -> None:
+        if isinstance(problem, str) and "\n" in problem:
+            self._core = _core.Problem.parse(problem, "<text>")
+        else:
+            self._core = _core.Problem.read(problem)
+        self._forward = self._core
+        self._reader = self._core
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._core.name
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return self._core.title
+
+    @property
+    def text(self) -> str:
+        """The problem file."""
+        return self._core.text
+
+    @property
+    def files(self) -> list[Path]:
+        """Measurement files that it names."""
+        return list(self._core.files)
+
+    @property
+    def units(self) -> list[Literal["rad", "m"] | None]:
+        """Unit of each joint's command, from the base outwards; None at fixed joints."""
+        return self._core.units
+
+    def __repr__(self) -> str:
+        return f"<flexcal.Problem {self.name!r}>"
+
+    def identify(
+        self,
+        data: Data | None = None,
+        strategy: Strategy = "joint",
+        solver: Solver = "auto",
+        *,
+        progress: Told = False,
+    ) -> Identification:
+        """Fits the free parameters to the rows that are not held out.
+
+        Parameters
+        ----------
+        data
+            Measurements instead of those that the problem names: a path or several, a DataFrame, or a dict of arrays, with the
+            columns of files (``q1_deg`` … or ``q1_rad`` …, ``x_mm``, ``y_mm``, ``z_mm``, ``split`` …).
+        strategy
+            Which parameters are fitted together.
+        solver
+            ``"auto"`` keeps bounds and constraints where there are any.
+        progress
+            A function that is called with a :class:`Progress` at every step, or True for a line on standard error.
+
+        Raises
+        ------
+        InputError
+            A mistake in the measurements; problem, data, strategy and solver do not fit each other.
+        """
+        read = self._data(data)
+        with told(progress) as step:
+            result = Identification(self._core.identify(read, strategy, solver, step), self)
+        result._warn(stacklevel=2)
+        return result
+
+    def loop(self, data: Data | None = None, *, progress: Told = False) -> ClosedLoop:
+        """Finds the effects that the problem lacks and adds them, until nothing is left to find; held-out rows only judge.
+
+        Parameters are those of :meth:`identify`.
+        """
+        read = self._data(data)
+        with told(progress) as step:
+            result = ClosedLoop(self._core.close(read, step), self)
+        result._warn(stacklevel=2)
+        return result
+
+    def trace(self, data: Data | None = None, *, progress: Told = False) -> Trace:
+        """Ranks the effects that the residual points to; changes nothing. Parameters are those of :meth:`identify`."""
+        read = self._data(data)
+        with told(progress) as step:
+            result = Trace(self._core.trace(read, step), self)
+        result.fit._warn(stacklevel=2)
+        return result
+
+    def check(
+        self,
+        data: Data | None = None,
+        *,
+        poses: int | None = None,
+        candidates: Data | None = None,
+        truth: Path | None = None,
+        seed: int = 1,
+    ) -> Check:
+        """Says what measurements in some poses will tell, before anyone makes them.
+
+        Parameters
+        ----------
+        data
+            Measurements whose poses are judged; those of the problem, if nothing else is given. Positions are not needed.
+        poses
+            Number of poses to draw: of the candidates, or else within the limits of the joints.
+        candidates
+            A table of poses, with the columns of measurements; judged as a whole without ``poses``.
+        truth
+            A TRUTH.toml whose ``[poses]`` say where poses may lie, instead of the limits of the joints.
+        seed
+            Of every random number.
+        """
+        if data is not None and candidates is not None:
+            raise TypeError("data and candidates both name poses; keep one of the two")
+        table = self._given(candidates)
+        measured = None
+        if table is None and poses is None:
+            measured = self._poses_of(source(data) if data is not None else self.files)
+        elif data is not None:
+            raise TypeError("data name the poses; leave out their number")
+        return Check(_core.check(self._core, measured, table, poses, truth, seed))
+
+    def plan(
+        self,
+        poses: int,
+        data: Data | None = None,
+        *,
+        candidates: Data | None = None,
+        criterion: Criterion = "S",
+        separate: tuple[str, str] | None = None,
+        truth: Path | None = None,
+        seed: int = 1,
+    ) -> Plan:
+        """Chooses the poses that identify best.
+
+        Parameters
+        ----------
+        poses
+            Number of poses to measure.
+        data
+            Measurements that are there already: the plan completes them.
+        candidates
+            A table of poses to take; otherwise they are sought within the limits of the joints.
+        criterion
+            What to make small: the geometric mean of the standard errors (``"S"``), the mean variance (``"A"``), the volume of the
+            confidence ellipsoid (``"D"``) or the largest variance of any combination (``"E"``).
+        separate
+            Two effects to tell apart, each as a problem declares it: ``"gear-ratio = { joint = 3 }"``.
+        truth
+            A TRUTH.toml whose ``[poses]`` say where poses may lie, instead of the limits of the joints.
+        seed
+            Of every random number.
+        """
+        given, table = self._given(data), self._given(candidates)
+        return Plan(_core.plan(self._core, poses, given, table, criterion, separate, truth, seed))
+
+    def _data(self, data: Data | None) -> _core.Data:
+        read = self._core.data(self.files if data is None else source(data))
+        warn(read.warnings, stacklevel=3)
+        return read
+
+    def _given(self, data: Data | None) -> _core.Poses | None:
+        return None if data is None else self._poses_of(source(data))
+
+    def _poses_of(self, table: object) -> _core.Poses:
+        poses = self._core.poses(table)  # type: ignore[arg-type]
+        warn(poses.warnings, stacklevel=4)
+        return poses

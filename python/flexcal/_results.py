@@ -1,0 +1,348 @@
+"""Results as tables, arrays, words and, in a notebook, as a page."""
+
+from __future__ import annotations
+
+import json
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _html
+from ._forward import Forward
+from ._tables import table, warn
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from . import _core
+    from ._problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+
+class _Result:
+    """What all results can do."""
+
+    _core: Any
+
+    def summary(self) -> str:
+        """What the command line prints, as text."""
+        return str(self._core.summary())
+
+    def to_json(self) -> str:
+        """The file that the command line writes (``estimate.json``, ``loop.json`` …), to the byte but for the time taken."""
+        return str(self._core.json())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as a dict; docs/results.md explains every field. SI units, except where a key says otherwise."""
+        return dict(self._document)
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        document: dict[str, Any] = json.loads(self._core.json())
+        return document
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        return f"<flexcal.{type(self).__name__} of {self._document['problem']!r}>"
+
+
+class _Fit(_Result):
+    """A result with a fit and a report."""
+
+    _fit: _core.Identification
+    _problem: Problem
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """The free parameters, a row each, by their names; SI.
+
+        Columns: ``unit`` (of the next three), ``nominal``, ``estimate``, ``std_error`` (1 σ, NaN where nothing was learned or a
+        bound holds the value), ``at_bound`` (``"lower"``, ``"upper"`` or None), ``identified`` (0…1, the share that the data
+        gave), ``fitted``.
+        """
+        return _parameters(json.loads(self._fit.json())["parameters"])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the estimates, shape (parameters, parameters), in the order of ``parameters``; SI, entry (i, j) in the
+        product of both units. NaN where one of the two has no standard error."""
+        n = len(self.parameters)
+        return np.frombuffer(self._fit.covariance(), dtype=np.float64).reshape(n, n)
+
+    @cached_property
+    def residuals(self) -> pd.DataFrame:
+        """What the fit leaves, a row for each row of the data, in their order.
+
+        Columns: ``file``, ``line`` and what else names the row (``pose``, ``session``, ``target``); ``predicted_x_mm`` …;
+        ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; ``whitened``: its length over 1 σ of a coordinate;
+        ``outlier``; ``held_out``.
+        """
+        return _residuals(self._fit.residuals())
+
+    @cached_property
+    def errors(self) -> pd.DataFrame:
+        """Errors before and after, on the rows fitted and on those held out [mm]: mean, root mean square and largest distance."""
+        return _errors(self._document)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the fit is to be trusted; ``why_not_trusted`` says why not."""
+        return self._fit.why_not_trusted is None
+
+    @property
+    def why_not_trusted(self) -> str | None:
+        """Why the fit is not to be trusted; None if it is."""
+        return self._fit.why_not_trusted
+
+    @property
+    def cautions(self) -> list[str]:
+        """What to ask about the input."""
+        return self._fit.cautions
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that was fitted."""
+        return self._problem
+
+    @cached_property
+    def _report(self) -> tuple[str, str, dict[str, str]]:
+        markdown, page, figures = self._core.report()
+        return markdown, page, {name.removesuffix(".svg"): text for name, text in figures}
+
+    @property
+    def figures(self) -> dict[str, str]:
+        """The figures of the report as SVG, by name (``"held-out-errors"``, ``"effect-1"`` …)."""
+        return self._report[2]
+
+    @property
+    def markdown(self) -> str:
+        """``report.md`` of the command line."""
+        return self._report[0]
+
+    @property
+    def html(self) -> str:
+        """``report.html`` of the command line: a whole page that needs nothing else."""
+        return self._report[1]
+
+    def _warn(self, stacklevel: int) -> None:
+        reason = self._fit.why_not_trusted
+        warn(([] if reason is None else [reason]) + self.cautions, stacklevel + 1)
+
+
+class Identification(_Fit, Forward):
+    """An identified arm."""
+
+    def __init__(self, core: _core.Identification, problem: Problem) -> None:
+        self._core = core
+        self._fit = core
+        self._problem = problem
+        self._forward = core
+        self._reader = problem._core
+
+    def _repr_html_(self) -> str:
+        return _html.identification(self)
+
+
+class ClosedLoop(_Fit):
+    """The loop from the declared problem to one that leaves nothing to find; ``parameters``, ``covariance`` and ``residuals`` are
+    those of the last fit, with everything that was found."""
+
+    def __init__(self, core: _core.ClosedLoop, problem: Problem) -> None:
+        self._core = core
+        self._fit = core.after()
+        self._problem = problem
+
+    @property
+    def verdict(self) -> str:
+        """``"explained"``, ``"unexplained"`` or ``"nothing-found"``."""
+        return str(self._document["verdict"])
+
+    @cached_property
+    def effects(self) -> pd.DataFrame:
+        """What was found, a row each, in that order.
+
+        Columns: ``effect``, ``description``, ``p_value``; ``place``, ``depends_on`` and ``law`` with the probability that each
+        is claimed with (``place_probability`` …; None and NaN where no evidence was weighed); ``stability``.
+        """
+        return _effects(self._document["effects"])
+
+    @property
+    def unexplained(self) -> dict[str, Any] | None:
+        """Structure whose law is not known: its place, what it depends on; None if none is left."""
+        found: dict[str, Any] | None = self._document["unexplained"]
+        return found
+
+    @cached_property
+    def before(self) -> Identification:
+        """The fit of the problem as declared."""
+        return Identification(self._core.before(), self._problem)
+
+    @cached_property
+    def after(self) -> Identification:
+        """The fit with everything that was found; it predicts."""
+        return Identification(self._core.after(), self.closed_problem)
+
+    @cached_property
+    def closed_problem(self) -> Problem:
+        """The problem with what was found declared: an input like any other."""
+        from ._problem import Problem
+
+        return Problem(str(self._core.closed_problem()))
+
+    def _repr_html_(self) -> str:
+        return _html.closed_loop(self)
+
+
+class Trace(_Result):
+    """Which effects the residual of a fit points to."""
+
+    def __init__(self, core: _core.Trace, problem: Problem) -> None:
+        self._core = core
+        self.fit = Identification(core.fit(), problem)
+        """The fit of the problem as declared."""
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """As :attr:`Identification.parameters`, of the problem as declared."""
+        return self.fit.parameters
+
+    @property
+    def covariance(self) -> Array:
+        """As :attr:`Identification.covariance`, of the problem as declared."""
+        return self.fit.covariance
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """As :attr:`Identification.residuals`, of the problem as declared."""
+        return self.fit.residuals
+
+    @cached_property
+    def ranking(self) -> pd.DataFrame:
+        """Candidates, best first: ``effect``, ``description``, ``p_value`` (corrected for the candidates tried) and
+        ``expected_gain_mm`` (off the rms error of the poses fitted)."""
+        import pandas as pd
+
+        names = ["effect", "description", "p_value", "expected_gain_mm"]
+        return pd.DataFrame([[entry[name] for name in names] for entry in self._document["ranking"]], columns=names)
+
+    def _repr_html_(self) -> str:
+        return _html.trace(self)
+
+
+class Check(_Result):
+    """What measurements in some poses will tell."""
+
+    def __init__(self, core: _core.Check) -> None:
+        self._core = core
+
+    @property
+    def suffices(self) -> bool:
+        """Whether the poses suffice; ``why_not_sufficient`` says why not."""
+        return self._core.why_not_sufficient is None
+
+    @property
+    def why_not_sufficient(self) -> str | None:
+        """Why the poses do not suffice; None if they do."""
+        reason: str | None = self._core.why_not_sufficient
+        return reason
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """The free parameters by their names, with the standard error to expect; SI."""
+        return _named(self._document["parameters"])
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
+class Plan(_Result):
+    """Poses to measure, and what they promise."""
+
+    def __init__(self, core: _core.Plan) -> None:
+        self._core = core
+
+    @cached_property
+    def poses(self) -> pd.DataFrame:
+        """The poses, with the columns of measurements but for the positions (``q1_deg`` …): measure them, add ``x_mm``, ``y_mm``,
+        ``z_mm``, and identify."""
+        return table(self._core.csv())
+
+    @property
+    def suffices(self) -> bool:
+        """Whether the poses decide every parameter as far as poses can."""
+        return bool(self._core.suffices)
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """The free parameters by their names, with the standard error to expect, planned and at random; SI."""
+        return _named(self._document["parameters"])
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
+def _named(entries: list[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.json_normalize(entries, sep="_").set_index("name")
+
+
+def _parameters(entries: list[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    numbers = ["nominal", "estimate", "std_error", "identified"]
+    return pd.DataFrame(entries).set_index("name").astype(dict.fromkeys(numbers, np.float64))
+
+
+def _residuals(columns: dict[str, bytearray | tuple[bytearray, list[str]]]) -> pd.DataFrame:
+    import pandas as pd
+
+    frame: dict[str, Any] = {}
+    for name, values in columns.items():
+        if isinstance(values, tuple):
+            codes, words = values
+            frame[name] = pd.Categorical.from_codes(np.frombuffer(codes, dtype=np.int64), pd.Index(words))
+        elif name in ("line", "outlier", "held_out"):
+            whole = np.frombuffer(values, dtype=np.int64)
+            frame[name] = whole if name == "line" else whole.astype(np.bool_)
+        else:
+            frame[name] = np.frombuffer(values, dtype=np.float64)
+    return pd.DataFrame(frame, copy=False)
+
+
+def _errors(document: dict[str, Any]) -> pd.DataFrame:
+    import pandas as pd
+
+    stages = {"registered": document["registered"]}
+    if "before" in document:
+        stages |= {"declared": document["before"], "closed": document["after"]}
+    else:
+        stages["identified"] = document
+    rows = []
+    for stage, parts in stages.items():
+        for part in ("identification", "held_out"):
+            own = parts[part]
+            rows.append((stage, part, own["n"], *(own[of]["norm"] for of in ("mean_mm", "rms_mm", "max_mm"))))
+    names = ["arm", "rows", "n", "mean_mm", "rms_mm", "max_mm"]
+    return pd.DataFrame(rows, columns=names).set_index(["arm", "rows"])
+
+
+def _effects(entries: list[dict[str, Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    claims = ("place", "depends_on", "law")
+    names = ["effect", "description", "p_value"]
+    names += [name for claim in claims for name in (claim, f"{claim}_probability")] + ["stability"]
+    rows = []
+    for entry in entries:
+        row = [entry["effect"], entry["description"], entry["p_value"]]
+        for claim in claims:
+            said = (entry.get("claims") or {}).get(claim) or {}
+            row += [said.get("value"), said.get("probability")]
+        rows.append([*row, entry.get("stability")])
+    return pd.DataFrame(rows, columns=names)

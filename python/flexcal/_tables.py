@@ -1,0 +1,186 @@
+"""Tables on their way in: from paths, frames, dicts and arrays to columns of numbers and words."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import FlexcalWarning, InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Path: TypeAlias = str | os.PathLike[str]
+"""A file."""
+
+Data: TypeAlias = Path | Sequence[Path] | Mapping[str, Any] | Any
+"""Measurements: a CSV file or several of one table, a DataFrame (pandas, polars, pyarrow or any other that speaks Arrow), a
+structured array, or a dict of arrays. Names of columns and their units are those of files (``q1_deg``, ``x_mm``, ``split``);
+in a dict one array may stand for several columns: ``q_rad`` or ``q_deg``, shape (rows, joints), ``xyz_mm`` or ``xyz_m``,
+shape (rows, 3), and ``approach``, shape (rows, joints)."""
+
+Column: TypeAlias = bytes | tuple[bytes, list[str]]
+"""Bytes of 64-bit numbers, or of the 64-bit numbers of words with the words."""
+Source: TypeAlias = list[Path] | tuple[str, list[tuple[str, Column]]]
+
+
+def source(data: Data) -> Source:
+    """What the reader takes: files, or the name of a table and its columns."""
+    if isinstance(data, (str, os.PathLike)):
+        return [data]
+    if isinstance(data, (list, tuple)) and data and all(isinstance(file, (str, os.PathLike)) for file in data):
+        return list(data)
+    columns = [part for name, values in _columns(data) for part in _split(str(name), values)]
+    if not columns:
+        raise InputError("data: no columns; give a table with columns such as q1_deg, x_mm, y_mm, z_mm", key="data")
+    return "data", columns
+
+
+def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, Any]) -> tuple[Source, bool]:
+    """Configurations with further columns as a table, and whether it is one configuration alone.
+
+    ``units`` holds for each joint the unit of its command, None at fixed joints. A value of ``columns`` may be one for all rows.
+    """
+    if isinstance(q, (str, os.PathLike, Mapping)) or hasattr(q, "columns") or hasattr(q, "column_names"):
+        if columns:
+            raise TypeError("columns go into the table of poses itself")
+        return source(q), False
+    values = np.asarray(q, dtype=np.float64)
+    single = values.ndim == 1
+    values = np.atleast_2d(values)
+    moving = [unit for unit in units if unit is not None]
+    if values.ndim != 2 or values.shape[1] not in (len(units), len(moving)):
+        shape = " × ".join(str(size) for size in np.shape(q))
+        message = f"q: shape {shape}; an array of shape (poses, joints) has {len(moving)} columns here"
+        raise InputError(message, key="q")
+    if values.shape[1] == len(units):
+        values = values[:, [k for k, unit in enumerate(units) if unit is not None]]
+    # Without their numbers joints go by their order among those that move.
+    table: dict[str, Any] = {f"q{k + 1}_{unit}": values[:, k] for k, unit in enumerate(moving)}
+    for name, value in columns.items():
+        one_each = np.ndim(value) > 0
+        table[name] = value if one_each else np.full(len(values), value)
+    return source(table), single
+
+
+def table(text: str) -> pd.DataFrame:
+    """A CSV text as a frame, its numbers to the last bit."""
+    import pandas as pd
+
+    header, *rows = csv.reader(io.StringIO(text))
+    columns = zip(header, zip(*rows, strict=True), strict=True)
+    return pd.DataFrame({name: _parsed(cells) for name, cells in columns})
+
+
+def _parsed(cells: Sequence[str]) -> Any:
+    for kind in (int, float):
+        try:
+            return [kind(cell) for cell in cells]
+        except ValueError:
+            pass
+    return list(cells)
+
+
+def warn(messages: Iterable[str], stacklevel: int) -> None:
+    """Warns of each; ``stacklevel`` counts from the caller."""
+    for message in messages:
+        warnings.warn(message, FlexcalWarning, stacklevel=stacklevel + 1)
+
+
+def _columns(data: Any) -> Iterator[tuple[Any, Any]]:
+    if isinstance(data, Mapping):
+        yield from data.items()
+    elif isinstance(data, np.ndarray) and data.dtype.names is not None:
+        yield from ((name, data[name]) for name in data.dtype.names)
+    elif hasattr(data, "columns") and not isinstance(data, np.ndarray) and not hasattr(data, "column_names"):
+        yield from ((name, data[name]) for name in data.columns)
+    elif hasattr(data, "column_names"):
+        yield from zip(data.column_names, data.columns, strict=True)
+    elif hasattr(data, "__arrow_c_stream__"):
+        import pyarrow
+
+        yield from _columns(pyarrow.table(data))
+    else:
+        kind = type(data).__name__
+        raise TypeError(f"data: a path, a DataFrame or a dict of arrays is needed, not {kind}")
+
+
+def _split(name: str, values: Any) -> Iterator[tuple[str, Column]]:
+    """Its columns: more than one where an array has two dimensions."""
+    if getattr(values, "ndim", None) != 2 and not _is_nested(values):
+        yield name, _column(name, values)
+        return
+    array = np.asarray(values)
+    base, _, unit = name.partition("_")
+    suffix = f"_{unit}" if unit else ""
+    if base == "xyz" and array.shape[1] == 3:
+        parts = ["x", "y", "z"]
+    elif base in ("q", "approach"):
+        parts = [f"{base}{k + 1}" for k in range(array.shape[1])]
+    else:
+        message = f"column {name}: shape {array.shape}; q, approach and xyz alone may have two dimensions (xyz three columns)"
+        raise InputError(message, file="data", key=f"column {name}")
+    for k, part in enumerate(parts):
+        yield part + suffix, _column(part + suffix, array[:, k])
+
+
+def _is_nested(values: Any) -> bool:
+    return isinstance(values, (list, tuple)) and bool(values) and isinstance(values[0], (list, tuple, np.ndarray))
+
+
+def _column(name: str, values: Any) -> Column:
+    module = type(values).__module__.partition(".")[0]
+    if module == "polars":
+        return _of_polars(values)
+    if module == "pyarrow":
+        values = values.to_pandas()
+        module = "pandas"
+    if module == "pandas":
+        import pandas as pd
+
+        if pd.api.types.is_numeric_dtype(values.dtype):
+            return _numbers(values.to_numpy(dtype=np.float64, na_value=np.nan))
+        return _words(values)
+    array = np.asarray(values)
+    if array.ndim != 1:
+        message = f"column {name}: shape {array.shape}; a column has one value a row"
+        raise InputError(message, file="data", key=f"column {name}")
+    return _numbers(array) if array.dtype.kind in "fiub" else _words(array)
+
+
+def _numbers(values: Any) -> Column:
+    return np.asarray(values, dtype=np.float64).tobytes()
+
+
+def _words(values: Any) -> Column:
+    import pandas as pd
+
+    codes, words = pd.factorize(values)
+    return _coded(codes, [str(word) for word in words])
+
+
+def _of_polars(values: Any) -> Column:
+    import polars as pl
+
+    if values.dtype.is_numeric() or values.dtype == pl.Boolean:
+        return _numbers(values.cast(pl.Float64).to_numpy())
+    text = values.cast(pl.String)
+    words = text.drop_nulls().unique(maintain_order=True)
+    codes = text.cast(pl.Enum(words)).to_physical().cast(pl.Int64).fill_null(-1)
+    return _coded(codes.to_numpy(), words.to_list())
+
+
+def _coded(codes: npt.NDArray[np.integer[Any]], words: list[str]) -> Column:
+    """A missing word is an empty cell."""
+    missing = codes < 0
+    if missing.any():
+        codes = np.where(missing, len(words), codes)
+        words = [*words, ""]
+    return codes.astype(np.int64, copy=False).tobytes(), words

@@ -1,0 +1,213 @@
+//! Poses before they are measured: what they will tell, and which are best.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexcal::design::{self, Candidates, Criterion, DesignError, Judged, Pair, PlanOptions, PlanProgress};
+use flexcal::identify::Progress;
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::problem::{PoseRanges, Problem as Declared};
+use flexcal::report;
+use flexcal::simulate::Truth;
+use pyo3::prelude::*;
+
+use crate::data::Poses;
+use crate::error::{of_argument, raised};
+use crate::problem::Problem;
+use crate::supervise::supervised;
+
+/// What measurements in some poses will tell.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Check {
+    problem: Arc<Declared>,
+    check: design::Check,
+}
+
+/// Poses to measure, and what they promise.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Plan {
+    problem: Arc<Declared>,
+    plan: design::Plan,
+    separated: Option<design::Separated>,
+    criterion: Criterion,
+    seed: u64,
+}
+
+#[pymethods]
+impl Check {
+    /// check.json.
+    fn json(&self) -> String {
+        report::check_json(&self.problem, &self.check)
+    }
+
+    /// What the command line prints.
+    fn summary(&self) -> String {
+        report::check_text(&self.problem, &self.check)
+    }
+
+    /// Why the poses do not suffice, if they do not.
+    #[getter]
+    fn why_not_sufficient(&self) -> Option<String> {
+        (!self.check.suffices()).then(|| report::why_not_sufficient(&self.check))
+    }
+}
+
+#[pymethods]
+impl Plan {
+    /// plan.json.
+    fn json(&self) -> String {
+        report::plan_json(&self.problem, self.reached(), self.seed, &self.plan, self.separated.as_ref())
+    }
+
+    /// What the command line prints.
+    fn summary(&self) -> String {
+        report::plan_text(&self.problem, self.reached(), &self.plan, self.separated.as_ref())
+    }
+
+    /// plan.csv.
+    fn csv(&self) -> String {
+        report::poses_csv(&self.problem, &self.plan.poses)
+    }
+
+    /// Whether the poses decide what poses can decide.
+    #[getter]
+    fn suffices(&self) -> bool {
+        self.plan.suffices
+    }
+}
+
+impl Plan {
+    /// What was made small.
+    fn reached(&self) -> &Criterion {
+        self.separated.as_ref().map_or(&self.criterion, |separated| &separated.criterion)
+    }
+}
+
+/// Where poses may lie: within `[poses]` of a TRUTH.toml, or else the limits of the joints.
+fn ranges(problem: &Declared, truth: Option<&Path>) -> Result<PoseRanges, DesignError> {
+    match truth {
+        Some(file) => Ok(Truth::read(file, problem)?.poses),
+        None => PoseRanges::of(problem),
+    }
+}
+
+/// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
+fn known_ranges(problem: &Declared, truth: Option<&Path>) -> Result<Option<PoseRanges>, DesignError> {
+    match ranges(problem, truth) {
+        Err(DesignError::NoRange { .. }) => Ok(None),
+        other => other.map(Some),
+    }
+}
+
+/// Poses as they are judged: `count` of a table, all of it, or as many drawn.
+fn judged(
+    problem: &Declared,
+    table: Option<&Measurements>,
+    (count, seed): (Option<usize>, u64),
+    truth: Option<&Path>,
+) -> Result<Judged, DesignError> {
+    match (table, count) {
+        (None, None) => Err(DesignError::NoPoses),
+        (None, Some(count)) => Ok(Judged::Drawn(ranges(problem, truth)?, count)),
+        (Some(table), Some(poses)) if poses > table.len() => {
+            Err(DesignError::TooFewCandidates { poses, candidates: table.len() })
+        }
+        (Some(table), count) => {
+            let poses = count.map_or_else(|| table.clone(), |count| design::some_of(table, count, seed));
+            Ok(Judged::Table { poses: Box::new(poses), within: known_ranges(problem, truth)?, held_out: None })
+        }
+    }
+}
+
+/// Measured poses as they are judged: those to identify with, where predictions count in those held out.
+fn judged_data(problem: &Declared, rows: &Measurements, truth: Option<&Path>) -> Result<Judged, DesignError> {
+    let data = Dataset::of(problem, rows.clone())?;
+    let held_out = design::with_known_words(&data);
+    Ok(Judged::Table {
+        poses: Box::new(rows.select(&data.split.identification)),
+        within: known_ranges(problem, truth)?,
+        held_out: (!held_out.is_empty()).then(|| Box::new(rows.select(&held_out))),
+    })
+}
+
+/// Says what measurements in some poses will tell: `measured` ones, `count` of the `candidates`, or `count` drawn.
+#[pyfunction]
+pub fn check(
+    py: Python<'_>,
+    problem: &Problem,
+    measured: Option<&Poses>,
+    candidates: Option<&Poses>,
+    count: Option<usize>,
+    truth: Option<PathBuf>,
+    seed: u64,
+) -> PyResult<Check> {
+    let declared = Arc::clone(&problem.problem);
+    let (measured, candidates) = (rows(measured), rows(candidates));
+    let check = supervised(py, None, move |_| {
+        let truth = truth.as_deref();
+        let judged = match measured {
+            Some(measured) => judged_data(&declared, &measured, truth),
+            None => judged(&declared, candidates.as_deref(), (count, seed), truth),
+        };
+        design::check(&declared, &judged?, seed)
+    })?;
+    Ok(Check { problem: Arc::clone(&problem.problem), check: check.map_err(|error| raised(&error))? })
+}
+
+/// Chooses the poses that identify best, or that tell two effects apart.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+pub fn plan(
+    py: Python<'_>,
+    problem: &Problem,
+    poses: usize,
+    given: Option<&Poses>,
+    candidates: Option<&Poses>,
+    criterion: &str,
+    separate: Option<(String, String)>,
+    truth: Option<PathBuf>,
+    seed: u64,
+) -> PyResult<Plan> {
+    let criterion = criterion_of(criterion)?;
+    let (given, candidates) = (rows(given), rows(candidates));
+    let pair = separate.map(|(one, other)| {
+        let effect = |text: &str| problem.problem.effect(text, Path::new("separate"));
+        Ok::<_, DesignError>(Pair::new(&problem.problem, [effect(&one)?, effect(&other)?])?)
+    });
+    let pair = pair.transpose().map_err(|error| raised(&error))?;
+    let problem = pair.as_ref().map_or_else(|| Arc::clone(&problem.problem), |pair| Arc::new(pair.declared.clone()));
+    let declared = Arc::clone(&problem);
+    let chosen = criterion.clone();
+    let found = supervised(py, None, move |sink| {
+        let candidates = match candidates {
+            Some(rows) => Candidates::Rows(Box::new(rows.as_ref().clone())),
+            None => Candidates::Within(ranges(&declared, truth.as_deref())?.that_matter(&declared)),
+        };
+        // A sweep is a step at which an interrupt ends the work.
+        let sweep = |sweep: PlanProgress| {
+            sink(Progress { iteration: sweep.sweep as u64, unknowns: 0, poses, cost: sweep.value });
+        };
+        let options = PlanOptions { poses, criterion: &chosen, seed, progress: Some(&sweep) };
+        match &pair {
+            Some(pair) => design::separate(pair, &candidates, given.as_deref(), &options)
+                .map(|(plan, separated)| (plan, Some(separated))),
+            None => design::plan(&declared, &candidates, given.as_deref(), &options).map(|plan| (plan, None)),
+        }
+    })?;
+    let (plan, separated) = found.map_err(|error: DesignError| raised(&error))?;
+    Ok(Plan { problem, plan, separated, criterion, seed })
+}
+
+fn rows(poses: Option<&Poses>) -> Option<Arc<Measurements>> {
+    poses.map(|poses| Arc::clone(&poses.rows))
+}
+
+fn criterion_of(word: &str) -> PyResult<Criterion> {
+    match word {
+        "S" => Ok(Criterion::S),
+        "A" => Ok(Criterion::A),
+        "D" => Ok(Criterion::D),
+        "E" => Ok(Criterion::E),
+        _ => Err(of_argument("criterion", format!("criterion: \"{word}\" is none of S, A, D, E"))),
+    }
+}

@@ -1,0 +1,36 @@
+//! flexcal in Python: the extension module `flexcal._core` behind the package `flexcal`.
+//!
+//! It passes arrays and words through; what Python users see (tables, documentation, types) is written in Python.
+
+mod array;
+mod data;
+mod design;
+mod error;
+mod outcome;
+mod problem;
+mod supervise;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+
+/// The module.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::command_line;
+    #[pymodule_export]
+    use super::data::{Data, Poses};
+    #[pymodule_export]
+    use super::design::{Check, Plan, check, plan};
+    #[pymodule_export]
+    use super::outcome::{ClosedLoop, Identification, Trace};
+    #[pymodule_export]
+    use super::problem::Problem;
+}
+
+/// Runs the command line: the program's name and its arguments; the exit status.
+#[pyfunction]
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| flexcal::cli::run(arguments))
+}

@@ -1,0 +1,205 @@
+//! What came of identifications, loops and traces.
+
+use std::sync::Arc;
+
+use flexcal::identify::{self, Residual};
+use flexcal::measurement::{Dataset, Labels};
+use flexcal::problem::Problem;
+use flexcal::report::{self, PlotData, Report};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::array::{Array, derivatives, integers, numbers, points};
+use crate::data::Poses;
+use crate::error::raised;
+
+/// Markdown, page, and name and SVG text of each figure.
+type Pages = (String, String, Vec<(String, String)>);
+
+/// An identified arm.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Identification {
+    pub problem: Arc<Problem>,
+    pub data: Arc<Dataset>,
+    pub found: Arc<identify::Identification>,
+}
+
+/// A closed loop.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct ClosedLoop {
+    pub problem: Arc<Problem>,
+    pub text: Arc<str>,
+    pub data: Arc<Dataset>,
+    pub closure: Arc<flexcal::diagnose::ClosedLoop>,
+}
+
+/// What a residual points to.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Trace {
+    pub problem: Arc<Problem>,
+    pub data: Arc<Dataset>,
+    pub trace: Arc<flexcal::diagnose::Trace>,
+}
+
+#[pymethods]
+impl Identification {
+    /// estimate.json.
+    fn json(&self, py: Python<'_>) -> String {
+        py.detach(|| report::estimate_json(&self.problem, &self.found))
+    }
+
+    /// What the command line prints.
+    fn summary(&self, py: Python<'_>) -> String {
+        py.detach(|| report::estimate_text(&self.problem, &self.found))
+    }
+
+    /// Pages and figures.
+    fn report(&self, py: Python<'_>) -> PyResult<Pages> {
+        py.detach(|| {
+            let shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
+            Ok(pages(report::identification_report(&self.problem, &self.found, &shown)))
+        })
+        .map_err(|error: identify::IdentifyError| raised(&error))
+    }
+
+    /// Why the fit is not to be trusted, if it is not.
+    #[getter]
+    fn why_not_trusted(&self) -> Option<String> {
+        (!self.found.is_trusted()).then(|| report::why_not_trusted(&self.found))
+    }
+
+    /// What to ask about the input.
+    #[getter]
+    fn cautions(&self) -> Vec<String> {
+        let few = self.found.too_few_poses.iter().map(ToString::to_string);
+        few.chain(self.found.cautions.iter().map(ToString::to_string)).collect()
+    }
+
+    /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two has no standard error.
+    fn covariance<'py>(&self, py: Python<'py>) -> Array<'py> {
+        let found = &self.found;
+        let known: Vec<bool> = found.estimates.iter().map(|estimate| estimate.std_error.is_some()).collect();
+        let n = known.len();
+        let value = |(j, k): (usize, usize)| {
+            let both = known.get(j) == Some(&true) && known.get(k) == Some(&true);
+            found.covariance.of(j, k).filter(|_| both).unwrap_or(f64::NAN)
+        };
+        numbers(py, (0..n).flat_map(|j| (0..n).map(move |k| (j, k))).map(value))
+    }
+
+    /// Columns of the residual table.
+    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = py.detach(|| self.found.residuals(&self.problem, &self.data));
+        let residuals = found.map_err(|error| raised(&error))?;
+        table(py, &self.data, &residuals)
+    }
+
+    /// Positions of the identified arm, shape = (poses, 3), measuring frame [m].
+    fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
+        let found = py.detach(|| self.found.predict(&self.problem, &poses.rows));
+        Ok(points(py, &found.map_err(|error| raised(&error))?))
+    }
+
+    /// ∂p/∂q of the identified arm, shape = (poses, 3, joints).
+    fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
+        let found = py.detach(|| identify::jacobian(&self.problem, Some(&self.found), &poses.rows));
+        Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
+    }
+}
+
+#[pymethods]
+impl ClosedLoop {
+    /// loop.json.
+    fn json(&self, py: Python<'_>) -> String {
+        py.detach(|| report::loop_json(&self.problem, &self.closure))
+    }
+
+    /// What the command line prints.
+    fn summary(&self, py: Python<'_>) -> String {
+        py.detach(|| report::loop_text(&self.problem, &self.closure))
+    }
+
+    /// Pages and figures.
+    fn report(&self, py: Python<'_>) -> PyResult<Pages> {
+        py.detach(|| {
+            let shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
+            Ok(pages(report::loop_report(&self.problem, &self.closure, &shown)))
+        })
+        .map_err(|error: identify::IdentifyError| raised(&error))
+    }
+
+    /// problem.closed.toml: the problem with what was found declared, its data where they were.
+    fn closed_problem(&self) -> PyResult<String> {
+        let files = &self.problem.data.files;
+        report::closed_problem(&self.text, &self.problem, &self.closure, files)
+            .map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The fit of the declared problem.
+    fn before(&self) -> Identification {
+        let found = Arc::new(self.closure.before.fit.clone());
+        Identification { problem: Arc::clone(&self.problem), data: Arc::clone(&self.data), found }
+    }
+
+    /// The fit with everything that was found.
+    fn after(&self) -> Identification {
+        let (problem, found) = (Arc::new(self.closure.closed.clone()), Arc::new(self.closure.after.clone()));
+        Identification { problem, data: Arc::clone(&self.data), found }
+    }
+}
+
+#[pymethods]
+impl Trace {
+    /// trace.json.
+    fn json(&self, py: Python<'_>) -> String {
+        py.detach(|| report::trace_json(&self.problem, &self.trace))
+    }
+
+    /// What the command line prints.
+    fn summary(&self, py: Python<'_>) -> String {
+        py.detach(|| report::trace_text(&self.problem, &self.trace))
+    }
+
+    /// The fit of the declared problem.
+    fn fit(&self) -> Identification {
+        let found = Arc::new(self.trace.fit.clone());
+        Identification { problem: Arc::clone(&self.problem), data: Arc::clone(&self.data), found }
+    }
+}
+
+fn pages(report: Report) -> Pages {
+    (report.markdown, report.html, report.figures)
+}
+
+/// The residual table, column by column: numbers, or codes and words.
+fn table<'py>(py: Python<'py>, data: &Dataset, residuals: &[Residual]) -> PyResult<Bound<'py, PyDict>> {
+    let rows = &data.measurements;
+    let columns = PyDict::new(py);
+    let words = |of_row: &mut dyn Iterator<Item = usize>, names: Vec<String>| (integers(py, of_row), names);
+    let labels = |labels: &Labels| words(&mut labels.of_row.iter().copied(), labels.names.clone());
+    let files = rows.files.iter().map(|file| file.display().to_string()).collect();
+    columns.set_item("file", words(&mut rows.origin.iter().map(|&(file, _)| file as usize), files))?;
+    columns.set_item("line", integers(py, rows.origin.iter().map(|&(_, line)| line as usize)))?;
+    if let Some(pose) = &rows.pose {
+        columns.set_item("pose", numbers(py, pose.iter().copied()))?;
+    }
+    if rows.session.names.iter().any(|name| !name.is_empty()) {
+        columns.set_item("session", labels(&rows.session))?;
+    }
+    if let Some(target) = &rows.target {
+        columns.set_item("target", labels(target))?;
+    }
+    let put = |name: &str, of: &dyn Fn(&Residual) -> f64| columns.set_item(name, numbers(py, residuals.iter().map(of)));
+    let measured = |own: &Residual| rows.positions.get(own.row).copied().unwrap_or_default();
+    put("predicted_x_mm", &|own| 1e3 * (measured(own) - own.position).x)?;
+    put("predicted_y_mm", &|own| 1e3 * (measured(own) - own.position).y)?;
+    put("predicted_z_mm", &|own| 1e3 * (measured(own) - own.position).z)?;
+    put("residual_x_mm", &|own| 1e3 * own.position.x)?;
+    put("residual_y_mm", &|own| 1e3 * own.position.y)?;
+    put("residual_z_mm", &|own| 1e3 * own.position.z)?;
+    put("whitened", &|own| own.whitened.norm())?;
+    columns.set_item("outlier", integers(py, residuals.iter().map(|own| usize::from(own.outlier))))?;
+    columns.set_item("held_out", integers(py, residuals.iter().map(|own| usize::from(own.held_out))))?;
+    Ok(columns)
+}

@@ -1,0 +1,159 @@
+//! A problem, and what can be done with it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use flexcal::diagnose;
+use flexcal::identify::{self, Options, Placement, SolverChoice, Strategy};
+use flexcal::model::Model;
+use flexcal::nalgebra::DVector;
+use flexcal::problem::{Joint, JointKind};
+use pyo3::prelude::*;
+
+use crate::array::{Array, derivatives, points};
+use crate::data::{Data, Poses, Source};
+use crate::error::{of_argument, raised};
+use crate::outcome::{ClosedLoop, Identification, Trace};
+use crate::supervise::supervised;
+
+/// An arm, what is free of it, and where its measurements are.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Problem {
+    pub problem: Arc<flexcal::problem::Problem>,
+    text: Arc<str>,
+}
+
+#[pymethods]
+impl Problem {
+    /// Reads a problem.toml, or the one in a folder.
+    #[staticmethod]
+    fn read(path: PathBuf) -> PyResult<Self> {
+        let (problem, text) = flexcal::problem::Problem::read_with_text(&path).map_err(|error| raised(&error))?;
+        Ok(Self { problem: Arc::new(problem), text })
+    }
+
+    /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
+    #[staticmethod]
+    fn parse(text: &str, file: PathBuf) -> PyResult<Self> {
+        let problem = flexcal::problem::Problem::parse(text, &file).map_err(|error| raised(&error))?;
+        Ok(Self { problem: Arc::new(problem), text: Arc::from(text) })
+    }
+
+    /// Its name.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.problem.name
+    }
+
+    /// One line for people.
+    #[getter]
+    fn title(&self) -> &str {
+        &self.problem.title
+    }
+
+    /// The problem file.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Measurement files that it names.
+    #[getter]
+    fn files(&self) -> Vec<PathBuf> {
+        self.problem.data.files.clone()
+    }
+
+    /// Unit of each joint's command, from the base outwards; None at fixed joints.
+    #[getter]
+    fn units(&self) -> Vec<Option<&'static str>> {
+        let unit = |joint: &Joint| match joint.kind {
+            JointKind::Revolute => Some("rad"),
+            JointKind::Prismatic => Some("m"),
+            JointKind::Fixed => None,
+        };
+        self.problem.joints.iter().map(unit).collect()
+    }
+
+    /// Reads measurements.
+    fn data(&self, py: Python<'_>, source: Source) -> PyResult<Data> {
+        let input = source.owned()?;
+        py.detach(|| Data::read(input, &self.problem)).map_err(|error| raised(&error))
+    }
+
+    /// Reads poses, measured or not.
+    fn poses(&self, py: Python<'_>, source: Source) -> PyResult<Poses> {
+        let input = source.owned()?;
+        py.detach(|| Poses::read(input, &self.problem)).map_err(|error| raised(&error))
+    }
+
+    /// Fits the free parameters.
+    fn identify(
+        &self,
+        py: Python<'_>,
+        data: &Data,
+        strategy: &str,
+        solver: &str,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Identification> {
+        let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
+        let solver = word("solver", solver, &SolverChoice::CHOICES, SolverChoice::as_str)?;
+        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let found = supervised(py, progress.as_ref(), {
+            let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
+            move |sink| {
+                let options = Options::default().with_strategy(strategy).with_solver(solver).with_progress(sink);
+                identify::identify(&problem, &data, &options)
+            }
+        })?;
+        let found = found.map_err(|error| raised(&error))?;
+        Ok(Identification { problem, data, found: Arc::new(found) })
+    }
+
+    /// Finds the effects that the problem lacks.
+    fn close(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<ClosedLoop> {
+        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let closure = supervised(py, progress.as_ref(), {
+            let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
+            move |sink| diagnose::close(&problem, &data, &Options::default().with_progress(sink))
+        })?;
+        let closure = closure.map_err(|error| raised(&error))?;
+        Ok(ClosedLoop { problem, text: Arc::clone(&self.text), data, closure: Arc::new(closure) })
+    }
+
+    /// Ranks the effects that the residual points to.
+    fn trace(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<Trace> {
+        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let trace = supervised(py, progress.as_ref(), {
+            let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
+            move |sink| diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
+        })?;
+        let trace = trace.map_err(|error| raised(&error))?;
+        Ok(Trace { problem, data, trace: Arc::new(trace) })
+    }
+
+    /// Positions of the nominal arm, shape = (poses, 3), measuring frame [m].
+    fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
+        let found = py.detach(|| {
+            let placement = Placement::of(&poses.rows);
+            let model = Model::new(&self.problem, &placement.bases, &placement.targets)?;
+            let rows: Vec<usize> = (0..poses.rows.len()).collect();
+            let x = DVector::zeros(model.parameters.len());
+            Ok(model.predict(placement.poses(&poses.rows, &rows, 1.0), &x))
+        });
+        Ok(points(py, &found.map_err(|error: flexcal::error::InputError| raised(&error))?))
+    }
+
+    /// ∂p/∂q of the nominal arm, shape = (poses, 3, joints).
+    fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
+        let found = py.detach(|| identify::jacobian(&self.problem, None, &poses.rows));
+        Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
+    }
+}
+
+/// What a word of an argument stands for.
+fn word<T: Copy>(argument: &str, word: &str, each: &[T], name: fn(T) -> &'static str) -> PyResult<T> {
+    each.iter().copied().find(|&value| name(value) == word).ok_or_else(|| {
+        let known: Vec<&str> = each.iter().map(|&value| name(value)).collect();
+        of_argument(argument, format!("{argument}: \"{word}\" is none of {}", known.join(", ")))
+    })
+}

@@ -1,0 +1,60 @@
+"""The lunar sampler, and what the command line makes of it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import flexcal
+import pandas as pd
+import pytest
+from flexcal._tables import table
+
+ROOT = Path(__file__).parents[2]
+LUNAR = ROOT / "problems" / "lunar-sampler"
+UR10_DATA = [ROOT.parent / "shared" / "measured" / "ur10-ipa" / f"session_{letter}.csv" for letter in "ABC"]
+
+Command = Callable[..., Any]
+
+
+@pytest.fixture(scope="session")
+def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
+    """Runs the command line of the package; the exit status, what it prints, and the folder of its results."""
+
+    def run(*arguments: object) -> tuple[subprocess.CompletedProcess[str], Path]:
+        out = tmp_path_factory.mktemp("out")
+        words = [sys.executable, "-m", "flexcal", *map(str, arguments), "--out", str(out)]
+        return subprocess.run(words, capture_output=True, text=True, check=False), out
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def lunar() -> flexcal.Problem:
+    return flexcal.Problem(LUNAR)
+
+
+@pytest.fixture(scope="session")
+def identified(lunar: flexcal.Problem) -> flexcal.Identification:
+    return lunar.identify()
+
+
+@pytest.fixture(scope="session")
+def closed(lunar: flexcal.Problem) -> flexcal.ClosedLoop:
+    return lunar.loop()
+
+
+def exact(file: Path) -> pd.DataFrame:
+    """A table to the last bit, as the pandas before 3.1 reads it on request alone."""
+    return table(file.read_text())
+
+
+def timeless(text: str) -> Any:
+    """A result without the time that it took."""
+    document = json.loads(text)
+    document.pop("seconds", None)
+    return document

@@ -1,0 +1,103 @@
+"""Python gives what the command line gives, to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import flexcal
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import Command, exact, LUNAR, ROOT, timeless, UR10_DATA
+
+
+@pytest.mark.parametrize("strategy", ["joint", "geometry-only"])
+def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> None:
+    run, out = command("identify", LUNAR, "--strategy", strategy)
+    result = lunar.identify(strategy=strategy)  # type: ignore[arg-type]
+    assert result.trusted == (run.returncode == 0)
+    assert timeless(result.to_json()) == timeless((out / "estimate.json").read_text())
+    assert result.summary().splitlines()[4:] == run.stdout.splitlines()[4 : len(result.summary().splitlines())]
+    assert result.html == (out / "report.html").read_text()
+
+
+def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoop, command: Command) -> None:
+    truth = ROOT / "tests" / "cases" / "truth.toml"
+    run, out = command("loop", LUNAR)
+    assert timeless(closed.to_json()) == timeless((out / "loop.json").read_text())
+    assert run.stdout.startswith(closed.summary())
+    assert sorted(closed.figures) == sorted(file.stem for file in (out / "figures").iterdir())
+    run, out = command("trace", LUNAR)
+    assert timeless(lunar.trace().to_json()) == timeless((out / "trace.json").read_text())
+    run, out = command("check", LUNAR, "--truth", truth, "--poses", 28)
+    assert lunar.check(poses=28, truth=truth).to_json() == (out / "check.json").read_text()
+    run, out = command("check", LUNAR)
+    assert lunar.check().to_json() == (out / "check.json").read_text()
+    run, out = command("plan", LUNAR, "--truth", truth, "--poses", 12, "--criterion", "D", "--seed", 3)
+    plan = lunar.plan(12, criterion="D", truth=truth, seed=3)
+    assert plan.to_json() == (out / "plan.json").read_text()
+    assert len(plan.poses) == 12 and plan.poses.equals(exact(out / "plan.csv"))
+    run, out = command("plan", LUNAR, "--poses", 5, "--candidates", out / "plan.csv", "--data", LUNAR / "measurements.csv")
+    again = lunar.plan(5, LUNAR / "measurements.csv", candidates=plan.poses)
+    assert again.to_json() == (out / "plan.json").read_text()
+
+
+def test_tables_in_memory(lunar: flexcal.Problem, identified: flexcal.Identification) -> None:
+    polars = pytest.importorskip("polars")
+    pyarrow = pytest.importorskip("pyarrow")
+    file = LUNAR / "measurements.csv"
+    frame = exact(file)
+    joints = [f"q{k}_deg" for k in range(1, 5)]
+    dictionary = {
+        "q_deg": frame[joints].to_numpy(),
+        "xyz_mm": frame[["x_mm", "y_mm", "z_mm"]].to_numpy(),
+        **{name: frame[name].tolist() for name in frame if name not in (*joints, "x_mm", "y_mm", "z_mm")},
+    }
+    tables = [
+        str(file),
+        [file],
+        frame,
+        frame.astype({"split": "category"}),
+        frame.to_records(index=False),
+        polars.read_csv(file),
+        polars.read_csv(file).with_columns(polars.col("split").cast(polars.Categorical)),
+        pyarrow.Table.from_pandas(frame),
+        dictionary,
+    ]
+    for table in tables:
+        result = lunar.identify(table)
+        assert timeless(result.to_json()) == timeless(identified.to_json()), type(table)
+
+
+@pytest.mark.skipif(not UR10_DATA[0].exists(), reason="the UR10's data are not here")
+def test_ur10(command: Command) -> None:
+    folder = ROOT / "problems" / "ur10-ipa"
+    _, out = command("identify", folder, "--data", *UR10_DATA)
+    problem = flexcal.Problem(folder)
+    with pytest.warns(flexcal.FlexcalWarning):
+        by_path, by_frame = problem.identify(UR10_DATA), problem.identify(_together(UR10_DATA))
+    expected = timeless((out / "estimate.json").read_text())
+    assert timeless(by_path.to_json()) == expected
+    for name in ("parameters", "covariance", "held_out", "reduced_chi2"):
+        assert timeless(by_frame.to_json())[name] == expected[name], name
+    assert by_path.residuals.drop(columns=["file", "line"]).equals(by_frame.residuals.drop(columns=["file", "line"]))
+
+
+def _together(files: list[Path]) -> pd.DataFrame:
+    return pd.concat([exact(file) for file in files], ignore_index=True)
+
+
+def test_results_agree(lunar: flexcal.Problem, identified: flexcal.Identification, closed: flexcal.ClosedLoop) -> None:
+    for result in (identified, closed):
+        variances = np.diag(result.covariance)
+        np.testing.assert_allclose(np.sqrt(variances), result.parameters["std_error"], rtol=1e-9)
+        residuals = result.residuals
+        assert len(residuals) == 78 and residuals["held_out"].sum() == 50
+        lengths = np.linalg.norm(residuals.filter(like="residual_"), axis=1)
+        mean = result.errors["mean_mm"].xs("held_out", level="rows").iloc[-1]
+        np.testing.assert_allclose(lengths[residuals["held_out"]].mean(), mean, rtol=1e-12)
+    assert closed.verdict == "explained"
+    assert list(closed.effects["law"]) == ["link-thermal-bending"] and closed.effects["law_probability"][0] > 0.9
+    again = closed.closed_problem.identify(LUNAR / "measurements.csv")
+    off = (again.parameters["estimate"] - closed.parameters["estimate"]) / closed.parameters["std_error"]
+    assert off.abs().max() < 1e-3
