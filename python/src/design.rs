@@ -27,7 +27,7 @@ pub struct Check {
 #[pyclass(frozen, module = "flexcal._core")]
 pub struct Plan {
     problem: Arc<Declared>,
-    plan: design::Plan,
+    found: design::Plan,
     separated: Option<design::Separated>,
     criterion: Criterion,
     seed: u64,
@@ -56,23 +56,23 @@ impl Check {
 impl Plan {
     /// plan.json.
     fn json(&self) -> String {
-        report::plan_json(&self.problem, self.reached(), self.seed, &self.plan, self.separated.as_ref())
+        report::plan_json(&self.problem, self.reached(), self.seed, &self.found, self.separated.as_ref())
     }
 
     /// What the command line prints.
     fn summary(&self) -> String {
-        report::plan_text(&self.problem, self.reached(), &self.plan, self.separated.as_ref())
+        report::plan_text(&self.problem, self.reached(), &self.found, self.separated.as_ref())
     }
 
     /// plan.csv.
     fn csv(&self) -> String {
-        report::poses_csv(&self.problem, &self.plan.poses)
+        report::poses_csv(&self.problem, &self.found.poses)
     }
 
     /// Whether the poses decide what poses can decide.
     #[getter]
     fn suffices(&self) -> bool {
-        self.plan.suffices
+        self.found.suffices
     }
 }
 
@@ -172,7 +172,7 @@ pub fn plan(
     let (given, candidates) = (rows(given), rows(candidates));
     let pair = separate.map(|(one, other)| {
         let effect = |text: &str| problem.problem.effect(text, Path::new("separate"));
-        Ok::<_, DesignError>(Pair::new(&problem.problem, [effect(&one)?, effect(&other)?])?)
+        Pair::new(&problem.problem, [effect(&one)?, effect(&other)?])
     });
     let pair = pair.transpose().map_err(|error| raised(&error))?;
     let problem = pair.as_ref().map_or_else(|| Arc::clone(&problem.problem), |pair| Arc::new(pair.declared.clone()));
@@ -194,8 +194,8 @@ pub fn plan(
             None => design::plan(&declared, &candidates, given.as_deref(), &options).map(|plan| (plan, None)),
         }
     })?;
-    let (plan, separated) = found.map_err(|error: DesignError| raised(&error))?;
-    Ok(Plan { problem, plan, separated, criterion, seed })
+    let (found, separated) = found.map_err(|error: DesignError| raised(&error))?;
+    Ok(Plan { problem, found, separated, criterion, seed })
 }
 
 fn rows(poses: Option<&Poses>) -> Option<Arc<Measurements>> {

@@ -39,7 +39,7 @@ pub struct ClosedLoop {
 pub struct Trace {
     pub problem: Arc<Problem>,
     pub data: Arc<Dataset>,
-    pub trace: Arc<flexcal::diagnose::Trace>,
+    pub found: Arc<flexcal::diagnose::Trace>,
 }
 
 #[pymethods]
@@ -153,17 +153,17 @@ impl ClosedLoop {
 impl Trace {
     /// trace.json.
     fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| report::trace_json(&self.problem, &self.trace))
+        py.detach(|| report::trace_json(&self.problem, &self.found))
     }
 
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| report::trace_text(&self.problem, &self.trace))
+        py.detach(|| report::trace_text(&self.problem, &self.found))
     }
 
     /// The fit of the declared problem.
     fn fit(&self) -> Identification {
-        let found = Arc::new(self.trace.fit.clone());
+        let found = Arc::new(self.found.fit.clone());
         Identification { problem: Arc::clone(&self.problem), data: Arc::clone(&self.data), found }
     }
 }

@@ -128,7 +128,7 @@ impl Problem {
             move |sink| diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
         })?;
         let trace = trace.map_err(|error| raised(&error))?;
-        Ok(Trace { problem, data, trace: Arc::new(trace) })
+        Ok(Trace { problem, data, found: Arc::new(trace) })
     }
 
     /// Positions of the nominal arm, shape = (poses, 3), measuring frame [m].

@@ -32,7 +32,9 @@ pub fn jacobian(
     let mut x = DVector::zeros(model.parameters.len());
     if let Some(identified) = identified {
         x = identified.vector(&model)?;
-        poses.iter_mut().for_each(|pose| pose.setup.elapsed = pose.setup.time - identified.first_time);
+        for pose in &mut poses {
+            pose.setup.elapsed = pose.setup.time - identified.first_time;
+        }
     }
     Ok(model.command_jacobian(problem, poses, &x))
 }

@@ -40,7 +40,9 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
         assert!((own.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
     }
     let [known, declared, positions, differences] = [0, 1, 2, 3].map(|stage| ratio(&found, "corrected", stage));
-    println!("corrected: known {known:.3}, declared {declared:.3}, positions {positions:.3}, differences {differences:.3}");
+    println!(
+        "corrected: known {known:.3}, declared {declared:.3}, positions {positions:.3}, differences {differences:.3}"
+    );
     assert!(known < 0.1 && differences < 0.1, "{known} {differences}");
     assert!(declared > 1.5 * known && positions > 5.0 * differences, "{declared} {positions}");
     let side = ratio(&found, "link-side", 0);
