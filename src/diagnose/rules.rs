@@ -150,7 +150,7 @@ impl SelectionRules {
         resamples: 2000,
         drawn_again: 20,
         covered: 0.95,
-        weighed_poses: 240,
+        weighed_poses: 1500,
         unknown_law: 0.25,
         sure: 0.95,
         stated: 0.9,

@@ -9,6 +9,7 @@ use super::fitting::{FitEnd, Fitting};
 use super::outcome::Noise;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
+use crate::least_squares::solver::Termination;
 use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood};
 
 /// An undeclared σ has settled when it changes by less than this part.
@@ -38,8 +39,8 @@ pub(super) fn fitted(
                 Some(next) => {
                     fitting.assumed = next;
                     // What was held stays where it began, and what ran off under a σ too small begins anew.
-                    let settled = end.termination.converged() && end.gauge.rows.nrows() == 0;
-                    begin = if settled { end.x } else { start.clone() };
+                    let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
+                    begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
                 }
                 None => return Ok((end, statistics, Noise::Declared)),
             }

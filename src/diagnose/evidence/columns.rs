@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::block::Design;
 use super::functions::{Known, basis, goes_with, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use crate::diagnose::covariate::Covariate;
@@ -17,8 +18,8 @@ pub(super) struct Candidate {
     pub hypothesis: Hypothesis,
     /// Which of the functions of that hypothesis, counted from 0.
     pub variant: usize,
-    /// Shape = (3 N, k), of root mean square 1 all together.
-    pub columns: DMatrix<f64>,
+    /// Of root mean square 1 all together.
+    pub design: Design,
     pub ln_prior: f64,
     /// For each column, whether its parameter is never negative.
     pub never_negative: Vec<bool>,
@@ -79,28 +80,22 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: impl FnOnce() -> DMatrix<f64>) {
+        self.add_design(family, share, hypothesis, || Design::Dense(columns()));
+    }
+
+    fn add_design(&mut self, family: &str, share: f64, hypothesis: Hypothesis, design: impl FnOnce() -> Design) {
         if self.only.is_some_and(|only| *only != hypothesis) {
             return;
         }
         // Names of effects, one's own among them, have no space before them.
-        self.entered(&format!(" {family}"), share, hypothesis, columns(), Vec::new());
+        self.entered(&format!(" {family}"), share, hypothesis, design(), Vec::new());
     }
 
-    fn entered(
-        &mut self,
-        family: &str,
-        share: f64,
-        hypothesis: Hypothesis,
-        mut columns: DMatrix<f64>,
-        never_negative: Vec<bool>,
-    ) {
-        let weighed = columns.rows(0, 3 * self.weighed);
-        let size = (weighed.norm_squared() / weighed.nrows().max(1) as f64).sqrt();
-        if size > 0.0 && size.is_finite() {
-            columns /= size;
+    fn entered(&mut self, family: &str, share: f64, hypothesis: Hypothesis, design: Design, never_negative: Vec<bool>) {
+        if let Some(design) = design.scaled(self.weighed) {
             let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
             let variant = same.map_or(0, |last| last.variant + 1);
-            self.candidates.push(Candidate { hypothesis, variant, columns, ln_prior: 0.0, never_negative });
+            self.candidates.push(Candidate { hypothesis, variant, design, ln_prior: 0.0, never_negative });
             self.shares.push((family.to_owned(), share));
         }
     }
@@ -120,7 +115,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             }
             let hypothesis = Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
             let never = effect.terms(self.problem).iter().map(|term| term.never_negative).collect();
-            self.entered(effect.name(), 1.0 / tries, hypothesis, columns, never);
+            self.entered(effect.name(), 1.0 / tries, hypothesis, Design::Dense(columns), never);
         }
     }
 
@@ -255,10 +250,9 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Another error in every pose.
     fn per_pose(&mut self, slot: Slot, at: &DVector<f64>) {
-        let poses = at.len() / 3;
         let hypothesis =
             Hypothesis { law: Law::PerPose, part: Part::of(slot), slot: Some(slot), depends_on: Vec::new() };
-        self.add("per pose", 1.0, hypothesis, || times(&[at], &DMatrix::identity(poses, poses)));
+        self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
     }
 
     /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums of neighbouring ones.
@@ -321,10 +315,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         if count == self.weighed || axes.len() < 3 {
             return;
         }
-        let of_pose = |row: usize, group: usize| numbers.get(row) == Some(&group);
-        let indicators = || DMatrix::from_fn(poses.len(), count, |row, group| f64::from(u8::from(of_pose(row, group))));
+        let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
         let hypothesis = Hypothesis { law: Law::PerPose, part: Part::Arm, slot: None, depends_on: Vec::new() };
-        self.add("per pose", 1.0, hypothesis, || times(&axes.iter().collect::<Vec<_>>(), &indicators()));
+        let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
+        self.add_design("per pose", 1.0, hypothesis, design);
     }
 
     /// Curvature and strain of beams by other functions than the temperature's multiple.

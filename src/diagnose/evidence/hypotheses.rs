@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::block::Design;
 use super::columns::{Candidate, Columns, slots};
 use super::functions::{Known, Shape};
 use super::{Explanation, Hypothesis};
@@ -57,7 +58,7 @@ impl<'a> Hypotheses<'a> {
     }
 
     /// Single bumps and steps in the place of a function of one covariate at one coordinate; all together as probable as the function.
-    pub(super) fn shaped(&self, hypothesis: &Hypothesis, weighed: usize, shapes: &[Shape]) -> Vec<Candidate> {
+    pub(super) fn shaped(&self, hypothesis: &Hypothesis, weighed: usize, shapes: &[Shape]) -> Vec<(Shape, Candidate)> {
         let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
         let Some(known) = Known::of(Covariate::Position, values.to_vec(), weighed) else { return Vec::new() };
         let ln_prior = -(Shape::all().len() as f64).ln();
@@ -66,11 +67,11 @@ impl<'a> Hypotheses<'a> {
             for (pose, at) in known.scaled.iter().enumerate() {
                 columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
             }
-            let size = (columns.rows(0, 3 * weighed).norm_squared() / (3 * weighed) as f64).sqrt();
-            columns /= size.max(f64::MIN_POSITIVE);
-            Candidate { hypothesis: hypothesis.clone(), variant: 0, columns, ln_prior, never_negative: vec![false] }
+            let design = Design::Dense(columns).scaled(weighed)?;
+            let never_negative = vec![false];
+            Some((*shape, Candidate { hypothesis: hypothesis.clone(), variant: 0, design, ln_prior, never_negative }))
         };
-        shapes.iter().map(one).collect()
+        shapes.iter().filter_map(one).collect()
     }
 
     /// The covariates that a hypothesis depends on.

@@ -9,12 +9,12 @@
 //! over a grid. c runs over what positions can show, from a third of σ to a hundred of it; ln f has a Cauchy
 //! distribution about 0: mostly a declared σ is right to a tenth, and where it is not, it may be far off.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in this many steps either side: closer together than the
-/// likelihood of some 2000 degrees of freedom is wide, 1/√(2ν).
-const STEPS: i32 = 70;
+/// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in steps of a twentieth, or closer: of half of what the likelihood
+/// of ν degrees of freedom is wide, 1/√(2ν).
 const REACH: f64 = 3.5;
+const STEP: f64 = 0.05;
 
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
@@ -28,12 +28,15 @@ pub(super) struct Noise {
 impl Noise {
     /// For each factor f of the grid ln of its prior and of f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
-        let at = |step: i32| {
-            let ln_f = REACH * f64::from(step) / f64::from(STEPS);
+        let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt());
+        let least = self.least.clamp(-REACH, REACH);
+        #[expect(clippy::cast_possible_truncation, reason = "few steps")]
+        let steps = (REACH / step).ceil() as i32;
+        let at = |number: i32| {
+            let ln_f = step * f64::from(number);
             (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
         };
-        let is_enough = |step: &i32| REACH * f64::from(*step) >= f64::from(STEPS) * self.least.min(REACH) - 1e-9;
-        (-STEPS..=STEPS).filter(is_enough).map(at).collect()
+        (-steps..=steps).filter(|&number| step * f64::from(number) >= least - 1e-9).map(at).collect()
     }
 }
 
@@ -50,41 +53,107 @@ pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
 }
 
-/// A block of columns, G = AᵀA and b = Aᵀr, against a residual of squares S: ln p(r | block) summed over sizes, and the most
-/// probable of its sizes.
+/// What a residual r says about columns A: G = AᵀA and b = Aᵀr.
+#[derive(Debug, Clone)]
+pub(super) enum Normal {
+    /// G, shape = (k, k), and b.
+    Dense { gram: DMatrix<f64>, product: DVector<f64> },
+    /// G = D − LᵀL with D diagonal and few rows in L, shape = (few, k): columns for every pose, projected.
+    LessFew { diagonal: DVector<f64>, less: DMatrix<f64>, product: DVector<f64> },
+}
+
+impl Normal {
+    /// The same beside a set that takes Z A = `along` off the columns and `taken` = Z r off the residual.
+    pub fn beside(&self, along: DMatrix<f64>, taken: &DVector<f64>) -> Self {
+        match self {
+            Self::Dense { gram, product } => {
+                let (mut gram, mut product) = (gram.clone(), product.clone());
+                gram.gemm(-1.0, &along.transpose(), &along, 1.0);
+                product.gemv_tr(-1.0, &along, taken, 1.0);
+                Self::Dense { gram, product }
+            }
+            Self::LessFew { diagonal, less, product } => {
+                let mut product = product.clone();
+                product.gemv_tr(-1.0, &along, taken, 1.0);
+                let (few, more) = (less.nrows(), along.nrows());
+                let mut less = less.clone().resize_vertically(few + more, 0.0);
+                less.rows_mut(few, more).copy_from(&along);
+                Self::LessFew { diagonal: diagonal.clone(), less, product }
+            }
+        }
+    }
+
+    /// ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b, for a size c.
+    fn taken(&self, size: f64) -> Option<(f64, f64)> {
+        let precision = (size * size).recip();
+        match self {
+            Self::Dense { product, .. } => {
+                // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
+                let factor = self.factor(size)?;
+                let lower = factor.l_dirty();
+                let mut taken = product.clone();
+                if !lower.solve_lower_triangular_mut(&mut taken) {
+                    return None;
+                }
+                Some((ln_product(&lower.diagonal(), size), taken.norm_squared()))
+            }
+            Self::LessFew { diagonal, less, product } => {
+                // E = 1/c² + D, K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K,
+                // (E − LᵀL)⁻¹ = E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
+                let root = diagonal.map(|own| (own + precision).sqrt());
+                let mut scaled = less.clone();
+                scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
+                let along = product.component_div(&root);
+                let mut inner = DMatrix::identity(less.nrows(), less.nrows());
+                inner.gemm(-1.0, &scaled, &scaled.transpose(), 1.0);
+                let factor = inner.cholesky()?;
+                let mut beside = scaled * &along;
+                if !factor.l_dirty().solve_lower_triangular_mut(&mut beside) {
+                    return None;
+                }
+                let determinant = ln_product(&root, size) + ln_product(&factor.l_dirty().diagonal(), 1.0);
+                Some((determinant, along.norm_squared() + beside.norm_squared()))
+            }
+        }
+    }
+
+    /// The factor of 1/c² + G; `None` where G is not kept whole.
+    fn factor(&self, size: f64) -> Option<Cholesky<f64, Dyn>> {
+        let Self::Dense { gram, .. } = self else { return None };
+        let mut inner = gram.clone();
+        for j in 0..inner.nrows() {
+            inner[(j, j)] += (size * size).recip();
+        }
+        inner.cholesky()
+    }
+}
+
+/// ln Π c dⱼ, a few factors at a time before their product runs out of range.
+fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
+    let all: Vec<f64> = diagonal.iter().map(|own| own * size).collect();
+    all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
+}
+
+/// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the most probable of its sizes.
 ///
 /// Of a parameter that is `never_negative` the prior is the half β ≥ 0 of its normal distribution: with the estimate m and its
 /// standard error s the likelihood changes by 2 Φ(m / s).
 pub(super) fn of_block(
-    gram: &DMatrix<f64>,
-    product: &DVector<f64>,
+    normal: &Normal,
     (squares, freedom): (f64, f64),
     grid: &[(f64, f64)],
     (sizes, never_negative): (&[f64], &[bool]),
 ) -> (f64, f64) {
     let at = |size: f64| {
-        // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
-        let precision = (size * size).recip();
-        let mut inner = gram.clone();
-        for j in 0..inner.nrows() {
-            inner[(j, j)] += precision;
-        }
-        let Some(factor) = inner.cholesky() else { return f64::NEG_INFINITY };
-        let lower = factor.l_dirty();
-        let mut taken = product.clone();
-        if !lower.solve_lower_triangular_mut(&mut taken) {
-            return f64::NEG_INFINITY;
-        }
-        // ½ ln det, a few factors at a time before their product runs out of range.
-        let diagonal: Vec<f64> = (0..lower.nrows()).map(|j| lower[(j, j)] * size).collect();
-        let determinant: f64 = diagonal.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum();
-        let left = (squares - taken.norm_squared()).max(0.0);
-        let signs = if never_negative.contains(&true) {
-            signs(&factor.inverse(), product, (left / freedom).sqrt().max(1.0), never_negative)
-        } else {
-            0.0
+        let Some((determinant, taken)) = normal.taken(size) else { return f64::NEG_INFINITY };
+        let left = (squares - taken).max(0.0);
+        let signs = match normal {
+            Normal::Dense { product, .. } if never_negative.contains(&true) => normal
+                .factor(size)
+                .map(|factor| signs(&factor.inverse(), product, (left / freedom).sqrt().max(1.0), never_negative)),
+            _ => None,
         };
-        signs - determinant + over_noise(left, grid)
+        signs.unwrap_or(0.0) - determinant + over_noise(left, grid)
     };
     let tried: Vec<(f64, f64)> = sizes.iter().map(|&size| (size, at(size))).collect();
     let best = tried.iter().copied().fold((1.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });

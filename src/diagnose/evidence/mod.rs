@@ -6,6 +6,7 @@
 //! sum, what knows no law: smooth functions of the same covariates at the same part, functions of two covariates, harmonics whose
 //! height and phase change, another value in every pose. So a law is probable only where it is better than what needs none.
 
+mod block;
 mod columns;
 mod functions;
 mod hypotheses;
@@ -25,11 +26,12 @@ use super::fitted::Fitted;
 use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
+use block::Block;
 use columns::Candidate;
 use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
-use search::{Block, Target, Weighted, search};
+use search::{Target, Weighted, search};
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
@@ -250,17 +252,17 @@ pub(super) fn best_form(
     };
     let mut shapes = Shape::all();
     let coarse = hypotheses.shaped(hypothesis, weighed, &shapes);
-    let best_of = |(k, ..): &(usize, f64, f64)| shapes[*k].finer();
+    let best_of = |(k, ..): &(usize, f64, f64)| coarse[*k].0.finer();
     if !coarse.is_empty() {
-        let found = gains(&coarse.iter().collect::<Vec<_>>())?;
+        let found = gains(&coarse.iter().map(|(_, own)| own).collect::<Vec<_>>())?;
         shapes = found.iter().take(FINEST).flat_map(best_of).collect();
     }
     let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
-    let forms: Vec<&Candidate> = std::iter::once(smooth).chain(&finer).collect();
+    let forms: Vec<&Candidate> = std::iter::once(smooth).chain(finer.iter().map(|(_, own)| own)).collect();
     // Half of the chance for the smooth function, half for all shapes together.
     let even = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
     let (k, _, size) = gains(&forms)?.into_iter().map(even).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((forms[k].columns.clone(), size))
+    Some((forms[k].design.columns().into_owned(), size))
 }
 
 /// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth left out, whose most probable
@@ -319,27 +321,20 @@ fn blocks(
         return None;
     }
     let of_candidate = |candidate: &&Candidate| {
-        let mut columns = candidate.columns.clone();
-        for &pose in left_out {
-            columns.rows_mut(3 * pose, 3).fill(0.0);
-        }
-        let columns = neighbourhood.left_of(&columns);
-        Block::new(columns, neighbourhood.residual(), candidate.ln_prior, &candidate.never_negative)
+        let design = candidate.design.clone().without(left_out);
+        Block::new(design, &neighbourhood, candidate.ln_prior, &candidate.never_negative)
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
     let is_declared = fitted.found.noise == Noise::Declared;
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let without_weight = 3 * (left_out.len() + rows.iter().enumerate().filter(is_aside).count());
-    let target = Target {
-        residual: neighbourhood.residual().clone(),
-        noise: marginal::Noise {
-            freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
-            trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
-            least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
-        },
+    let noise = marginal::Noise {
+        freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
+        trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
+        least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
     };
-    Some((blocks, target))
+    Some((blocks, Target { fit: neighbourhood, noise }))
 }
 
 /// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.

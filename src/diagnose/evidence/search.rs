@@ -5,38 +5,15 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::super::neighbourhood::LinearNeighbourhood;
 use super::super::rules::SelectionRules;
-use super::marginal::{Noise, of_block, over_noise};
+use super::block::Block;
+use super::marginal::{Noise, over_noise};
 
-/// Columns of one hypothesis with everything fitted projected out, and the logarithm of its prior probability.
-#[derive(Debug, Clone)]
-pub(super) struct Block {
-    /// A, shape = (rows, k), of root mean square 1 in the data before the projection.
-    columns: DMatrix<f64>,
-    /// AᵀA.
-    gram: DMatrix<f64>,
-    /// Aᵀr.
-    product: DVector<f64>,
-    ln_prior: f64,
-    /// For each column, whether its parameter is never negative; empty: none.
-    never_negative: Vec<bool>,
-}
-
-impl Block {
-    /// Of projected columns, with what they have in common with a projected residual.
-    pub fn new(columns: DMatrix<f64>, residual: &DVector<f64>, ln_prior: f64, never_negative: &[bool]) -> Self {
-        let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
-        // The narrow side is transposed: this is the product that is fast.
-        gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
-        Self { product: columns.tr_mul(residual), gram, columns, ln_prior, never_negative: never_negative.to_vec() }
-    }
-}
-
-/// What is explained: a projected residual with its degrees of freedom, and how far its σ is trusted.
+/// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
-    /// Shape = (rows).
-    pub residual: DVector<f64>,
+    pub fit: LinearNeighbourhood,
     pub noise: Noise,
 }
 
@@ -84,17 +61,18 @@ struct Conditioned {
 
 impl Conditioned {
     fn new(set: &Set, blocks: &[Block], target: &Target) -> Option<Self> {
-        let rows = target.residual.len();
-        let own = set.members.iter().zip(&set.sizes);
-        let columns: Vec<DVector<f64>> = own
-            .flat_map(|(&member, &size)| blocks[member].columns.column_iter().map(move |column| column * size))
-            .collect();
-        let all = if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&columns) };
+        let residual = target.fit.residual();
+        let mut all = DMatrix::zeros(residual.len(), 0);
+        for (&member, &size) in set.members.iter().zip(&set.sizes) {
+            let (columns, first) = (blocks[member].columns(&target.fit), all.ncols());
+            all = all.resize_horizontally(first + columns.ncols(), 0.0);
+            all.columns_mut(first, columns.ncols()).copy_from(&(columns.as_ref() * size));
+        }
         let k = all.ncols();
-        let inner = DMatrix::identity(k, k) + all.tr_mul(&all);
+        let inner = DMatrix::identity(k, k) + all.transpose() * &all;
         let within = inner.cholesky()?.l().solve_lower_triangular(&all.transpose())?;
-        let taken = &within * &target.residual;
-        let squares = target.residual.norm_squared() - taken.norm_squared();
+        let taken = &within * residual;
+        let squares = residual.norm_squared() - taken.norm_squared();
         let grid = target.noise.grid();
         let without = over_noise(squares, &grid);
         Some(Self { within, taken, squares, grid, without })
@@ -102,15 +80,8 @@ impl Conditioned {
 
     /// ln p(r | set and block) − ln p(r | set), and the block's most probable size.
     fn gain(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
-        let (mut gram, mut product) = (block.gram.clone(), block.product.clone());
-        if self.within.nrows() > 0 {
-            let along = &self.within * &block.columns;
-            gram.gemm(-1.0, &along.transpose(), &along, 1.0);
-            product.gemv_tr(-1.0, &along, &self.taken, 1.0);
-        }
-        let left = (self.squares, target.noise.freedom);
-        let (with, size) = of_block(&gram, &product, left, &self.grid, (&rules.displacements, &block.never_negative));
-        (with - self.without, size)
+        let left = ((self.squares, target.noise.freedom), self.without);
+        block.gain((&self.within, &self.taken), left, &self.grid, rules)
     }
 }
 
@@ -187,7 +158,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
 pub(super) fn ln_posterior(blocks: &[Block], target: &Target, rules: &SelectionRules) -> Option<f64> {
     let all: Vec<usize> = (0..blocks.len()).collect();
     let set = assembled(&all, blocks, target, rules)?;
-    Some(set.ln_posterior + over_noise(target.residual.norm_squared(), &target.noise.grid()))
+    Some(set.ln_posterior + over_noise(target.fit.residual().norm_squared(), &target.noise.grid()))
 }
 
 /// For each block that is tried the gain beside some others, its prior among it, and its most probable size.

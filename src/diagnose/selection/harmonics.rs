@@ -114,15 +114,16 @@ fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
         }
         squares.left_out(&priors)
     };
-    let tried: Vec<_> = data
-        .rules
-        .prior_scales
-        .clone()
-        .map(|power| found * 2.0_f64.powi(power))
-        .map(|scale| (scale, error(scale)))
-        .collect();
-    let finite = tried.into_iter().filter_map(|(scale, error)| Some((scale, error?)));
-    finite.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |(scale, _)| scale)
+    let best = |powers: &[f64]| {
+        let tried = powers.iter().filter_map(|&power| Some((power, error(found * power.exp2())?)));
+        tried.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let coarse: Vec<f64> = data.rules.prior_scales.clone().map(f64::from).collect();
+    let finer = |(power, least): (f64, f64), step: f64| {
+        best(&[power - step, power + step]).filter(|other| other.1 < least).unwrap_or((power, least))
+    };
+    let finest = best(&coarse).map(|own| finer(finer(own, 0.5), 0.25));
+    finest.map_or(found, |(power, _)| found * power.exp2())
 }
 
 /// Identification poses in each part of the range of each joint that moves, as many in each.
