@@ -92,6 +92,19 @@ impl<S: Scalar> Arm<S> {
         frame
     }
 
+    /// For each joint its axis, a point \[m\] and a direction, and the frame behind it, of the arm that does not deflect; arm base
+    /// frame.
+    pub fn rigid_joints(&self, configuration: &[f64]) -> Vec<(Vector3<S>, Vector3<S>, Frame<S>)> {
+        let mut frame = Frame::identity();
+        let along = |(joint, &q): (&Joint<S>, &f64)| {
+            let mut root = frame;
+            joint.root(&mut root);
+            joint.advance(&mut frame, q);
+            (root.origin, root.axes[2], frame)
+        };
+        self.joints.iter().zip(configuration).map(along).collect()
+    }
+
     /// Payload of a pose \[kg\].
     pub(super) fn payload(&self, setup: &PoseView) -> S {
         let declared = setup.payload.unwrap_or(self.payload_mass);

@@ -146,10 +146,15 @@ impl<S: Scalar> Joint<S> {
         }
     }
 
-    /// Moves `frame` through the whole rigid `T_i`.
-    pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
+    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: Rx(α) Tx(a).
+    pub(super) fn root(&self, frame: &mut Frame<S>) {
         frame.rotate_x(self.alpha.sin_cos);
         frame.translate_x(self.a);
+    }
+
+    /// Moves `frame` through the whole rigid `T_i`.
+    pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
+        self.root(frame);
         self.turn(frame, q, None, None);
     }
 }

@@ -10,13 +10,11 @@ use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, p_value};
 use super::render::{Report, report, text};
+use super::unexplained::{correction, place, unexplained};
 use super::{effect, findings, trace};
-use crate::diagnose::{
-    ClosedLoop, Correction, Covariate, Found, HELD_FIXED, Interval, REFUSED, Round, SelectionRules, Trace, Unexplained,
-    Verdict,
-};
+use crate::diagnose::{ClosedLoop, Correction, Found, Interval, Round, SelectionRules, Trace, Unexplained, Verdict};
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
 
 /// Alternatives that are named in words; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
@@ -384,108 +382,4 @@ fn rounds<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     let header = ["round", "effects in the model", "identification rms, mm", "held out mean", "held out rms"];
     let rows = closure.rounds.iter().enumerate().map(row).collect();
     vec![Block::heading("Rounds"), Block::Table(Table::new(&header, rows, &[1]))]
-}
-
-/// The correction of structure without a law, if there is one.
-fn correction(closure: &ClosedLoop) -> Option<&Correction> {
-    closure.unexplained.iter().find_map(|left| left.correction.as_ref())
-}
-
-/// Where structure is.
-fn place(left: &Unexplained) -> String {
-    left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
-}
-
-/// Structure whose law is not known.
-fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
-    if closure.unexplained.is_empty() {
-        return Vec::new();
-    }
-    let mut sentences: Vec<String> = closure.unexplained.iter().map(located).collect();
-    let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();
-    let mut catalogue = "No effect of the catalogue explains it better than a function without a law".to_owned();
-    for (why, words) in [(HELD_FIXED, "holds them fixed"), (REFUSED, "speaks of them in another unit")] {
-        match untried(why) {
-            0 => {}
-            count => _ = write!(catalogue, "; {count} were not tried because [parameters] {words}"),
-        }
-    }
-    sentences.push(catalogue + ".");
-    match correction(closure) {
-        None => {
-            sentences.push(
-                "No empirical correction would improve the prediction of poses that it was not fitted to.".to_owned(),
-            );
-        }
-        Some(correction) => sentences.extend(corrected(problem, closure, correction)),
-    }
-    sentences
-}
-
-/// One finding without a law.
-fn located(left: &Unexplained) -> String {
-    let on = left.depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let chance = format!("p-value at most {}", p_value(left.p_value));
-    let of = |probability: f64| number(probability, 2);
-    match (&left.claims, on.as_str()) {
-        (Some(claims), "") => {
-            format!(
-                "Structure at {}, probability {}; what it depends on is not known ({chance}).",
-                place(left),
-                of(claims.place.1)
-            )
-        }
-        (Some(claims), on) => format!(
-            "Structure at {}, probability {}, that depends on {on}, probability {}; its law is not known ({chance}).",
-            place(left),
-            of(claims.place.1),
-            of(claims.depends_on.1)
-        ),
-        (None, "") => format!("Structure is left: {} (p {}).", place(left), p_value(left.p_value)),
-        (None, on) => format!("Structure is left: {}, depending on {on} (p {}).", place(left), p_value(left.p_value)),
-    }
-}
-
-/// What a correction does, and as far as it reaches.
-fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -> Vec<String> {
-    let before = closure.after.fitted.held_out;
-    let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
-    let does = if held_out.rms.norm < before.rms.norm { "improves" } else { "does not improve" };
-    let mut sentences = vec![format!(
-        "A smooth correction there {does} the prediction of held-out poses: mean {} to {} mm, rms {} to {} mm; of identification poses \
-         left out in turn rms {} to {} mm. It names no cause and is not part of {}.",
-        mm(before.mean.norm, 4),
-        mm(held_out.mean.norm, 4),
-        mm(before.rms.norm, 4),
-        mm(held_out.rms.norm, 4),
-        mm(*without, 4),
-        mm(*with, 4),
-        code("problem.closed.toml"),
-    )];
-    let range = |(covariate, range): &(Covariate, (f64, f64))| {
-        let (factor, unit) = unit(problem, *covariate);
-        format!("{covariate} from {} to {}{unit}", number(range.0 * factor, 2), number(range.1 * factor, 2))
-    };
-    let ranges: Vec<String> = ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
-    if !ranges.is_empty() {
-        sentences.push(format!(
-            "It holds for {}, as far as the identification poses reach; beyond, it keeps its last value ({beyond} of {} held-out poses).",
-            ranges.join(", "),
-            held_out.n
-        ));
-    }
-    sentences
-}
-
-/// Factor from SI to the unit in which people read a quantity of the poses.
-fn unit(problem: &Problem, covariate: Covariate) -> (f64, &'static str) {
-    match covariate {
-        Covariate::Temperature => (1.0, " °C"),
-        Covariate::Time => (1.0 / 3600.0, " h"),
-        Covariate::Payload => (1.0, " kg"),
-        Covariate::Hoist => (1.0, " N"),
-        Covariate::Command(joint) if problem.joints[joint].kind == JointKind::Prismatic => (1e3, " mm"),
-        Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
-        _ => (1.0, ""),
-    }
 }

@@ -28,6 +28,7 @@ mod separation;
 mod study;
 mod table;
 mod trace;
+mod unexplained;
 
 pub use check::{check_json, check_text, why_not_sufficient};
 pub use closed_loop::{loop_json, loop_report, loop_text};

@@ -145,6 +145,7 @@ fn law(own: &Hypothesis) -> &str {
         Law::NearHarmonic(_) => "near-harmonic",
         Law::PerPose => "per-pose",
         Law::Linear => "linear",
+        Law::Sag => "sag",
         _ => "smooth",
     }
 }
@@ -160,6 +161,7 @@ fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
         }
         Law::PerPose => format!("{part}: another error in every pose, by nothing that is known of the poses"),
         Law::Linear => format!("{part}: linear in the position, as scale by axis and shear are"),
+        Law::Sag => format!("{part}: gives way under weight that is not declared"),
         _ => format!("{part}: a smooth function of {on}; its law is not known"),
     }
 }

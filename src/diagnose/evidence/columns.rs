@@ -79,7 +79,13 @@ impl<'a, 'l> Columns<'a, 'l> {
         all.weighted()
     }
 
-    fn add(&mut self, family: &str, share: f64, hypothesis: Hypothesis, columns: impl FnOnce() -> DMatrix<f64>) {
+    pub(super) fn add(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        columns: impl FnOnce() -> DMatrix<f64>,
+    ) {
         self.add_design(family, share, hypothesis, || Design::Dense(columns()));
     }
 
@@ -144,6 +150,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.measurement(&known);
         self.warming(&known);
         self.repeats();
+        self.sag();
         self.covariates.extend(known);
     }
 

@@ -78,6 +78,8 @@ pub enum Law {
     PerPose,
     /// Linear in the position.
     Linear,
+    /// Gives way under the weight of links whose masses nobody declared.
+    Sag,
 }
 
 /// One explanation of a residual.

@@ -12,6 +12,7 @@ mod functions;
 mod hypotheses;
 mod hypothesis;
 mod marginal;
+mod sag;
 mod search;
 
 use nalgebra::DMatrix;

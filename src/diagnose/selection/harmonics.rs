@@ -105,12 +105,14 @@ fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
     let parts = parts_of_ranges(&fitted.problem, data);
     let squares = PartSquares::new(&linearised.fitted(), linearised.residual(), &parts);
     let parameters = fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
-    let priors: Vec<(f64, Option<f64>)> =
-        parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma))).collect();
+    let all = parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
+    // Weighed as fitted: where that took a σ larger than the declared one, priors counted for more.
+    let weight = fitted.found.noise_factor.max(1.0).sqrt();
+    let priors: Vec<(f64, Option<f64>)> = all.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
     let error = |scale: f64| {
         let mut priors = priors.clone();
         for &j in &own {
-            priors[j].1 = Some(scale);
+            priors[j].1 = Some(scale / weight);
         }
         squares.left_out(&priors)
     };
