@@ -1,9 +1,16 @@
 //! The running QR decomposition of a tall matrix, block by block.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 
 use super::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 use super::{Block, Linearisation};
+
+/// Reflectors applied together as matrix products.
+const WIDE: usize = 32;
+/// Columns behind which products are worth their preparation.
+const WORTH_PRODUCTS: usize = 128;
 
 /// The triangular factor of all rows absorbed so far.
 ///
@@ -98,11 +105,33 @@ impl Triangle {
         if m == 0 {
             return;
         }
-        for first in (0..n).step_by(PANEL) {
-            let width = PANEL.min(n - first);
+        let mut first = 0;
+        while n - first >= WORTH_PRODUCTS {
+            let used = filled(first + WIDE).min(m);
+            let mut factors = [0.0; WIDE];
+            self.reduce_columns(block, first..first + WIDE, first + WIDE, |_| used, &mut factors);
+            self.apply(block, first, used, &factors);
+            first += WIDE;
+        }
+        self.reduce_columns(block, first..n, n + 1, filled, &mut []);
+    }
+
+    /// Reduces some columns of the block, and the columns behind them up to `end`; the reflectors' factors τ, as far as there is room.
+    fn reduce_columns(
+        &mut self,
+        block: &mut Block,
+        columns: Range<usize>,
+        end: usize,
+        filled: impl Fn(usize) -> usize,
+        factors: &mut [f64],
+    ) {
+        let (n, m) = (self.parameters, block.rows);
+        for first in columns.clone().step_by(PANEL) {
+            let width = PANEL.min(columns.end - first);
             let used = filled(first + width).min(m);
-            let (panel, trailing) = block.values[first * m..].split_at_mut(width * m);
-            let factors = self.factor_panel(first, width, panel, m, used);
+            let (panel, trailing) = block.values[first * m..end * m].split_at_mut(width * m);
+            let own = self.factor_panel(first, width, panel, m, used);
+            factors.iter_mut().skip(first - columns.start).zip(&own[..width]).for_each(|(all, own)| *all = *own);
             let vectors: [&[f64]; PANEL] = std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
             let coupling = coupling(&vectors, width);
             for (j, column) in trailing.chunks_exact_mut(m).enumerate() {
@@ -111,13 +140,43 @@ impl Triangle {
                 for i in 0..width {
                     let at = (first + i) * (n + 1) + first + width + j;
                     let earlier: f64 = (0..i).map(|l| coupling[i][l] * s[l]).sum();
-                    s[i] = factors[i] * (self.rows[at] + s[i] - earlier);
+                    s[i] = own[i] * (self.rows[at] + s[i] - earlier);
                     self.rows[at] -= s[i];
                 }
                 s[width..].fill(0.0);
                 subtract(column, &s, &vectors);
             }
         }
+    }
+
+    /// Applies the reflectors of the wide panel at `first` to all columns behind it, as matrix products.
+    ///
+    /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R − W, C ← C − V W
+    /// [Schreiber and Van Loan 1989]
+    fn apply(&mut self, block: &mut Block, first: usize, used: usize, factors: &[f64; WIDE]) {
+        let (n, m) = (self.parameters, block.rows);
+        let (panel, trailing) = block.values[first * m..].split_at_mut(WIDE * m);
+        let behind = n + 1 - first - WIDE;
+        let vectors = DMatrixView::from_slice_with_strides(panel, used, WIDE, 1, m);
+        let transposed = vectors.transpose();
+        let mut columns = DMatrixViewMut::from_slice_with_strides_mut(trailing, used, behind, 1, m);
+        let corner = &mut self.rows[first * (n + 1) + first + WIDE..];
+        let mut rows = DMatrixViewMut::from_slice_with_strides_mut(corner, WIDE, behind, n + 1, 1);
+        let mut products = DMatrix::zeros(WIDE, WIDE);
+        products.gemm(1.0, &transposed, &vectors, 0.0);
+        let mut triangle = DMatrix::zeros(WIDE, WIDE);
+        for (i, &factor) in factors.iter().enumerate() {
+            for j in 0..i {
+                let turned: f64 = (j..i).map(|l| triangle[(j, l)] * products[(l, i)]).sum();
+                triangle[(j, i)] = -factor * turned;
+            }
+            triangle[(i, i)] = factor;
+        }
+        let mut taken = rows.clone_owned();
+        taken.gemm(1.0, &transposed, &columns, 1.0);
+        let taken = triangle.transpose() * taken;
+        rows -= &taken;
+        columns.gemm(-1.0, &vectors, &taken, 1.0);
     }
 
     /// Replaces `width` columns by their reflectors and returns the factors τ of H = I − τ u uᵀ.
@@ -211,7 +270,7 @@ mod tests {
 
     #[test]
     fn absorbs_blocks_of_any_shape() {
-        for n in [1, 2, 3, 4, 5, 7, 8, 13] {
+        for n in [1, 2, 3, 4, 5, 7, 8, 13, 127, 128, 150, 201] {
             let mut triangle = Triangle::new(n);
             let mut stacked = DMatrix::zeros(0, n + 1);
             for (k, rows) in [1, 3, 4, 30, 257].into_iter().enumerate() {
@@ -227,7 +286,12 @@ mod tests {
 
     #[test]
     fn merging_equals_absorbing() {
-        let (n, rows) = (11, 40);
+        for (n, rows) in [(11, 40), (170, 40), (170, 400)] {
+            merges(n, rows);
+        }
+    }
+
+    fn merges(n: usize, rows: usize) {
         let (first, second) = (block(rows, n, 0, 1.0), block(rows, n, 5000, 2.0));
         let mut stacked = DMatrix::zeros(2 * rows, n + 1);
         stacked.view_mut((0, 0), (rows, n + 1)).copy_from(&dense(&first));
