@@ -8,10 +8,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnose::{Evidence, Hypothesis, trace};
+use flexcal::diagnose::{Evidence, Hypothesis, Law, trace};
 use flexcal::identify::Options;
-use flexcal::measurement::Dataset;
+use flexcal::measurement::{Dataset, Split};
+use flexcal::monte_carlo::table;
 use flexcal::problem::Problem;
+use flexcal::simulate::{Truth, simulate};
 use serde_json::Value;
 
 /// A law that is stated: from this probability on.
@@ -100,4 +102,50 @@ fn noise_explains_itself() {
         let total: f64 = evidence.explanations.iter().map(|explanation| explanation.probability).sum();
         assert!((total - 1.0).abs() < 1e-6, "{name}: {total}");
     }
+}
+
+/// Seven joints as those of a light arm: α \[°\], a and d \[m\], and mass \[kg\] and centre \[m\] of each link.
+const SEVEN: [(f64, f64, f64, f64, [f64; 3]); 7] = [
+    (0.0, 0.0, 0.333, 4.97, [0.0, 0.0, -0.05]),
+    (-90.0, 0.0, 0.0, 0.65, [0.0, -0.03, 0.0]),
+    (90.0, 0.0, 0.316, 3.2, [0.03, 0.04, -0.07]),
+    (90.0, 0.0825, 0.0, 3.6, [-0.05, 0.1, 0.03]),
+    (-90.0, -0.0825, 0.384, 1.2, [-0.01, 0.04, -0.04]),
+    (90.0, 0.0, 0.0, 1.7, [0.06, -0.01, -0.01]),
+    (90.0, 0.088, 0.107, 0.7, [0.01, 0.0, 0.06]),
+];
+
+/// The arm with the masses of its links, or without.
+fn seven(masses: bool) -> Problem {
+    use std::fmt::Write as _;
+    let mut text = "name = 'seven'\n".to_owned();
+    for (alpha, a, d, mass, com) in SEVEN {
+        let _ = writeln!(text, "[[joint]]\nalpha_deg = {alpha}\na_m = {a}\nd_m = {d}");
+        if masses {
+            let _ = writeln!(text, "[[joint.body]]\nmass_kg = {mass}\ncom_m = {com:?}");
+        }
+    }
+    text += "[tool]\ntarget_m = [0, 0.05, 0.1]\n[data]\nfiles = ['measurements.csv']\nposition_sigma_mm = 0.05\n[parameters]\n\
+             'joint*.*' = { free = true, sigma_mm = 2, sigma_deg = 0.5 }\n'tool.*' = { free = true, sigma_mm = 3 }\n";
+    Problem::parse(&text, Path::new("problem.toml")).unwrap()
+}
+
+#[test]
+fn sag_of_links_whose_masses_nobody_declared_is_called_that() {
+    let give: String = [2, 3, 4, 5, 6]
+        .map(|joint| format!("[[effect]]\njoint-compliance = {{ joint = {joint} }}\ncompliance_rad_per_N_m = 2e-5\n"))
+        .concat();
+    let text = format!(
+        "[random]\n'joint*.theta' = {{ sigma_deg = 0.2 }}\n'joint*.a' = {{ sigma_mm = 0.5 }}\n{give}\
+         [noise]\nposition_sigma_mm = 0.05\n[poses]\nq1_deg = [-160, 160]\nq2_deg = [-90, 90]\nq3_deg = [-160, 160]\n\
+         q4_deg = [-170, -10]\nq5_deg = [-160, 160]\nq6_deg = [5, 200]\nq7_deg = [-160, 160]\n"
+    );
+    let (heavy, light) = (seven(true), seven(false));
+    let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &heavy).unwrap();
+    let rows = simulate(&heavy, &truth, 84, 5).unwrap().rows;
+    let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+    let data = Dataset::new(table(&rows), split);
+    let evidence = trace(&light, &data, &Options::default()).unwrap().evidence.unwrap();
+    assert!(evidence.probability(|own| own.law == Law::Sag) > STATED, "{:?}", evidence.best());
+    assert_eq!(stated(&evidence), Vec::<String>::new());
 }

@@ -55,7 +55,8 @@ pub struct SelectionRules {
     pub several_orders: usize,
     /// Parts of each joint's range that are left out in turn to find the prior's scale.
     pub range_parts: usize,
-    /// Scales of the prior that are tried, as powers of two of the root mean square of the coefficients found.
+    /// Scales of the prior that are tried, as powers of two of the root mean square of the coefficients found; then half and quarter
+    /// powers about the best.
     pub prior_scales: RangeInclusive<i32>,
     /// Part of their rms error to which a correction must take poses that were left out to be worth stating.
     pub worthwhile: f64,
@@ -79,7 +80,7 @@ pub struct SelectionRules {
     pub drawn_again: u64,
     /// Part of the resamples within that interval.
     pub covered: f64,
-    /// Poses, taken evenly, on which hypotheses are weighed against each other at most: the work grows with their square.
+    /// Poses, taken evenly, on which hypotheses are weighed against each other at most: with more, rounds find the effects.
     pub weighed_poses: usize,
     /// Chance of a family of functions of unknown law, over that of a family of effects: the catalogue holds what is common.
     pub unknown_law: f64,

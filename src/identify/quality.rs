@@ -151,6 +151,9 @@ impl fmt::Display for QualityFlag {
                 after * 1e3
             ),
             Self::HeldOutNotConverged(termination) => write!(f, "the bases of held-out sessions: {termination}"),
+            Self::Misses { rms, .. } if !rms.is_finite() => {
+                write!(f, "the fitted arm misses the measurements by more than numbers hold; check their units")
+            }
             Self::Misses { rms, spread } => write!(
                 f,
                 "the fitted arm misses the measurements by {:.1} mm, {:.0} % of their spread; check units, signs of \
