@@ -89,6 +89,44 @@ fn identify_prints_a_table_and_writes_the_estimate() {
 }
 
 #[test]
+fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
+    let bench = Bench::new();
+    let run = |arguments: &str| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(bench.folder.path()).args(arguments.split(' ')).assert()
+    };
+    run("identify --quiet --data a-none.csv problem.toml").success();
+    run("identify --quiet").success();
+    run("identify --quiet --data a-none.csv --out elsewhere").success();
+    assert!(bench.path("out/lunar-sampler/estimate.json").exists() && bench.path("elsewhere/estimate.json").exists());
+    // A closed problem has a folder of its own.
+    fs::copy(bench.path("problem.toml"), bench.path("problem.closed.toml")).unwrap();
+    run("identify problem.closed.toml --quiet").success();
+    assert!(bench.path("out/lunar-sampler-closed/estimate.json").exists());
+    // What is planned can be rehearsed.
+    let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml");
+    fs::copy(truth, bench.path("truth.toml")).unwrap();
+    let room = "--workspace-mm=-4000,4000,0,4000,-4000,4000 --keep-out-mm 1,0,0,-500";
+    run(&format!("plan --truth truth.toml --poses 12 --quiet --out plan {room}"));
+    run("simulate --truth truth.toml --data plan/plan.csv --seed 3 --quiet --out rig").success();
+    let rows = |name: &str| {
+        let mut table = csv::Reader::from_path(bench.path(name)).unwrap();
+        let header: Vec<String> = table.headers().unwrap().iter().map(str::to_owned).collect();
+        let rows: Vec<Vec<String>> =
+            table.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect();
+        move |column: &str| {
+            let place = header.iter().position(|name| name == column).unwrap();
+            rows.iter().map(|row| row[place].parse().unwrap()).collect::<Vec<f64>>()
+        }
+    };
+    let (planned, measured) = (rows("plan/plan.csv"), rows("rig/measurements.csv"));
+    assert_eq!(planned("q2_deg"), measured("q2_deg"));
+    assert!(measured("y_mm").iter().all(|y| *y > -100.0) && measured("x_mm").iter().all(|x| *x > -600.0));
+    let assert = run("plan --truth truth.toml --poses 12 --workspace-mm 1,0,0,1,0,1").code(2);
+    assert!(text(&assert.get_output().stderr).contains("the box is empty"));
+}
+
+#[test]
 fn json_is_all_there_is_on_standard_output_and_quiet_is_quiet() {
     let bench = Bench::new();
     let assert = bench.identify(&["--json", "--out", "elsewhere"]).success();

@@ -197,11 +197,11 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
     let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
     let words = [
         ["q1_deg", "joint 1"],
-        ["time", "time_s"],
         ["operator", "known; ignored"],
         ["payloud_kgs", "(did you mean payload_kg?); ignored"],
         // A column that is there already is not meant.
         ["yy_m", "known; ignored"],
+        ["time", "time_s"],
     ];
     assert_eq!(warnings.len(), words.len());
     for (warning, words) in warnings.iter().zip(words) {
@@ -330,4 +330,31 @@ fn rows_of_one_configuration_stay_together_across_rounding() {
     for pair in 0..40 {
         assert_eq!(split.held_out.contains(&(2 * pair)), split.held_out.contains(&(2 * pair + 1)), "pair {pair}");
     }
+}
+
+#[test]
+fn readings_stand_beside_commands_and_nests_apart() {
+    let text = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 1\n";
+    let table = "time_s,nest,q1_deg,q2_deg,q1_read_deg,q2_read_deg,x_mm,y_mm,z_mm\n0,floor,,,,,1,2,3\n60,,10,20,10.5,20.5,4,5,6\n\
+                 120,,30,40,30.5,40.5,7,8,9\n180,floor,,,,,1.5,2,3\n";
+    let commanded = parse(text);
+    let rows = read(&commanded, &[table]).unwrap().0;
+    assert_eq!((rows.len(), rows.nests.len()), (2, 2));
+    assert!(close(rows.configuration(0)[0], 10_f64.to_radians()));
+    let nest = &rows.nests[1];
+    assert_eq!((nest.name.as_str(), nest.time, nest.after), ("floor", Some(180.0), 2));
+    assert!(close(nest.position.x, 1.5e-3));
+    let other = rows.by_other_joints().unwrap();
+    assert!(close(other.configuration(1)[1], 40.5_f64.to_radians()));
+    let readings = parse(&format!("{text}[data]\njoints = 'read'\n"));
+    let read_rows = read(&readings, &[table]).unwrap().0;
+    assert_eq!(read_rows.configurations, other.configurations);
+    // Readings alone are enough where they count, and not where commands do.
+    let alone = "q1_read_rad,q2_read_deg,x_m,y_m,z_m\n0.1,2,3,4,5\n";
+    assert!(read(&readings, &[alone]).unwrap().0.by_other_joints().is_none());
+    let error = read(&commanded, &[alone]).unwrap_err().to_string();
+    assert!(error.contains("column q1: missing; add q1_deg or q1_rad"), "{error}");
+    let error = read(&readings, &["q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n"]).unwrap_err().to_string();
+    assert!(error.contains("column q1_read: missing; add q1_read_deg or q1_read_rad"), "{error}");
+    assert!(read(&commanded, &["q1_deg,q2_deg,q1_read_mm,x_m,y_m,z_m\n1,2,3,4,5,6\n"]).is_err());
 }

@@ -4,8 +4,13 @@
 
 mod common;
 
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
 use common::arms::path;
-use flexcal::identify::{Identification, IdentifyError, Options, identify};
+use flexcal::identify::{Identification, IdentifyError, Options, SavedEstimate, SavedEstimateError, identify, predict};
 use flexcal::measurement::Dataset;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
@@ -120,4 +125,89 @@ fn configurations_of_another_arm_are_an_error() {
     let wrong = |error: IdentifyError| matches!(error, IdentifyError::JointCount { found: 2, joints: 4 });
     assert!(identify(&problem, &few, &Options::default()).is_err_and(wrong));
     assert!(found.predict(&problem, &few.measurements).is_err_and(wrong));
+}
+
+#[test]
+fn a_saved_estimate_predicts_what_the_fit_predicts() {
+    let (problem, data, found) = lunar();
+    let json = estimate_json(&problem, &found);
+    let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
+    let again = predict(&problem, Some(&saved), &data.measurements, Some(&data.split)).unwrap();
+    let (own, residuals) = (found.predict(&problem, &data.measurements).unwrap(), again.residuals.unwrap());
+    for ((one, other), residual) in own.iter().zip(&again.positions).zip(&residuals) {
+        assert!((one - other).norm() < 1e-12, "{one}{other}");
+        assert_eq!(residual.held_out, data.split.held_out.contains(&residual.row));
+    }
+    // Rows without positions are predicted, and judge nothing.
+    let rows = &data.measurements;
+    let bare = Dataset::poses((0..rows.len()).map(|row| rows.configuration(row))).measurements().unwrap();
+    let bare = predict(&problem, Some(&saved), &bare, None).unwrap();
+    assert!(bare.residuals.is_none() && bare.errors.is_none() && bare.positions.len() == rows.len());
+    // Without an estimate it is the nominal arm.
+    let nominal = predict(&problem, None, rows, None).unwrap().errors.unwrap();
+    assert!((nominal.all.mean.norm - 26.8e-3).abs() < 1e-3, "{}", nominal.all.mean.norm);
+    // An estimate of another arm is refused.
+    let other = Problem { gravity: Vector3::zeros(), ..problem.clone() };
+    let error = predict(&other, Some(&saved), rows, None).unwrap_err();
+    let expected = matches!(error, flexcal::identify::PredictError::Estimate(SavedEstimateError::OtherArm { .. }));
+    assert!(expected, "{error}");
+}
+
+/// A rigid arm of three joints and the tables of two sessions whose bases differ; session B holds a gross error.
+fn two_sessions(folder: &Path) -> impl Fn(&str) -> assert_cmd::assert::Assert + '_ {
+    let problem = "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.6\n\
+                   [tool]\ntarget_m = [0.5, 0.1, 0.0]\n[parameters]\n'joint3.a' = { sigma_mm = 3 }\n'base.*' = { free = true }\n\
+                   'tool.*' = { sigma_mm = 1 }\n[data]\nposition_sigma_mm = 0.02\nheld_out = { fraction = 0.3 }\n";
+    fs::write(folder.join("problem.toml"), problem).unwrap();
+    let arm = Problem::parse(problem, Path::new("problem.toml")).unwrap();
+    for (session, shift) in [("A", 0.0), ("B", 100.0)] {
+        let configurations: Vec<[f64; 3]> =
+            (0..40).map(|k| [1.7, 2.3, 3.1].map(|step| f64::from(k) * step % 2.0 - 1.0)).collect();
+        let poses = Dataset::poses(&configurations).measurements().unwrap();
+        let truth = predict(&arm, None, &poses, None).unwrap().positions;
+        let mut table = "session,target,pose,q1_rad,q2_rad,q3_rad,x_mm,y_mm,z_mm\n".to_owned();
+        for (k, (q, p)) in configurations.iter().zip(&truth).enumerate() {
+            let off = if session == "B" && k == 7 { 5.0 } else { 0.01 * (k as f64).sin() };
+            let [x, y, z] = [p.x * 1e3 + shift + off, p.y * 1e3 - 2.0 * shift, p.z * 1e3];
+            writeln!(table, "{session},ball,{k},{},{},{},{x},{y},{z}", q[0], q[1], q[2]).unwrap();
+        }
+        fs::write(folder.join(format!("{session}.csv")), table).unwrap();
+    }
+    move |arguments: &str| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(folder).args(arguments.split(' ')).assert()
+    }
+}
+
+#[test]
+fn an_estimate_applies_to_another_session_without_a_refit() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = two_sessions(folder.path());
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    run("identify problem.toml --quiet --out fit --data A.csv").success();
+    let assert = run("predict problem.toml --estimate fit/estimate.json --out there --data A.csv B.csv").success();
+    let told = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    assert!(told.contains("Fitted to these rows, with the arm as it is: base[B].x"), "{told}");
+    let errors: Value = serde_json::from_str(&read("there/errors.json")).unwrap();
+    assert_eq!((errors["all"]["n"].as_u64(), errors["sessions"]["B"]["n"].as_u64()), (Some(80), Some(40)));
+    assert!(errors["sessions"]["A"]["max_mm"]["norm"].as_f64().unwrap() < 0.1, "{errors}");
+    assert!((errors["sessions"]["B"]["max_mm"]["norm"].as_f64().unwrap() - 5.0).abs() < 1.0, "{errors}");
+    let residuals = read("there/residuals.csv");
+    let (header, rows) = residuals.split_once('\n').unwrap();
+    let expected = "file,line,pose,session,target,predicted_x_mm,predicted_y_mm,predicted_z_mm,residual_x_mm,residual_y_mm,\
+                    residual_z_mm,whitened,outlier,held_out";
+    assert_eq!(header, expected);
+    let outliers: Vec<&str> = rows.lines().filter(|line| line.split(',').rev().nth(1) == Some("true")).collect();
+    assert!(matches!(outliers[..], [line] if line.starts_with("B.csv,9,7,B,ball,")), "{outliers:?}");
+    assert!(
+        read("there/predictions.csv").starts_with("file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,")
+    );
+    assert_eq!(read("fit/residuals.csv").lines().count(), 41);
+    // Where nothing was measured, nobody knows where the arm of a new session stands.
+    let bare: Vec<String> =
+        read("B.csv").lines().map(|line| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(",")).collect();
+    fs::write(folder.path().join("bare.csv"), bare.join("\n")).unwrap();
+    let assert = run("predict problem.toml --estimate fit/estimate.json --out bare --data bare.csv").code(2);
+    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(message.contains("has no estimate of base[B].x") && !folder.path().join("bare").exists(), "{message}");
 }

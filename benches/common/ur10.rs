@@ -74,6 +74,7 @@ impl Ur10 {
             target: 0,
             measured,
             sigma: NOISE,
+            orientation: None,
         });
         PoseResiduals::new(&self.model, poses.collect(), unknowns, at)
     }

@@ -49,7 +49,7 @@ enum PosesError {
 /// Checks, writes `check.json`, and prints what is to be expected.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let problem = Problem::read(&common.problem)?;
+    let problem = Problem::read(common.problem())?;
     let results = common.results("check", &problem, &arguments.source.files(), &["check.json"])?;
     let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
     let json = report::check_json(&problem, &check);
@@ -75,7 +75,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
     let poses = poses.map(|poses| poses as usize);
     let table = source.table(problem, common.quiet)?;
     match (table, poses) {
-        (Some(_), _) if !common.data.is_empty() => Err(PosesError::Twice.into()),
+        (Some(_), _) if !common.data().is_empty() => Err(PosesError::Twice.into()),
         (Some(table), poses) => {
             let rows = table.len();
             let poses = match poses {
@@ -87,7 +87,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
         }
         (None, Some(poses)) => Ok(Judged::Drawn(source.all_ranges(problem)?, poses)),
         (None, None) => {
-            let files: &[PathBuf] = if common.data.is_empty() { &problem.data.files } else { &common.data };
+            let files: &[PathBuf] = if common.data().is_empty() { &problem.data.files } else { common.data() };
             if files.is_empty() {
                 return Err(PosesError::None.into());
             }

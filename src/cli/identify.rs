@@ -42,29 +42,51 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Identifies, writes `estimate.json`, `report.md` and `report.html`, and prints the table.
+/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data, results } = common.read("identify", &["estimate.json", REPORT[0], REPORT[1]])?;
+    let Input { problem, data, results } =
+        common.read("identify", &["estimate.json", "residuals.csv", REPORT[0], REPORT[1]])?;
+    if problem.parameters.is_empty() && !common.quiet {
+        diagnostic::warn(
+            "nothing is free: the nominal arm is judged as it is; to identify it, write [parameters] with lines such as \
+             \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \"joint*.theta\" = { sigma_deg = 1.0 }, \
+             \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
+        );
+    }
     let line = common.talks().then(Line::new);
     let options = Options::default()
         .with_strategy(arguments.strategy)
         .with_solver(arguments.solver)
         .with_progress(line.as_ref().map(Line::sink));
-    let result = identify::identify(&problem, &data, &options);
+    let result = identify::identify(&problem, &data, &options)
+        .and_then(|found| Ok((identify::joint_sources(&problem, &data, &options, &found)?, found)));
     if let Some(line) = line {
         line.clear();
     }
-    let identification = result?;
+    let (sources, identification) = result?;
     let json = report::estimate_json(&problem, &identification);
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    results.write_report(&[("estimate.json", &json)], &told)?;
+    let residuals = report::residuals_csv(&data.measurements, &identification.residuals(&problem, &data)?);
+    results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
     if common.json {
         output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::estimate_text(&problem, &identification))?;
-        output::print(&format!("\nWritten to {}: estimate.json, report.md, report.html\n", results.folder.display()))?;
+        if let Some(sources) = &sources {
+            output::print(&format!("\n{}\n", report::joint_sources_text(sources)))?;
+        }
+        let names = "estimate.json, residuals.csv, report.md, report.html";
+        output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
+        if identification.is_trusted() && report::lacks_something(&identification) {
+            let data: Vec<String> = common.data().iter().map(|file| format!(" {}", file.display())).collect();
+            let data = if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
+            output::print(&format!(
+                "Next: flexcal loop {}{data} looks for what the model lacks\n",
+                common.problem().display()
+            ))?;
+        }
     }
     Ok(diagnostic::judged(&identification, common.quiet))
 }

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::error::InputError;
+use flexcal::error::{InputError, Warning, WarningKind};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
@@ -14,11 +14,12 @@ use super::output::{Results, WriteError};
 /// Problem, data, and where results go.
 #[derive(Debug, Args)]
 pub struct Common {
-    /// A problem.toml, or the folder that holds one
-    pub problem: PathBuf,
+    /// A problem.toml, or the folder that holds one [default: the current folder]
+    #[arg(value_name = "PROBLEM")]
+    named: Option<PathBuf>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
-    pub data: Vec<PathBuf>,
+    data: Vec<PathBuf>,
     /// Folder for results [default: out/<name of the problem>]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -40,10 +41,31 @@ pub struct Input {
     pub results: Results,
 }
 
+/// The problem among the arguments, and the files of `--data`, which takes what follows: the last of several is the problem where
+/// none is named, if it is a folder or a TOML file, as no table is.
+fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [PathBuf]) {
+    let is_problem = |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
+    match (named, data) {
+        (Some(named), data) => (named, data),
+        (None, [data @ .., last]) if !data.is_empty() && is_problem(last) => (last, data),
+        (None, data) => (Path::new("."), data),
+    }
+}
+
 impl Common {
+    /// The problem's file or folder.
+    pub fn problem(&self) -> &Path {
+        split(self.named.as_deref(), &self.data).0
+    }
+
+    /// The measurement files that are named, none where those of the problem count.
+    pub fn data(&self) -> &[PathBuf] {
+        split(self.named.as_deref(), &self.data).1
+    }
+
     /// Reads the problem and its measurements, once `command` may write the results called `names`.
     pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
-        let problem = Problem::read(&self.problem)?;
+        let problem = Problem::read(self.problem())?;
         let results = self.results(command, &problem, &[], names)?;
         let data = self.measurements(&problem)?;
         Ok(Input { problem, data, results })
@@ -59,6 +81,17 @@ impl Common {
         Dataset::of(problem, measurements)
     }
 
+    /// Says that the search for effects leaves orientations out, where the problem fits them.
+    pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
+        if problem.data.fits_orientation {
+            let warning = Warning { location: problem.data.location.clone(), kind: WarningKind::OrientationLeftOut };
+            if !self.quiet {
+                diagnostic::print_warnings(std::slice::from_ref(&warning));
+            }
+            data.measurements.warnings.push(warning);
+        }
+    }
+
     /// Where `command` writes the results called `names`; besides problem and data it reads `others`.
     pub fn results(
         &self,
@@ -68,23 +101,28 @@ impl Common {
         names: &[&str],
     ) -> Result<Results, WriteError> {
         let own = [self.problem_file()];
-        let inputs = [&own, others, &problem.data.files, &self.data].concat();
+        let inputs = [&own, others, &problem.data.files, self.data()].concat();
         Results::claim(command, self.folder(problem), inputs, names, (self.force, self.quiet))
     }
 
     /// The measurement files.
     pub fn files<'a>(&'a self, problem: &'a Problem) -> &'a [PathBuf] {
-        if self.data.is_empty() { &problem.data.files } else { &self.data }
+        if self.data().is_empty() { &problem.data.files } else { self.data() }
     }
 
     /// The problem file itself.
     pub fn problem_file(&self) -> PathBuf {
-        if self.problem.is_dir() { self.problem.join("problem.toml") } else { self.problem.clone() }
+        let problem = self.problem();
+        if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Folder for the results of `problem`.
+    /// Folder for the results of `problem`; those of a `problem.closed.toml` do not go where those of the problem went that it
+    /// comes from.
     fn folder(&self, problem: &Problem) -> PathBuf {
-        self.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name))
+        let file = self.problem_file();
+        let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));
+        let name = variant.map_or_else(|| problem.name.clone(), |variant| format!("{}-{variant}", problem.name));
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
     /// Whether people read along.

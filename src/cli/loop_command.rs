@@ -30,14 +30,15 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Closes the loop, writes `loop.json`, `problem.closed.toml` and both reports, and prints the story.
+/// Closes the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and prints the story.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let (problem, text) = Problem::read_with_text(&common.problem)?;
+    let (problem, text) = Problem::read_with_text(common.problem())?;
     common.files(&problem).iter().try_for_each(|file| nameable(file))?;
-    let names = ["loop.json", "problem.closed.toml", REPORT[0], REPORT[1]];
+    let names = ["loop.json", "problem.closed.toml", "residuals.csv", REPORT[0], REPORT[1]];
     let results = common.results("loop", &problem, &[], &names)?;
-    let data = common.measurements(&problem)?;
+    let mut data = common.measurements(&problem)?;
+    common.say_of_orientation(&problem, &mut data);
     let line = common.talks().then(Line::new);
     let options = Options::default().with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::close(&problem, &data, &options);
@@ -53,6 +54,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let texts = [
         ("loop.json", json.as_str()),
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
+        (
+            "residuals.csv",
+            &report::residuals_csv(&data.measurements, &closure.after.residuals(&closure.closed, &data)?),
+        ),
     ];
     let told = report::loop_report(&problem, &closure, &shown);
     results.write_report(&texts, &told)?;
@@ -60,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print_json(&json)?;
     } else if common.talks() {
         output::print(&report::loop_text(&problem, &closure))?;
-        let names = "loop.json, problem.closed.toml, report.md, report.html";
+        let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))

@@ -13,6 +13,7 @@ mod outcome;
 mod output;
 mod plan;
 mod poses;
+mod predict;
 mod progress;
 mod simulate;
 mod study;
@@ -52,6 +53,8 @@ enum Command {
     Trace(trace::Arguments),
     /// Find the effects that a problem lacks and add them, until nothing is left to find.
     Loop(loop_command::Arguments),
+    /// Say where an identified arm will be, and what measurements leave of that, without another fit.
+    Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
@@ -84,6 +87,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Loop(arguments) => loop_command::run(&arguments),
+        Command::Predict(arguments) => predict::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),

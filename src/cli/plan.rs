@@ -4,8 +4,9 @@ use std::error::Error;
 use std::path::Path;
 
 use clap::{Args, ValueEnum, value_parser};
-use flexcal::design::{self, Candidates, Criterion, Pair, PlanOptions, PlanProgress};
+use flexcal::design::{self, Candidates, Criterion, Pair, PlanOptions, PlanProgress, Workspace};
 use flexcal::measurement::Measurements;
+use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report;
 
@@ -26,6 +27,7 @@ Examples:
   flexcal plan problems/lunar-sampler --truth problems/lunar-sampler/TRUTH.toml --poses 28
   flexcal plan my-arm --poses 40 --candidates reachable.csv --criterion D
   flexcal plan my-arm --poses 10 --data first.csv --seed 7
+  flexcal plan my-arm --poses 30 --workspace-mm=-800,800,-800,800,100,1200 --keep-out-mm 1,0,0,250
   flexcal plan my-arm --poses 12 --separate 'gear-ratio = { joint = 3 }' 'joint-harmonic = { joint = 3, orders = [1] }'"
 )]
 pub struct Arguments {
@@ -40,8 +42,50 @@ pub struct Arguments {
     /// Choose the poses that tell two effects apart; each as trace and loop name it and as a problem declares it
     #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
     separate: Vec<String>,
+    /// Box that the nominal target stays in, frame of the arm's base
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true)]
+    workspace_mm: Option<[f64; 6]>,
+    /// Plane that the nominal target stays beyond, frame of the arm's base: N·p ≥ D for a normal N
+    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    keep_out_mm: Vec<[f64; 4]>,
     #[command(flatten)]
     source: Source,
+}
+
+/// So many finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers = text.split(',').map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));
+    let numbers: Option<Vec<f64>> = numbers.collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| format!("not {N} numbers with commas between them"))
+}
+
+/// Where the target may go, if anything is said.
+fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError> {
+    let room = match arguments.workspace_mm.map(|room| room.map(|x| x * 1e-3)) {
+        Some([x0, x1, y0, y1, z0, z1]) if x0 < x1 && y0 < y1 && z0 < z1 => {
+            Some([Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)])
+        }
+        Some(_) => return Err(WorkspaceError::Empty),
+        None => None,
+    };
+    let plane = |[x, y, z, least]: [f64; 4]| {
+        let normal = Vector3::new(x, y, z).try_normalize(0.0).ok_or(WorkspaceError::NoNormal)?;
+        Ok((normal, least * 1e-3))
+    };
+    let planes = arguments.keep_out_mm.iter().copied().map(plane).collect::<Result<Vec<_>, _>>()?;
+    let said = room.is_some() || !planes.is_empty();
+    Ok(said.then_some(Workspace { room, planes }))
+}
+
+/// A workspace that makes no sense.
+#[derive(Debug, thiserror::Error)]
+enum WorkspaceError {
+    #[error("--workspace-mm: the box is empty; write X0,X1,Y0,Y1,Z0,Z1, the lesser of each pair first")]
+    Empty,
+    #[error("--keep-out-mm: 0,0,0 is no normal of a plane")]
+    NoNormal,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -74,7 +118,11 @@ impl From<CriterionArgument> for Criterion {
 /// Plans, writes `plan.csv` and `plan.json`, and prints what the plan promises.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
-    let declared = Problem::read(&common.problem)?;
+    let declared = Problem::read(common.problem())?;
+    if declared.data.fits_orientation && !common.quiet {
+        diagnostic::warn("poses are chosen by what their positions tell; check counts orientations as well");
+    }
+    let declared = declared.positions_alone();
     let pair = pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let results = common.results("plan", &problem, &source.files(), &["plan.csv", "plan.json"])?;
@@ -82,10 +130,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
     };
-    let given = if common.data.is_empty() {
+    let given = if common.data().is_empty() {
         None
     } else {
-        let (given, warnings) = Measurements::read_poses(&common.data, &problem)?;
+        let (given, warnings) = Measurements::read_poses(common.data(), &problem)?;
         if !common.quiet {
             diagnostic::print_warnings(&warnings);
         }
@@ -99,7 +147,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             line.say(|| format!("{what}, sweep {sweep}: ln of the criterion {value:.4}"));
         }
     };
+    let workspace = workspace(arguments)?;
     let options = PlanOptions {
+        workspace: workspace.as_ref(),
         poses: arguments.poses as usize,
         criterion: &criterion,
         seed: source.seed,

@@ -4,8 +4,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
-use flexcal::problem::{HeldOut, Problem};
-use flexcal::simulate::{Simulation, Truth, simulate};
+use flexcal::error::InputError;
+use flexcal::measurement::Measurements;
+use flexcal::problem::{HeldOut, PoseConditions, Problem};
+use flexcal::simulate::{Simulation, Truth, simulate, simulate_poses};
 
 use super::outcome::Outcome;
 use super::output::Results;
@@ -15,16 +17,21 @@ use super::{diagnostic, output};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   flexcal simulate problems/lunar-sampler --truth TRUTH.toml --poses 78 --seed 1
-  flexcal identify problems/lunar-sampler --data out/lunar-sampler/measurements.csv")]
+  flexcal identify problems/lunar-sampler --data out/lunar-sampler/measurements.csv
+  flexcal simulate problems/lunar-sampler --truth TRUTH.toml --data out/lunar-sampler/plan.csv --seed 1 --out out/rehearsed")]
 pub struct Arguments {
-    /// A problem.toml, or the folder that holds one
+    /// A problem.toml, or the folder that holds one [default: the current folder]
+    #[arg(default_value = ".", hide_default_value = true)]
     problem: PathBuf,
     /// How the true arm differs from the problem, and from where poses are drawn; or the folder that holds it
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
-    /// Number of poses
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
-    poses: u32,
+    /// Number of poses, drawn in the ranges of [poses]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000), required_unless_present = "data")]
+    poses: Option<u32>,
+    /// Tables of poses to measure instead, such as plan.csv; positions in them do not count
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "poses")]
+    data: Vec<PathBuf>,
     /// Seed of every random number
     #[arg(long, value_name = "S")]
     seed: u64,
@@ -48,11 +55,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let truth = Truth::read(&arguments.truth, &problem)?;
     let inside = |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
     let own = [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
-    let inputs = [&own[..], &problem.data.files].concat();
+    let inputs = [&own[..], &problem.data.files, &arguments.data].concat();
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name));
     let (force, quiet) = (arguments.force, arguments.quiet);
     let results = Results::claim("simulate", folder, inputs, &["measurements.csv", "truth.json"], (force, quiet))?;
-    let simulation = simulate(&problem, &truth, arguments.poses as usize, arguments.seed)?;
+    let simulation = match arguments.poses {
+        Some(poses) => simulate(&problem, &truth, poses as usize, arguments.seed)?,
+        None => simulate_poses(&problem, &truth, poses_of(arguments, &problem)?, arguments.seed)?,
+    };
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is divided by whoever reads the rows.
@@ -72,6 +82,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     Ok(Outcome::Done)
+}
+
+/// What the rows of the tables set.
+fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<PoseConditions>, InputError> {
+    let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
+    if !arguments.quiet {
+        diagnostic::print_warnings(&warnings);
+    }
+    Ok((0..rows.len()).map(|row| rows.conditions(row)).collect())
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {

@@ -25,7 +25,8 @@ pub struct Arguments {
 /// Fits, traces what is left, writes `trace.json`, and prints the ranking.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data, results } = common.read("trace", &["trace.json"])?;
+    let Input { problem, mut data, results } = common.read("trace", &["trace.json"])?;
+    common.say_of_orientation(&problem, &mut data);
     let line = common.talks().then(Line::new);
     let options = Options::default().with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::trace(&problem, &data, &options);

@@ -196,18 +196,13 @@ impl<'a> Table<'a> {
             joints: self.joints,
             configurations: self.configurations,
             positions: vec![Vector3::zeros(); count],
-            sigma: None,
             payload: (!self.ranges.payloads.is_empty()).then_some(self.payload),
             hoist: self.ranges.hoist.map(|_| self.hoist),
             temperature: self.ranges.temperature.map(|_| self.temperature),
             time: (0_u32..).take(count).map(f64::from).collect(),
-            time_measured: false,
             approach: self.ranges.approach.then_some(self.approach),
-            pose: None,
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },
-            target: None,
-            marked_held_out: None,
-            warnings: Vec::new(),
+            ..Measurements::default()
         }
     }
 }

@@ -70,6 +70,8 @@ pub struct Check {
     pub detection: Detection,
     /// Measured coordinates.
     pub coordinates: usize,
+    /// Of these of each pose: three, or six with its orientation.
+    pub of_pose: usize,
     /// How many of the poses differ from each other.
     pub different: usize,
     /// Free parameters without a prior.
@@ -134,7 +136,8 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         noise,
         detection: detectable(problem, &poses)?,
         growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise, count)),
-        coordinates: 3 * count,
+        coordinates: told.coordinates * count,
+        of_pose: told.coordinates,
         different: different(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
@@ -152,7 +155,7 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 impl Check {
     /// Whether the poses decide every parameter as far as poses of their kind can, and measure as many coordinates as parameters have no prior.
     pub fn suffices(&self) -> bool {
-        self.forecast.open <= self.growth.open && 3 * self.different >= self.without_prior
+        self.forecast.open <= self.growth.open && self.of_pose * self.different >= self.without_prior
     }
 }
 

@@ -4,6 +4,10 @@ use std::path::PathBuf;
 
 use crate::error::{InputError, Location};
 
+/// How to free the geometry of an arm.
+const FREE: &str = "write [parameters] with lines such as \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \
+                    \"joint*.theta\" = { sigma_deg = 1.0 }, \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }";
+
 /// Why there is no plan and no forecast.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -31,7 +35,7 @@ pub enum DesignError {
         file: PathBuf,
     },
     /// No parameter is free.
-    #[error("{}: parameters: no parameter is free, so there is nothing to identify", file.display())]
+    #[error("{}: parameters: no parameter is free, so there is nothing to identify; {FREE}", file.display())]
     NothingFree {
         /// The problem file.
         file: PathBuf,

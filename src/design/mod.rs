@@ -16,6 +16,7 @@ mod scan;
 mod sensitivity;
 mod separate;
 mod site;
+mod workspace;
 
 pub use candidate_poses::Extremes;
 pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
@@ -28,3 +29,4 @@ pub use plan::{Candidates, Plan, PlanOptions, PlanProgress, plan};
 pub use sensitivity::Sensitivity;
 pub use separate::{Pair, Separated, separate};
 pub use site::Site;
+pub use workspace::Workspace;

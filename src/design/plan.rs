@@ -4,7 +4,7 @@ use rand::Rng;
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
-use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site};
+use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace};
 use crate::measurement::{Measurements, different};
 use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
@@ -48,6 +48,8 @@ pub struct PlanOptions<'a> {
     pub criterion: &'a Criterion,
     /// Seed of every random number.
     pub seed: u64,
+    /// Where the target may go; `None`: anywhere.
+    pub workspace: Option<&'a Workspace>,
     /// Told of every sweep; from several threads at once.
     pub progress: Option<&'a (dyn Fn(PlanProgress) + Sync)>,
 }
@@ -111,13 +113,20 @@ pub fn plan(
     let mut tables = vec![&usual];
     tables.extend(given);
     let site = Site::new(problem, &tables)?;
+    let admitted = |(table, told): (Measurements, Sensitivity)| match options.workspace {
+        Some(workspace) => {
+            let rows = site.inside(&table, workspace);
+            (table.select(&rows), told.select(&rows))
+        }
+        None => (table, told),
+    };
     let parameters = &site.model.parameters;
     let measured = given.map_or(0, |given| different(&given.pose_numbers(problem), 0..given.len()));
     let given = given.map(|given| site.at_rest(given).1);
-    let (mut table, usual) = site.at_rest(&usual);
+    let (mut table, usual) = admitted(site.at_rest(&usual));
     let mut all = usual.clone();
     if let Some(ends) = ends {
-        let (ends, sensitivity) = site.at_rest(&ends);
+        let (ends, sensitivity) = admitted(site.at_rest(&ends));
         table = table.and(&ends);
         all = all.and(&sensitivity);
     }
@@ -212,9 +221,15 @@ impl Found {
             let stream = FIRST_ROUND + number * ROUNDS.len() as u64 + round;
             let about = ranges.vary(problem, &self.poses, each, reach, (options.seed, stream));
             let told = site.sensitivity(&about, None);
+            let inside: Vec<usize> = match options.workspace {
+                Some(workspace) => site.inside(&about, workspace),
+                None => (0..about.len()).collect(),
+            };
             // The poses themselves come first, each before those about it.
             let is_own = |k: usize| k.is_multiple_of(each + 1);
-            let kept: Vec<usize> = (0..about.len()).filter(|&k| is_own(k) || told.is_finite(k)).collect();
+            let kept: Vec<usize> = (0..about.len())
+                .filter(|&k| is_own(k) || (told.is_finite(k) && inside.binary_search(&k).is_ok()))
+                .collect();
             let own = (0..kept.len()).filter(|&k| is_own(kept[k])).collect();
             let told = told.select(&kept);
             let end = exchange.with_candidates(&told).improve(own, |sweep, value| options.tell(None, sweep, value));

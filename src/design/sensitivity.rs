@@ -12,8 +12,10 @@ const TOGETHER: usize = 64;
 /// Derivatives of the measured coordinates of some poses, over their σ, with respect to every free parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Jᵀ, shape = (parameters, 3 · poses) [1 / unit of x]; not finite where a pose has no equilibrium.
+    /// Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite where a pose has no equilibrium.
     pub rows: DMatrix<f64>,
+    /// Measured coordinates of a pose: three, or six with its orientation.
+    pub coordinates: usize,
 }
 
 impl Sensitivity {
@@ -21,30 +23,31 @@ impl Sensitivity {
     pub fn of(model: &Model, poses: &[Pose], at: &DVector<f64>) -> Self {
         let n = model.parameters.len();
         let residuals = PoseResiduals::new(model, poses.to_vec(), (0..n).collect(), at.clone());
+        let coordinates = residuals.rows_per_item();
         let starts: Vec<usize> = (0..poses.len()).step_by(TOGETHER).collect();
         let blocks: Vec<(usize, Block)> = starts
             .into_par_iter()
             .map(|start| {
                 let items = start..(start + TOGETHER).min(poses.len());
-                let mut block = Block::zeros(3 * items.len(), n);
+                let mut block = Block::zeros(coordinates * items.len(), n);
                 residuals.linearise(at, items, &mut block);
                 (start, block)
             })
             .collect();
-        let mut rows = DMatrix::zeros(n, 3 * poses.len());
+        let mut rows = DMatrix::zeros(n, coordinates * poses.len());
         for (start, block) in blocks {
             for j in 0..n {
                 for (k, value) in block.column(j).iter().enumerate() {
-                    rows[(j, 3 * start + k)] = *value;
+                    rows[(j, coordinates * start + k)] = *value;
                 }
             }
         }
-        Self { rows }
+        Self { rows, coordinates }
     }
 
     /// Number of poses.
     pub fn len(&self) -> usize {
-        self.rows.ncols() / 3
+        self.rows.ncols() / self.coordinates
     }
 
     /// Whether there is no pose.
@@ -52,9 +55,9 @@ impl Sensitivity {
         self.len() == 0
     }
 
-    /// Jᵢᵀ of one pose, shape = (parameters, 3).
+    /// Jᵢᵀ of one pose, shape = (parameters, coordinates).
     pub fn pose(&self, pose: usize) -> DMatrixView<'_, f64> {
-        self.rows.columns(3 * pose, 3)
+        self.rows.columns(self.coordinates * pose, self.coordinates)
     }
 
     /// Whether the arm comes to rest in a pose.
@@ -65,11 +68,12 @@ impl Sensitivity {
     /// The poses with these numbers, in this order.
     #[must_use]
     pub fn select(&self, poses: &[usize]) -> Self {
-        let mut rows = DMatrix::zeros(self.rows.nrows(), 3 * poses.len());
+        let of_pose = self.coordinates;
+        let mut rows = DMatrix::zeros(self.rows.nrows(), of_pose * poses.len());
         for (k, &pose) in poses.iter().enumerate() {
-            rows.columns_mut(3 * k, 3).copy_from(&self.pose(pose));
+            rows.columns_mut(of_pose * k, of_pose).copy_from(&self.pose(pose));
         }
-        Self { rows }
+        Self { rows, coordinates: of_pose }
     }
 
     /// These poses, then those of `other`.
@@ -79,7 +83,7 @@ impl Sensitivity {
         let mut rows = DMatrix::zeros(n, own + other.rows.ncols());
         rows.columns_mut(0, own).copy_from(&self.rows);
         rows.columns_mut(own, other.rows.ncols()).copy_from(&other.rows);
-        Self { rows }
+        Self { rows, coordinates: self.coordinates }
     }
 
     /// Σ JᵢᵀJᵢ, shape = (parameters, parameters).

@@ -3,11 +3,11 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::{DesignError, Sensitivity};
+use super::{DesignError, Sensitivity, Workspace};
 use crate::identify::Placement;
 use crate::measurement::Measurements;
-use crate::model::Model;
 use crate::model::parameter::{BeamField, Parameter, Slot};
+use crate::model::{Model, SeenOrientation};
 use crate::problem::Problem;
 use crate::random;
 
@@ -86,8 +86,23 @@ impl<'a> Site<'a> {
             pose.base = place(&self.bases, &placement.bases[pose.base]);
             pose.target = place(&self.targets, &placement.targets[pose.target]);
             pose.sigma = unit.unwrap_or(pose.sigma);
+            let turn = self.problem.data.orientation_sigma.filter(|_| self.problem.data.fits_orientation);
+            // In a unit of length, what counts are positions.
+            pose.orientation = turn.filter(|_| unit.is_none()).map(|sigma| SeenOrientation { axes: None, sigma });
         }
         Sensitivity::of(&self.model, &poses, at)
+    }
+
+    /// Rows of a table in which the nominal target stays in a workspace.
+    pub(super) fn inside(&self, table: &Measurements, workspace: &Workspace) -> Vec<usize> {
+        let (rows, nominal) = ((0..table.len()).collect::<Vec<_>>(), vec![0.0; self.model.parameters.len()]);
+        let mut poses = Placement::of(table).poses(table, &rows, 1.0);
+        // One target is as good as another to say where the tool is.
+        for pose in &mut poses {
+            pose.target = 0;
+        }
+        let points = self.model.points(&poses, &nominal);
+        rows.into_iter().filter(|&row| points[row].is_some_and(|point| workspace.holds(&point))).collect()
     }
 
     /// A table without the poses in which the arm does not come to rest, and what the others tell.

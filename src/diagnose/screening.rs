@@ -82,7 +82,8 @@ pub fn trace_by(
 ) -> Result<Trace, IdentifyError> {
     rules.check()?;
     let data = Data::new(data, rules).with_candidates(&options.candidates);
-    let fitted = Fitted::new(problem.clone(), &data, options)?;
+    // Evidence is of positions: so is the fit.
+    let fitted = Fitted::new(problem.positions_alone(), &data, options)?;
     Ok(Trace { evidence: weigh(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
 }
 

@@ -223,7 +223,9 @@ pub enum InputErrorKind {
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,
-    #[error("no row is said to be held out; add held_out here or a column split")]
+    #[error(
+        "no row is said to be held out; write held_out = {{ fraction = 0.3, seed = 1 }} in [data], or add a column split"
+    )]
     NoHeldOut,
     #[error("no rows are left to fit: {cause}")]
     NoIdentificationRows { cause: NoRows },
@@ -241,8 +243,32 @@ pub enum InputErrorKind {
     EmptyTable,
     #[error("no rows below the header")]
     NoRowsBelowHeader,
-    #[error("columns are set apart by commas, not by {found:?}")]
-    NotCommas { found: char },
+    #[error("an Excel workbook; save its sheet as CSV")]
+    Workbook,
+    #[error("columns are set apart by {found:?}; write delimiter = \"{found}\" in [data.format]")]
+    OtherDelimiter { found: char },
+    #[error("a decimal comma goes with another delimiter than a comma")]
+    DecimalDelimiter,
+    #[error("{} has no such column{}; {}", file.display(), meant(name, known), list("there are", known, "its header is empty"))]
+    NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
+    #[error("{} has several columns of this name; say which by its place, as in \"#{place}\"", file.display())]
+    AmbiguousColumn { file: PathBuf, place: usize },
+    #[error("not a column that flexcal knows{}", question(meant.as_deref()))]
+    UnknownMeaning { meant: Option<String> },
+    #[error("the position of every row is the one that stands for nothing measured")]
+    AllMissing,
+    #[error("qx, qy, qz, qw are no rotation: their squares do not add up to 1")]
+    NotAQuaternion,
+    #[error(
+        "orientation is to be fitted, and the measurements hold none; add rx_deg, ry_deg, rz_deg or qx, qy, qz, qw"
+    )]
+    NoOrientation,
+    #[error("orientation is weighed against position; write position_sigma_mm too, or a column sigma_mm")]
+    NoPositionSigma,
+    #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
+    NotATime { value: String },
+    #[error("\"{value}\" is not a number; where numbers have a decimal comma, write decimal = \",\" in [data.format]")]
+    DecimalComma { value: String },
     #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
     MissingColumn { write: String, near: Option<String> },
     #[error("not a column that is known; a letter off {meant}: write that, or a name that is not so near")]
@@ -287,6 +313,12 @@ pub enum NoRows {
 pub enum WarningKind {
     #[error("not a column that is known{}; ignored", question(meant.as_deref()))]
     ColumnIgnored { meant: Option<String> },
+    #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
+    Unmapped { names: Vec<String> },
+    #[error("nothing was measured in {rows} row{}, the first here: left out", plural(*rows))]
+    RowsMissing { rows: usize },
+    #[error("orientations take no part in the search for effects: its fits and its evidence are of positions")]
+    OrientationLeftOut,
     #[error("joint {joint} takes no q; ignored")]
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]

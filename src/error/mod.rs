@@ -13,6 +13,8 @@ pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::{nearest, one_typo};
 pub use plain::{is_hidden, one_line, veiled, visible};
 
+/// How UTF-8 text may begin.
+pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";
 /// How UTF-16 text begins, in either order of its bytes.
 pub(crate) const BYTE_ORDER_MARKS: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
 

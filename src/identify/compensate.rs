@@ -1,26 +1,32 @@
 //! The purpose of it all: commands that bring the arm as it is to where it should be.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::Placement;
+use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
 use crate::model::{Model, Pose, PoseResiduals};
-use crate::problem::PoseView;
-use crate::problem::Problem;
+use crate::problem::{JointKind, PoseView, Problem};
 
 use super::stage::StageError;
 
 /// 1 σ of the target position against 1 σ = 1 (rad or m) of the way from the seed: the position decides, the seed breaks
 /// ties \[m\].
 const POSITION_WEIGHT: f64 = 1e-6;
+/// 1 σ of the target orientation, likewise \[rad\].
+const ORIENTATION_WEIGHT: f64 = 1e-6;
 /// A command has settled when a pass changes it by less [rad or m].
 const SETTLED: f64 = 1e-10;
 /// Passes after which a command that does not settle is taken as it is: its miss says how good it is.
 const MAX_PASSES: usize = 20;
 /// A target counts as reached within this distance \[m\].
 const REACHED: f64 = 1e-6;
+/// … and turned by no more than this from it \[rad\].
+const REACHED_TURN: f64 = 1e-6;
+/// Coordinates of a pose: with as many moving joints an arm that is not at the edge of its reach has a command for it.
+const POSE: usize = 6;
 
 /// A command for one target.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,20 +39,73 @@ pub struct Command {
     pub miss: Vector3<f64>,
     /// Distance to the target before: with the seed as command \[m\].
     pub seed_miss: f64,
+    /// Rotation vector from the predicted to the desired orientation, measuring frame \[rad\], where one is desired.
+    pub turn: Option<Vector3<f64>>,
+    /// Angle to the desired orientation before \[rad\], likewise.
+    pub seed_turn: Option<f64>,
 }
 
 impl Command {
     /// Whether the arm gets there.
     pub fn is_reached(&self) -> bool {
-        self.miss.norm() <= REACHED
+        self.miss.norm() <= REACHED && self.turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
     }
 }
 
-/// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the
-/// row's position, within the joint limits of `problem`.
+/// Where targets without positions are: where the nominal arm would have been with the commands of the rows, on the bases and with
+/// the tools of the full parameter vector `x`, measuring frame. With their orientations for an arm of six moving joints and more;
+/// with fewer it could not have both.
 ///
-/// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖q − seed‖²: Newton's method on the position by dual numbers, with
-/// redundancy resolved towards the seed. Where effects follow the command (a transmission ratio, harmonics), they are
+/// # Errors
+/// The nominal arm has no equilibrium in one of the rows.
+pub fn waypoints(
+    problem: &Problem,
+    model: &Model,
+    x: &DVector<f64>,
+    rows: &Measurements,
+) -> Result<Measurements, InputError> {
+    let placement = Placement::of(rows);
+    let nominal = DVector::from_iterator(
+        x.len(),
+        model.parameters.iter().zip(x).map(|(own, x)| if own.slot.is_placement() { *x } else { 0.0 }),
+    );
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let poses = placement.poses(rows, &all, 1.0);
+    let mut targets = rows.clone();
+    if problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed).count() >= POSE {
+        let turns = model.orientations(&poses, nominal.as_slice());
+        targets.orientations = Some(turns.into_iter().map(UnitQuaternion::from_scaled_axis).collect());
+    } else {
+        targets.orientations = None;
+    }
+    targets.positions = model.predict(poses, &nominal);
+    targets.position_measured = true;
+    match targets.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
+        Some(row) => Err(rows.location(row).error(InputErrorKind::NoEquilibrium)),
+        None => Ok(targets),
+    }
+}
+
+/// Targets that are given in the frame of the arm's base, as seen from the measuring frame.
+pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
+    let (placement, bases) = (Placement::of(targets), model.base_frames(x.as_slice()));
+    let base = |row: usize| &bases[placement.base_of(row)];
+    let mut seen = targets.clone();
+    for (row, position) in seen.positions.iter_mut().enumerate() {
+        *position = base(row).point(position);
+    }
+    for (row, orientation) in seen.orientations.iter_mut().flatten().enumerate() {
+        let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&base(row).axes));
+        *orientation = UnitQuaternion::from(turn) * *orientation;
+    }
+    seen
+}
+
+/// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the
+/// row's position, and to its orientation where it has one, within the joint limits of `problem`.
+///
+/// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q − seed‖²: Newton's method by dual
+/// numbers, with redundancy resolved towards the seed. Where effects follow the command (a transmission ratio, harmonics), they are
 /// taken at the command found so far, until it settles.
 ///
 /// # Errors
@@ -63,13 +122,15 @@ pub fn compensate(
     let unknowns: Vec<usize> = (0..arm.parameters.len()).collect();
     let moving = arm.moving_joints();
     let mut commands = Vec::with_capacity(rows.len());
-    for (row, mut pose) in placement.poses(targets, &rows, POSITION_WEIGHT).into_iter().enumerate() {
+    let weights = (POSITION_WEIGHT, Some(ORIENTATION_WEIGHT));
+    for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate() {
         pose.sigma = POSITION_WEIGHT;
         let seed = targets.configuration(row);
         let n = moving.len();
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
-            arm.residuals(vec![pose], &DVector::zeros(n))[0]
+            let turn = pose.orientation.map(|_| arm.orientation_residuals(vec![pose], &DVector::zeros(n))[0]);
+            (arm.residuals(vec![pose], &DVector::zeros(n))[0], turn)
         };
         let mut configuration = seed.to_vec();
         for _ in 0..MAX_PASSES {
@@ -92,8 +153,9 @@ pub fn compensate(
                 break;
             }
         }
-        let (miss, seed_miss) = (at(&configuration), at(seed).norm());
-        commands.push(Command { row, configuration, miss, seed_miss });
+        let ((miss, turn), (before, turn_before)) = (at(&configuration), at(seed));
+        let (seed_miss, seed_turn) = (before.norm(), turn_before.map(|turn| turn.norm()));
+        commands.push(Command { row, configuration, miss, seed_miss, turn, seed_turn });
     }
     Ok(commands)
 }

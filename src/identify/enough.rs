@@ -34,15 +34,16 @@ impl Enough {
         let numbers = measurements.pose_numbers(problem);
         let of_arm = measurements.arm_pose_numbers(problem);
         let poses = different(&of_arm, split.identification.iter().copied());
-        let coordinates = coordinates(&numbers, &of_arm, placement, &split.identification);
+        let of_point = if fitting.turn_sigma.is_some() { BODY } else { 3 };
+        let coordinates = coordinates((&numbers, &of_arm), placement, &split.identification, of_point);
         let parameters = unknowns.len();
         let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
         let (own, theirs) = (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
         let flag = (coordinates < without_prior)
             .then(|| QualityFlag::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
-            .or_else(|| underdetermined(model, placement, &numbers, (rows, false), own))
-            .or_else(|| underdetermined(model, placement, &numbers, (later, true), theirs))
+            .or_else(|| underdetermined((model, placement), (&numbers, of_point), (rows, false), own))
+            .or_else(|| underdetermined((model, placement), (&numbers, of_point), (later, true), theirs))
             .or_else(|| undetermined(fitting, &numbers, rows, at, own))
             .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
         let too_few = (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
@@ -51,18 +52,23 @@ impl Enough {
     }
 }
 
-/// Coordinates that tell of the arm and of its targets: three for each different point, but no more than six for a pose of the
-/// arm; the shape of its targets is one measurement more.
-fn coordinates(numbers: &[usize], of_arm: &[usize], placement: &Placement, rows: &[usize]) -> usize {
+/// Coordinates that tell of the arm and of its targets: three for each different point, six with its orientation, but no more than
+/// six for a pose of the arm; the shape of its targets is one measurement more.
+fn coordinates(
+    (numbers, of_arm): (&[usize], &[usize]),
+    placement: &Placement,
+    rows: &[usize],
+    of_point: usize,
+) -> usize {
     let mut points: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     let mut targets = BTreeSet::new();
     for &row in rows {
         points.entry(of_arm[row]).or_default().insert(numbers[row]);
         targets.insert(placement.target_of(row));
     }
-    let of_poses: usize = points.values().map(|own| (3 * own.len()).min(BODY)).sum();
-    let several = points.values().any(|own| 3 * own.len() > BODY);
-    of_poses + if several { (3 * targets.len()).saturating_sub(BODY) } else { 0 }
+    let of_poses: usize = points.values().map(|own| (of_point * own.len()).min(BODY)).sum();
+    let several = points.values().any(|own| of_point * own.len() > BODY);
+    of_poses + if several { (of_point * targets.len()).saturating_sub(BODY) } else { 0 }
 }
 
 /// `base[A]`, or `base` where there is one without a name.
@@ -102,14 +108,13 @@ fn undetermined(
 /// poses of `rows` than parameters of its own without a prior; of the parameters that are `varied` there. `numbers` are those
 /// of the poses of all rows. Where `judged`, the rows have to leave something to judge by as well.
 fn underdetermined(
-    model: &Model,
-    placement: &Placement,
-    numbers: &[usize],
+    (model, placement): (&Model, &Placement),
+    (numbers, of_point): (&[usize], usize),
     (rows, judged): (&[usize], bool),
     varied: impl Fn(usize) -> bool,
 ) -> Option<QualityFlag> {
     let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
-        let coordinates = 3 * different(numbers, rows.iter().copied().filter(|&row| used(row)));
+        let coordinates = of_point * different(numbers, rows.iter().copied().filter(|&row| used(row)));
         let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };

@@ -39,6 +39,17 @@ pub struct Errors {
     pub held_out: ErrorSummary,
 }
 
+/// Errors of orientation \[rad\]: lengths and components of the rotation vectors from predicted to measured, measuring frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrientationErrors {
+    /// Of the nominal arm, with base and target fitted where they are free.
+    pub registered: Errors,
+    /// Of the identified arm.
+    pub fitted: Errors,
+    /// 1 σ about each axis that the fit took \[rad\].
+    pub sigma_taken: f64,
+}
+
 impl ErrorSummary {
     /// Of the errors measured − predicted \[m\].
     pub fn of(errors: &[Vector3<f64>]) -> Self {

@@ -6,12 +6,12 @@ use super::assumed::Assumed;
 use super::placement::HeldOutOnly;
 use super::registration::register;
 use super::stage::{Gauge, Stage, StageEnd, StageError};
-use super::{ErrorSummary, Errors, Placement, ProgressSink, SolverChoice, Strategy};
+use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::least_squares::Loss;
 use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::measurement::{Measurements, Split};
-use crate::model::Model;
 use crate::model::parameter::Parameter;
+use crate::model::{Model, Pose};
 
 /// Sweeps after which a sequential strategy is given up.
 const MAX_SWEEPS: usize = 2000;
@@ -37,8 +37,12 @@ pub(super) struct Fitting<'a> {
     pub max_steps: Option<u64>,
     /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
     pub sigma: f64,
+    /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
+    pub turn_sigma: Option<f64>,
     /// What the fit makes of each row's σ.
     pub assumed: Assumed,
+    /// What it makes of the σ of orientations.
+    pub assumed_turn: Assumed,
 }
 
 /// Where a fit ended.
@@ -69,17 +73,26 @@ impl<'a> Fitting<'a> {
         all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter)).map(|(k, _)| k).collect()
     }
 
+    /// Some rows as poses, with the σ that were declared.
+    fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
+        self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
+    }
+
     /// A stage on some rows, with the σ that the fit takes.
     pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
-        let mut poses = self.placement.poses(self.measurements, rows, self.sigma);
+        let mut poses = self.poses(rows);
         let declared = poses.iter().map(|pose| pose.sigma).collect();
         for pose in &mut poses {
             pose.sigma = self.assumed.of(pose.sigma);
+            if let Some(orientation) = &mut pose.orientation {
+                orientation.sigma = self.assumed_turn.of(orientation.sigma);
+            }
         }
         Stage {
             model: self.model,
             poses,
             declared,
+            declared_turn: self.turn_sigma,
             unknowns,
             solver: self.solver,
             max_steps: Settings::default().max_iterations,
@@ -125,12 +138,12 @@ impl<'a> Fitting<'a> {
     /// The nominal arm with bases and targets fitted where they are free.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
-        let mut poses = self.placement.poses(self.measurements, &self.split.identification, self.sigma);
+        let mut poses = self.poses(&self.split.identification);
         let mut known = vec![false; self.placement.bases.len()];
         for pose in &poses {
             known[pose.base] = true;
         }
-        let held_out = self.placement.poses(self.measurements, &self.held_out_only.rows, self.sigma);
+        let held_out = self.poses(&self.held_out_only.rows);
         poses.extend(held_out.into_iter().filter(|pose| !known[pose.base]));
         register(self.model, &poses, &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
@@ -199,6 +212,17 @@ impl<'a> Fitting<'a> {
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
         let of = |rows: &[usize]| ErrorSummary::of(&self.position_errors(rows, x));
         Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
+    }
+
+    /// Errors of orientation on both parts of the data at the full parameter vectors of the registered nominal arm and of the
+    /// fitted one; `None` where orientation is not fitted.
+    pub fn orientation(&self, registered: &DVector<f64>, fitted: &DVector<f64>) -> Option<OrientationErrors> {
+        let sigma_taken = self.assumed_turn.of(self.turn_sigma?);
+        let errors = |x: &DVector<f64>| {
+            let of = |rows: &[usize]| ErrorSummary::of(&self.model.orientation_residuals(self.poses(rows), x));
+            Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
+        };
+        Some(OrientationErrors { registered: errors(registered), fitted: errors(fitted), sigma_taken })
     }
 
     /// Residuals measured − predicted of some rows, measuring frame \[m\].

@@ -3,10 +3,9 @@
 use std::collections::HashSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::fitting::Fitting;
-use super::outliers::{BY_CHANCE, Outlier};
+use super::outliers::{Outlier, chance};
 use super::quality::{LEAST_SPREAD, MISSES, QualityFlag};
 use super::{ErrorSummary, Errors};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
@@ -18,7 +17,7 @@ const WORSE: f64 = 1.5;
 /// … and this many times the noise.
 const ABOVE_NOISE: f64 = 5.0;
 
-/// Held-out rows whose errors are too long for the fit's σ and its own uncertainty there, in the order of the rows.
+/// Held-out rows whose errors of position are too long for the fit's σ and its own uncertainty there, in the order of the rows.
 ///
 /// A row is one where P(χ²₃ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J whitened by the σ that the fit
 /// took, C the covariance of its `unknowns` at `x`. The scatter is the median s over 1.538, no less than 1: so a model that
@@ -37,11 +36,12 @@ pub(super) fn outliers(
     let mut lengths = Vec::with_capacity(rows.len());
     for first in (0..rows.len()).step_by(CHUNK_ITEMS) {
         let items = first..(first + CHUNK_ITEMS).min(rows.len());
-        let mut block = Block::zeros(3 * items.len(), n);
+        let of_pose = stage.coordinates();
+        let mut block = Block::zeros(of_pose * items.len(), n);
         residuals.linearise(&at, items.clone(), &mut block);
         for pose in 0..items.len() {
-            let jacobian = DMatrix::from_fn(3, n, |i, j| block.column(j)[3 * pose + i]);
-            let residual = Vector3::from_fn(|i, _| block.column(n)[3 * pose + i]);
+            let jacobian = DMatrix::from_fn(3, n, |i, j| block.column(j)[of_pose * pose + i]);
+            let residual = Vector3::from_fn(|i, _| block.column(n)[of_pose * pose + i]);
             let own = &jacobian * covariance * jacobian.transpose();
             let spread = Matrix3::identity() + Matrix3::from_fn(|i, j| own[(i, j)]);
             // Scaled: squares of what is far off overflow.
@@ -52,9 +52,8 @@ pub(super) fn outliers(
         }
     }
     let known = lengths.iter().copied().filter(|length| length.is_finite());
-    let Ok(squares) = ChiSquared::new(3.0) else { return Vec::new() };
-    let scatter = (median(known).unwrap_or(0.0) / squares.inverse_cdf(0.5).sqrt()).max(1.0);
-    let limit = squares.inverse_cdf(1.0 - BY_CHANCE / lengths.len().max(1) as f64).sqrt();
+    let Some((typical, limit)) = chance(lengths.len(), 3) else { return Vec::new() };
+    let scatter = (median(known).unwrap_or(0.0) / typical).max(1.0);
     let errors = fitting.position_errors(rows, x);
     let outlier = |((&row, &length), error): ((&usize, &f64), Vector3<f64>)| {
         let distance = length / scatter;

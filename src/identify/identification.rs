@@ -20,7 +20,7 @@ use super::{Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Identifiability, Loss};
-use crate::measurement::{Dataset, Measurements};
+use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::effect::Columns;
 use crate::model::parameter::Parameter;
@@ -160,11 +160,20 @@ pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<
     identify_model(&model, problem, data, options)
 }
 
-/// Configurations of another arm are mistakes, and declared effects of which the measurements hold nothing.
-fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), IdentifyError> {
+/// Data without a row to fit and configurations of another arm are mistakes, and what is declared and not measured.
+fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> Result<(), IdentifyError> {
     let (found, joints) = (measurements.joints, problem.joints.len());
     if found != joints {
         return Err(IdentifyError::JointCount { found, joints });
+    }
+    if problem.data.fits_orientation {
+        let error = |kind| IdentifyError::from(problem.data.location.clone().error(kind));
+        if measurements.orientations.is_none() {
+            return Err(error(InputErrorKind::NoOrientation));
+        }
+        if problem.data.position_sigma.is_none() && measurements.sigma.is_none() {
+            return Err(error(InputErrorKind::NoPositionSigma));
+        }
     }
     let columns =
         Columns { temperature: measurements.temperature.is_some(), approach: measurements.approach.is_some() };
@@ -173,7 +182,7 @@ fn check_columns(problem: &Problem, measurements: &Measurements) -> Result<(), I
             return Err(location.clone().error(InputErrorKind::NeedsColumn { write }).into());
         }
     }
-    Ok(())
+    if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
 }
 
 /// As [`identify`], with a model of the problem that the caller has changed, as [`Strategy::model`] does for a strategy.
@@ -188,10 +197,7 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let clock = Instant::now();
-    check_columns(problem, measurements)?;
-    if split.identification.is_empty() {
-        return Err(IdentifyError::NoPoses);
-    }
+    check_data(problem, data)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
     if solver != SolverChoice::Bounded && model.is_bounded() {
@@ -211,7 +217,9 @@ pub fn identify_model(
         progress: options.progress.as_ref(),
         max_steps: options.max_steps,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
+        turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         assumed: Assumed::DECLARED,
+        assumed_turn: Assumed::DECLARED,
     };
     let unknowns = fitted_parameters(&fitting)?;
     let start = fitting.registered()?;
@@ -272,7 +280,8 @@ pub fn identify_model(
         sigma_taken: taken,
         sigma_scale: fitting.assumed.scale,
         weak: end.gauge.weak.clone(),
-        coordinates: 3 * split.identification.len(),
+        orientation: fitting.orientation(&start, &end.x),
+        coordinates: whole.coordinates() * split.identification.len(),
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
         covariance: covariance.finish(),

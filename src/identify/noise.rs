@@ -10,7 +10,7 @@ use super::outcome::Noise;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
 use crate::least_squares::solver::Termination;
-use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood};
+use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood, residual_vector};
 
 /// An undeclared σ has settled when it changes by less than this part.
 const NOISE_SETTLED: f64 = 1e-3;
@@ -34,10 +34,11 @@ pub(super) fn fitted(
         let whole = fitting.whole();
         let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.assumed))?;
         if noise_is_declared {
-            let next = if judged { contradicted(&whole, &end, &statistics, fitting.assumed)? } else { None };
+            let assumed = (fitting.assumed, fitting.assumed_turn);
+            let next = if judged { contradicted(&whole, &end, &statistics, assumed)? } else { None };
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
-                    fitting.assumed = next;
+                    (fitting.assumed, fitting.assumed_turn) = next;
                     // What was held stays where it began, and what ran off under a σ too small begins anew.
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
@@ -68,8 +69,8 @@ fn contradicted(
     stage: &Stage,
     end: &FitEnd,
     statistics: &Statistics,
-    assumed: Assumed,
-) -> Result<Option<Assumed>, StageError> {
+    assumed: (Assumed, Assumed),
+) -> Result<Option<(Assumed, Assumed)>, StageError> {
     let counts = |place: &usize| {
         stage.loss == Loss::Squares || statistics.lengths.outlying(statistics.lengths.values[*place]).is_none()
     };
@@ -81,17 +82,41 @@ fn contradicted(
     let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
     let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
     let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
-    let rows = (3 * places.len(), 2.0 * data.cost);
+    let rows = (stage.coordinates() * places.len(), 2.0 * data.cost);
     let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
     if !ratio.is_finite() {
         return Ok(None);
     }
-    let first = assumed == Assumed::DECLARED;
+    let first = assumed == (Assumed::DECLARED, Assumed::DECLARED);
+    let shares = shares(&residual_vector(&residuals, &x), stage.coordinates());
+    // Positions and orientations settle each by themselves.
+    let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
     let chance = ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE));
-    if (first && gain <= chance) || (!first && (ratio.sqrt() - 1.0).abs() < SCALE_SETTLED) {
+    if (first && gain <= chance) || (!first && settled) {
         return Ok(None);
     }
     let of = |all: &dyn Fn(usize) -> f64| places.iter().map(|&place| all(place)).collect::<Vec<f64>>();
-    let next = Assumed::raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio);
+    let of_position =
+        Assumed::raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio * shares[0]);
+    let taken = |place: usize| stage.poses[place].orientation.map_or(1.0, |own| own.sigma);
+    let of_turn = match stage.declared_turn {
+        Some(sigma) => Assumed::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
+        None => Assumed::DECLARED,
+    };
+    let next = (of_position, of_turn);
     Ok((next != assumed).then_some(next))
+}
+
+/// Mean square of the whitened residuals of positions, and of orientations, over that of all: 1 where there are positions alone.
+fn shares(whitened: &DVector<f64>, coordinates: usize) -> [f64; 2] {
+    if coordinates == 3 {
+        return [1.0; 2];
+    }
+    let mean = |part: fn(&[f64]) -> &[f64]| {
+        let squares = whitened.as_slice().chunks_exact(coordinates).flat_map(part).map(|r| r * r);
+        squares.sum::<f64>() / (whitened.len() / 2).max(1) as f64
+    };
+    let (position, turn) = (mean(|r| &r[..3]), mean(|r| &r[3..]));
+    let all = 0.5 * (position + turn);
+    if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }

@@ -6,7 +6,9 @@ use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
-use super::{ActiveConstraint, Caution, Errors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses};
+use super::{
+    ActiveConstraint, Caution, Errors, OrientationErrors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses,
+};
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{BlindCombination, Identifiability};
 use crate::model::parameter::Parameter;
@@ -86,6 +88,8 @@ pub struct Identification {
     pub registered: Errors,
     /// Of the identified arm.
     pub fitted: Errors,
+    /// Errors of orientation, where it is fitted.
+    pub orientation: Option<OrientationErrors>,
     /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.
     /// Where the loss is robust, outliers are left out of it.
     pub reduced_chi2: Option<f64>,

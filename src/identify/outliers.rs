@@ -7,10 +7,27 @@ use super::stage::Stage;
 use crate::error::Location;
 use crate::least_squares::residual_vector;
 use crate::measurement::Measurements;
+use crate::model::Pose;
 use crate::numeric::median;
 
 /// Probability that noise alone makes any pose an outlier.
-pub(super) const BY_CHANCE: f64 = 0.01;
+const BY_CHANCE: f64 = 0.01;
+
+/// The median length of so many `coordinates` of σ 1, √ of the median of χ², and the length beyond which chance takes any of `count`
+/// with probability 0.01 [Bonferroni].
+pub(super) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
+    let squares = ChiSquared::new(coordinates as f64).ok()?;
+    Some((squares.inverse_cdf(0.5).sqrt(), squares.inverse_cdf(1.0 - BY_CHANCE / count.max(1) as f64).sqrt()))
+}
+
+/// Which of some lengths of whitened residuals of so many `coordinates` are too long to be noise; the scatter is the median one, no
+/// less than the σ that they are in units of.
+pub(super) fn outlying(lengths: &[f64], coordinates: usize) -> Vec<bool> {
+    let Some((typical, limit)) = chance(lengths.len(), coordinates) else { return vec![false; lengths.len()] };
+    let known = lengths.iter().copied().filter(|length| length.is_finite());
+    let scatter = (median(known).unwrap_or(0.0) / typical).max(1.0);
+    lengths.iter().map(|length| *length > limit * scatter).collect()
+}
 
 /// A pose whose residual is too long to be noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,24 +58,29 @@ impl Lengths {
     /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that is left to scatter, 0…1, and
     /// `declared` the part of the declared σ that the fit took to be noise, where any σ was declared.
     ///
-    /// A pose is an outlier where P(χ²₃ > s²) < 0.01 / N, with s = ‖r‖ / scatter and N poses \[Bonferroni\]. The scatter is
+    /// A pose is an outlier where P(χ²₃ > s²) < 0.01 / N, with s = ‖r‖ / scatter and N poses \[Bonferroni\]; χ²₆ with orientations. The scatter is
     /// median ‖r‖ / 1.538 (√ of the median of χ²₃), which gross errors hardly move, over √`freedom`; under a declared σ it
     /// is no less than that part of it. So a model that misses some effect everywhere does not turn every pose into an outlier.
     pub fn of(stage: &Stage, at: &DVector<f64>, freedom: f64, declared: Option<f64>) -> Self {
         let residuals = stage.residuals(at);
         let whitened = residual_vector(&residuals, &residuals.reduced(at));
-        let weighed: Vec<f64> = whitened.as_slice().chunks_exact(3).map(|r| r[0].hypot(r[1]).hypot(r[2])).collect();
-        let taken = stage.poses.iter().zip(&stage.declared).map(|(pose, declared)| pose.sigma / declared);
-        let values: Vec<f64> = weighed.iter().zip(taken).map(|(length, taken)| length * taken).collect();
+        let length = |r: &[f64]| r[0].hypot(r[1]).hypot(r[2]);
+        let items = || whitened.as_slice().chunks_exact(stage.coordinates());
+        let both = |r: &[f64], position: f64| if r.len() > 3 { position.hypot(length(&r[3..])) } else { position };
+        let weighed: Vec<f64> = items().map(|r| both(r, length(r))).collect();
+        let in_declared = |(r, (pose, declared)): (&[f64], (&Pose, &f64))| {
+            let position = length(r) * (pose.sigma / declared);
+            match (pose.orientation, stage.declared_turn) {
+                (Some(orientation), Some(own)) => position.hypot(length(&r[3..]) * (orientation.sigma / own)),
+                _ => position,
+            }
+        };
+        let values: Vec<f64> = items().zip(stage.poses.iter().zip(&stage.declared)).map(in_declared).collect();
         let least = declared.unwrap_or(0.0);
-        // Three degrees of freedom are a distribution.
-        let Ok(squares) = ChiSquared::new(3.0) else {
+        let Some((typical, limit)) = chance(values.len(), stage.coordinates()) else {
             return Self { values, weighed, scatter: 1.0, limit: f64::INFINITY };
         };
-        let scatter = median(values.iter().copied()).unwrap_or(0.0)
-            / squares.inverse_cdf(0.5).sqrt()
-            / freedom.clamp(0.01, 1.0).sqrt();
-        let limit = squares.inverse_cdf(1.0 - BY_CHANCE / values.len().max(1) as f64).sqrt();
+        let scatter = median(values.iter().copied()).unwrap_or(0.0) / typical / freedom.clamp(0.01, 1.0).sqrt();
         Self { values, weighed, scatter: scatter.max(least), limit }
     }
 

@@ -1,10 +1,10 @@
 //! Which base and which target each row uses, and which of them appear in held-out rows only.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, UnitQuaternion, Vector3};
 
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
-use crate::model::{Model, Pose};
+use crate::model::{Model, Pose, SeenOrientation};
 use crate::problem::PoseView;
 use crate::problem::Problem;
 
@@ -72,8 +72,25 @@ impl Placement {
                 target: self.target_of_row[row],
                 measured: measurements.positions[row],
                 sigma: at(&measurements.sigma, row).unwrap_or(sigma),
+                orientation: None,
             })
             .collect()
+    }
+
+    /// The same with the orientations that were measured, where `turn` \[rad\], their σ, is given.
+    pub fn oriented_poses<'a>(
+        &self,
+        measurements: &'a Measurements,
+        rows: &[usize],
+        (sigma, turn): (f64, Option<f64>),
+    ) -> Vec<Pose<'a>> {
+        let mut poses = self.poses(measurements, rows, sigma);
+        if let (Some(sigma), Some(all)) = (turn, &measurements.orientations) {
+            for (pose, &row) in poses.iter_mut().zip(rows) {
+                pose.orientation = Some(SeenOrientation { axes: Some(axes_of(&all[row])), sigma });
+            }
+        }
+        poses
     }
 
     /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`, measuring frame \[m\]; NaN
@@ -111,6 +128,11 @@ impl Placement {
         let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];
         HeldOutOnly { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
     }
+}
+
+/// Axes of an orientation.
+pub(super) fn axes_of(orientation: &UnitQuaternion<f64>) -> [Vector3<f64>; 3] {
+    [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| orientation * axis)
 }
 
 /// Bases and targets that appear in held-out rows only.

@@ -1,12 +1,15 @@
 //! What an identified arm predicts, and what it leaves of measurements.
 
+use std::collections::HashSet;
+
 use nalgebra::{DVector, Vector3};
 
+use super::cautions::Caution;
 use super::identification::IdentifyError;
 use super::outcome::Identification;
 use super::placement::Placement;
 use crate::measurement::{Dataset, Measurements};
-use crate::model::Model;
+use crate::model::{Model, Pose};
 use crate::problem::Problem;
 
 /// A measured pose and what a fit leaves of it.
@@ -21,7 +24,12 @@ pub struct Residual {
     pub position: Vector3<f64>,
     /// The same over 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
-    /// Whether the row is among the [outliers](Identification::outliers) of the fit.
+    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\], where orientation is fitted.
+    pub orientation: Option<Vector3<f64>>,
+    /// The same over 1 σ about an axis \[1\].
+    pub whitened_orientation: Option<Vector3<f64>>,
+    /// Whether the row is too far off to be noise: one of the fit's [outliers](Identification::outliers), or of the held-out
+    /// rows that its [cautions](Identification::cautions) name.
     pub outlier: bool,
 }
 
@@ -58,28 +66,56 @@ impl Identification {
         let placement = Placement::of(measurements);
         let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let errors = self.errors(&model, measurements)?;
+        let turns = self.turns(problem, &model, measurements)?;
+        let turn_sigma = problem.data.orientation_sigma.unwrap_or(f64::NAN);
         let sigma = |row: usize| measurements.sigma.as_ref().map_or(self.sigma, |own| own[row]);
+        let held_out = self.cautions.iter().flat_map(|caution| match caution {
+            Caution::HeldOutOutliers { rows, .. } => rows.as_slice(),
+            _ => &[],
+        });
+        let outliers: HashSet<usize> = self.outliers.iter().chain(held_out).map(|outlier| outlier.row).collect();
         let residual = |(row, position): (usize, Vector3<f64>)| Residual {
             row,
             held_out: split.held_out.binary_search(&row).is_ok(),
             position,
             whitened: position / sigma(row),
-            outlier: self.outliers.iter().any(|outlier| outlier.row == row),
+            orientation: turns.as_ref().map(|all| all[row]),
+            whitened_orientation: turns.as_ref().map(|all| all[row] / turn_sigma),
+            outlier: outliers.contains(&row),
         };
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }
 
-    /// Measured − predicted of every row, measuring frame \[m\]; time counts from the first pose that was identified.
+    /// Measured − predicted of every row, measuring frame \[m\].
     fn errors(&self, model: &Model, rows: &Measurements) -> Result<Vec<Vector3<f64>>, IdentifyError> {
         if rows.joints != model.joints() {
             return Err(IdentifyError::JointCount { found: rows.joints, joints: model.joints() });
         }
+        Ok(model.residuals(self.poses(rows, None), &self.vector(model)?))
+    }
+
+    /// Rotation vectors from the predicted to the measured orientation of every row, measuring frame \[rad\], where it is fitted.
+    fn turns(
+        &self,
+        problem: &Problem,
+        model: &Model,
+        rows: &Measurements,
+    ) -> Result<Option<Vec<Vector3<f64>>>, IdentifyError> {
+        let fitted = problem.data.fits_orientation && rows.orientations.is_some();
+        if !fitted {
+            return Ok(None);
+        }
+        Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
+    }
+
+    /// Every row as a pose, its orientation with the σ `turn`; time counts from the first pose that was identified.
+    fn poses<'a>(&self, rows: &'a Measurements, turn: Option<f64>) -> Vec<Pose<'a>> {
         let all: Vec<usize> = (0..rows.len()).collect();
-        let mut poses = Placement::of(rows).poses(rows, &all, 1.0);
+        let mut poses = Placement::of(rows).oriented_poses(rows, &all, (1.0, turn));
         for pose in &mut poses {
             pose.setup.elapsed = pose.setup.time - self.first_time;
         }
-        Ok(model.residuals(poses, &self.vector(model)?))
+        poses
     }
 
     /// The full parameter vector of a model with the parameters that were identified, by their names.

@@ -27,7 +27,7 @@ pub(super) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
 /// What no parameter of the arm exceeds, with a prior or without: as [`plausible`], angles by half a turn.
 pub(super) fn largest(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.slot, parameter.unit()) {
-        (Slot::Base { .. }, _) => None,
+        (Slot::Base { .. } | Slot::Target { axis: 3.., .. }, _) => None,
         (_, Unit::Length) => Some(model.size()),
         (_, Unit::Angle) => Some(HALF_TURN),
         (_, unit) => unit.is_relative().then_some(LN_STIFFNESS),

@@ -47,6 +47,8 @@ pub(super) struct Stage<'a> {
     pub poses: Vec<Pose<'a>>,
     /// 1 σ of a coordinate of each pose, as declared \[m\].
     pub declared: Vec<f64>,
+    /// 1 σ of their orientations, as declared, where these are fitted \[rad\].
+    pub declared_turn: Option<f64>,
     /// Which parameters vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
@@ -82,6 +84,11 @@ impl<'a> Stage<'a> {
     /// The parameters that vary.
     pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
+    }
+
+    /// Measured coordinates of a pose: three, or six with its orientation.
+    pub fn coordinates(&self) -> usize {
+        if self.declared_turn.is_some() { 6 } else { 3 }
     }
 
     /// Residuals of the stage about the full parameter vector `at`.

@@ -50,15 +50,16 @@ impl Statistics {
         let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
         let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
         let mut uncertainty = of(1.0);
-        let coordinates = 3.0 * stage.poses.len() as f64;
+        let of_pose = stage.coordinates();
+        let coordinates = of_pose as f64 * stage.poses.len() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
         let lengths = Lengths::of(stage, &end.x, freedom / coordinates, assumed.map(|assumed| assumed.scale));
         let robust = stage.loss != Loss::Squares;
         let counts = |length: f64| !robust || lengths.outlying(length).is_none();
         let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
-        let left_out = if robust { 3.0 * lengths.outliers() as f64 } else { 0.0 };
+        let left_out = if robust { of_pose as f64 * lengths.outliers() as f64 } else { 0.0 };
         if robust {
-            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, 3, freedom));
+            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, of_pose, freedom));
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{Dataset, Labels, Measurements, Split};
 use crate::problem::item::GREATEST;
@@ -64,6 +64,8 @@ pub enum DatasetError {
 pub struct DatasetBuilder {
     configurations: Vec<Vec<f64>>,
     positions: Vec<Vector3<f64>>,
+    measured: bool,
+    orientations: Option<Vec<UnitQuaternion<f64>>>,
     sigma: Option<Vec<f64>>,
     payload: Option<Vec<f64>>,
     hoist: Option<Vec<f64>>,
@@ -86,6 +88,8 @@ impl Dataset {
         DatasetBuilder {
             configurations: rows_of(configurations),
             positions: positions.into_iter().collect(),
+            measured: true,
+            orientations: None,
             sigma: None,
             payload: None,
             hoist: None,
@@ -102,11 +106,18 @@ impl Dataset {
     pub fn poses<C: AsRef<[f64]>>(configurations: impl IntoIterator<Item = C>) -> DatasetBuilder {
         let configurations = rows_of(configurations);
         let positions = vec![Vector3::zeros(); configurations.len()];
-        Self::builder(configurations, positions)
+        DatasetBuilder { measured: false, ..Self::builder(configurations, positions) }
     }
 }
 
 impl DatasetBuilder {
+    /// Measured orientation of the target, measuring frame; fitted where the problem has an `orientation_sigma`.
+    #[must_use]
+    pub fn orientation(mut self, orientations: Vec<UnitQuaternion<f64>>) -> Self {
+        self.orientations = Some(orientations);
+        self
+    }
+
     /// 1 σ of each coordinate of a position, above 0 \[m\].
     #[must_use]
     pub fn sigma(mut self, sigma: Vec<f64>) -> Self {
@@ -222,6 +233,12 @@ impl DatasetBuilder {
         for (row, position) in self.positions.iter().enumerate() {
             finite("positions", row, position.as_slice())?;
         }
+        if let Some(orientations) = &self.orientations {
+            length("orientations", orientations.len(), rows)?;
+            for (row, own) in orientations.iter().enumerate() {
+                finite("orientations", row, own.coords.as_slice())?;
+            }
+        }
         let time = one("time", self.time)?;
         let unnamed = || Labels { names: vec![String::new()], of_row: vec![0; rows] };
         Ok(Measurements {
@@ -230,6 +247,8 @@ impl DatasetBuilder {
             joints,
             configurations: flat("configurations", &self.configurations)?,
             positions: self.positions,
+            position_measured: self.measured,
+            orientations: self.orientations,
             sigma: within("sigma", self.sigma, "not above 0", |sigma| *sigma <= 0.0)?,
             payload: within("payload", self.payload, "below 0", |payload| *payload < 0.0)?,
             hoist: one("hoist", self.hoist)?,
@@ -237,11 +256,9 @@ impl DatasetBuilder {
             time_measured: time.is_some(),
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
             approach: self.approach.map(|approach| directions(flat("approach", &approach)?, joints)).transpose()?,
-            pose: None,
             session: words("session", self.session)?.unwrap_or_else(unnamed),
             target: words("target", self.target)?,
-            marked_held_out: None,
-            warnings: Vec::new(),
+            ..Measurements::default()
         })
     }
 }

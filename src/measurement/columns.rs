@@ -3,15 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
+use super::mapped::Names;
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest, one_typo};
-use crate::problem::{HeldOut, JointKind, Problem};
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
+use crate::problem::{HeldOut, JointKind, JointSource, Problem};
 use crate::quantity::Unit;
 
 /// What a column stands for; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
     Joint(usize),
+    /// What a joint's encoder read.
+    Reading(usize),
     Position(usize),
     Sigma,
     Payload,
@@ -20,18 +23,37 @@ pub(super) enum Role {
     Time,
     Approach(usize),
     Orientation(usize),
+    Quaternion(usize),
     Split,
     Session,
     Target,
     Pose,
+    /// Which fixed point a row without an arm measures.
+    Nest,
+}
+
+impl Role {
+    /// Whether it is what a joint's encoder read.
+    pub fn is_reading(self) -> bool {
+        matches!(self, Self::Reading(_))
+    }
 }
 
 /// Unknown columns of which is asked what they are meant to be; who has more means none.
 const ASKED: usize = 100;
 
 /// Columns without a unit.
-const PLAIN: [(&str, Role); 4] =
-    [("split", Role::Split), ("session", Role::Session), ("target", Role::Target), ("pose", Role::Pose)];
+const PLAIN: [(&str, Role); 9] = [
+    ("nest", Role::Nest),
+    ("split", Role::Split),
+    ("session", Role::Session),
+    ("target", Role::Target),
+    ("pose", Role::Pose),
+    ("qx", Role::Quaternion(0)),
+    ("qy", Role::Quaternion(1)),
+    ("qz", Role::Quaternion(2)),
+    ("qw", Role::Quaternion(3)),
+];
 
 /// Columns with a unit, and whether they need one: a column such as `time` may be about something else.
 const MEASURED: [(&str, Role, Unit, bool); 11] = [
@@ -64,6 +86,10 @@ pub(super) struct Columns {
     pub read: Vec<Column>,
     /// Place of the column that marks held-out rows.
     pub marked: Option<usize>,
+    /// What the name of the file stands for, in every row.
+    pub file: Option<Role>,
+    /// What flexcal calls each column of the table.
+    names: Vec<String>,
 }
 
 impl Columns {
@@ -80,22 +106,36 @@ impl Columns {
             None => Some("split"),
             Some(_) => None,
         };
-        let numbering = Numbering::of(&table.header, problem);
-        let there: BTreeSet<&str> = table.header.iter().map(|name| split_unit(name).0).collect();
+        let named = Names::of(table, &problem.data.dialect)?;
+        let numbering = Numbering::of(named.all(), problem);
+        let there: BTreeSet<&str> = named.all().map(|name| split_unit(name).0).collect();
         let mut found: BTreeMap<Role, &str> = BTreeMap::new();
         let mut names = BTreeSet::new();
-        let mut columns = Self { read: Vec::new(), marked: None };
-        let (mut unknown, mut mistyped) = (Vec::new(), None);
-        for (place, name) in table.header.iter().enumerate() {
-            let error = |kind| table.column(name).error(kind);
-            if !name.is_empty() && !names.insert(name) {
-                return Err(error(InputErrorKind::RepeatedColumn { first: name.clone() }));
+        let file = named.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
+        let ours = named.all().map(str::to_owned).collect();
+        let mut columns = Self { read: Vec::new(), marked: None, file: None, names: ours };
+        let (mut unknown, mut mistyped, mut unmapped) = (Vec::new(), None, Vec::new());
+        for (place, &(name, rule)) in named.of_place.iter().chain(&file).enumerate() {
+            let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
+            let error = |kind| location().error(kind);
+            let foreign = named.mapped && rule.is_none();
+            if !name.is_empty() && !names.insert(name) && !foreign {
+                return Err(error(InputErrorKind::RepeatedColumn { first: name.to_owned() }));
             }
             let is_marked = marked_name == Some(name);
             if is_marked {
                 columns.marked = Some(place);
             }
-            match numbering.recognise(name, problem).map_err(error)? {
+            let meaning = match numbering.recognise(name, problem) {
+                // What another program calls by our name need not be ours.
+                Err(_) if foreign => Meaning::Unknown,
+                Ok(Meaning::Read(role, _)) if foreign && found.contains_key(&role) => Meaning::Unknown,
+                other => other.map_err(error)?,
+            };
+            match meaning {
+                Meaning::Read(role, _) if place == table.header.len() => {
+                    columns.file = Some(word_of_row(role).map_err(error)?);
+                }
                 Meaning::Read(role, to_si) => {
                     if let Some(first) = found.insert(role, name) {
                         return Err(error(InputErrorKind::RepeatedColumn { first: first.to_owned() }));
@@ -103,9 +143,17 @@ impl Columns {
                     columns.read.push(Column { role, place, to_si });
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
-                Meaning::Ignored(kind) => warnings.push(Warning { location: table.column(name), kind }),
+                Meaning::Ignored(_) | Meaning::Unknown if rule.is_some() => {
+                    let meant = numbering.meant(name, &there, problem);
+                    return Err(error(InputErrorKind::UnknownMeaning { meant }));
+                }
+                Meaning::Ignored(kind) => warnings.push(Warning { location: location(), kind }),
+                Meaning::Unknown if foreign => {
+                    unknown.push(name);
+                    unmapped.extend((!name.is_empty()).then(|| name.to_owned()));
+                }
                 Meaning::Unknown => {
-                    unknown.push(name.as_str());
+                    unknown.push(name);
                     let asked = unknown.len() <= ASKED;
                     let meant = asked.then(|| numbering.meant(name, &there, problem)).flatten();
                     if let Some(meant) = meant.as_ref().filter(|meant| counts(meant) && one_typo(name, meant)) {
@@ -116,6 +164,10 @@ impl Columns {
                     warnings.push(Warning { location: table.column(name), kind });
                 }
             }
+        }
+        if !unmapped.is_empty() {
+            let location = Location { key: None, ..table.column("") };
+            warnings.push(Warning { location, kind: WarningKind::Unmapped { names: unmapped } });
         }
         columns.read.sort_by_key(|column| column.role);
         columns.require(table, problem, measured, &numbering, &unknown)?;
@@ -136,14 +188,19 @@ impl Columns {
             let (write, near) = (unit.spelled(base), unit.spellings(base).find_map(|name| near(&name)));
             Err(table.column(base).error(InputErrorKind::MissingColumn { write, near }))
         };
+        let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
+            JointSource::Commanded => (Role::Joint, ""),
+            JointSource::Read => (Role::Reading, "_read"),
+        };
         for (index, joint) in problem.joints.iter().enumerate() {
             if let Some(unit) = unit_of(joint.kind)
-                && !self.has(Role::Joint(index))
+                && !self.has(source(index))
             {
-                return missing(&format!("q{}", numbering.number(index)), unit);
+                return missing(&format!("q{}{suffix}", numbering.number(index)), unit);
             }
         }
-        if !measured {
+        // One coordinate alone is no position.
+        if !measured && !(0..3).any(|axis| self.has(Role::Position(axis))) {
             return Ok(());
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -151,7 +208,10 @@ impl Columns {
                 return missing(name, Unit::Length);
             }
         }
-        if let Some(HeldOut::Column(name)) = &problem.data.held_out
+        if let (true, true) = self.orientations() {
+            return Err(table.column("qx").error(InputErrorKind::RepeatedColumn { first: "rx".to_owned() }));
+        }
+        if let Some(HeldOut::Column(name)) = problem.data.held_out.as_ref().filter(|_| measured)
             && self.marked.is_none()
         {
             let write = format!("it, or change held_out in {}", problem.data.held_out_location);
@@ -160,8 +220,35 @@ impl Columns {
         Ok(())
     }
 
+    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out with a warning.
+    pub fn settle_time(&mut self, table: &Table, warnings: &mut Vec<Warning>) {
+        let dated = |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
+        if let Some(place) = self.read.iter().position(|column| column.role == Role::Time && !dated(column)) {
+            let column = self.read.remove(place);
+            let kind = WarningKind::UnitIgnored { write: Unit::Time.spelled("time") };
+            warnings.push(Warning { location: table.column(table.name_of(column.place)), kind });
+        }
+    }
+
+    /// What flexcal calls a column.
+    pub fn name_of(&self, column: &Column) -> &str {
+        self.names.get(column.place).map_or("", String::as_str)
+    }
+
+    /// The fixed point that the row measures, if it is one of those without an arm.
+    pub fn nest<'t>(&self, table: &'t Table) -> Option<&'t str> {
+        let column = self.read.iter().find(|column| column.role == Role::Nest)?;
+        table.text(column.place).ok().filter(|word| !word.is_empty())
+    }
+
+    /// Whether there is a whole orientation as angles, and as a quaternion.
+    pub fn orientations(&self) -> (bool, bool) {
+        let all = |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
+        (all(3, Role::Orientation), all(4, Role::Quaternion))
+    }
+
     pub fn has(&self, role: Role) -> bool {
-        self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+        self.file == Some(role) || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
     }
 }
 
@@ -181,8 +268,8 @@ struct Numbering {
 
 impl Numbering {
     /// Columns go by the joint's number, or else by its place among the joints that move.
-    fn of(header: &[String], problem: &Problem) -> Self {
-        let numbers: Vec<usize> = header.iter().filter_map(|name| numbered(split_unit(name).0, "q")).collect();
+    fn of<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
+        let numbers: Vec<usize> = names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
         let all = || (0..problem.joints.len()).collect::<Vec<_>>();
         let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
         let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
@@ -227,6 +314,8 @@ impl Numbering {
             };
         }
         let (base, suffix) = split_unit(name);
+        let reading = suffix.and_then(|suffix| suffix.strip_prefix("read_")).filter(|_| numbered(base, "q").is_some());
+        let suffix = reading.or(suffix);
         let measured = MEASURED.iter().find(|(known, ..)| *known == base);
         let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
             (role, unit, strict)
@@ -237,9 +326,9 @@ impl Numbering {
             else {
                 return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
             };
-            (Role::Joint(joint), unit, true)
+            (if reading.is_some() { Role::Reading(joint) } else { Role::Joint(joint) }, unit, true)
         };
-        let write = || unit.spelled(base);
+        let write = || unit.spelled(&if reading.is_some() { format!("{base}_read") } else { base.to_owned() });
         match suffix {
             Some(suffix) => match unit.suffix(suffix) {
                 Some(suffix) => Ok(Meaning::Read(role, suffix.to_si)),
@@ -248,11 +337,23 @@ impl Numbering {
                 }
                 None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
             },
+            None if role == Role::Time => Ok(Meaning::Read(Role::Time, DATE)),
             None if strict => Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: write() }),
             None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
         }
     }
 }
+
+/// What the name of the file may stand for: a word.
+fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
+    match role {
+        Role::Session | Role::Target => Ok(role),
+        _ => Err(InputErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }),
+    }
+}
+
+/// Conversion of a time without a unit: a date, which needs none.
+pub(super) const DATE: fn(f64) -> f64 = |_| f64::NAN;
 
 /// Whether a column that was meant would be missed: a pose's name and orientations decide nothing.
 fn counts(meant: &str) -> bool {

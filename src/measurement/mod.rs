@@ -7,24 +7,33 @@ mod column_table;
 mod columns;
 mod dataset;
 #[deny(clippy::indexing_slicing)]
+mod dialect;
+#[deny(clippy::indexing_slicing)]
 mod duplicates;
 #[deny(clippy::indexing_slicing)]
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
 #[deny(clippy::indexing_slicing)]
+mod mapped;
+#[deny(clippy::indexing_slicing)]
+mod orientation;
+#[deny(clippy::indexing_slicing)]
 mod read;
 mod repeats;
 mod split;
 #[deny(clippy::indexing_slicing)]
 mod table;
+#[deny(clippy::indexing_slicing)]
+mod time;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
+use crate::problem::PoseConditions;
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
@@ -33,7 +42,7 @@ pub(crate) use repeats::different;
 pub use split::Split;
 
 /// Measured poses, a column for each quantity, in the order of the files.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Measurements {
     /// The files that were read.
     pub files: Vec<PathBuf>,
@@ -43,8 +52,16 @@ pub struct Measurements {
     pub joints: usize,
     /// Configurations, shape = (rows, joints), row after row \[rad\] or \[m\]; 0 at fixed joints.
     pub configurations: Vec<f64>,
+    /// The same from the other of commands and readings, where the table has both.
+    pub other_configurations: Option<Vec<f64>>,
+    /// Fixed points that were measured in between; they take no part in fits.
+    pub nests: Vec<NestReading>,
     /// Measured positions in the measuring frame \[m\].
     pub positions: Vec<Vector3<f64>>,
+    /// Whether the positions were measured; 0 otherwise, in poses that are still to be measured.
+    pub position_measured: bool,
+    /// Measured orientations of the target in the measuring frame, where there are all of their columns.
+    pub orientations: Option<Vec<UnitQuaternion<f64>>>,
     /// 1 σ of each coordinate from the column `sigma_mm` \[m\].
     pub sigma: Option<Vec<f64>>,
     /// Payload \[kg\].
@@ -67,8 +84,38 @@ pub struct Measurements {
     pub target: Option<Labels>,
     /// Whether the row is marked `validation`: in the column that the problem names, or in `split` where it says nothing.
     pub marked_held_out: Option<Vec<bool>>,
+    /// How the first file writes the commands, a column a joint; none where they came from no file.
+    pub command_columns: Vec<CommandColumn>,
     /// What was passed over in the files, for reports.
     pub warnings: Vec<Warning>,
+}
+
+/// A fixed point that was measured again, to see whether the instrument stayed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NestReading {
+    /// File index and line, for messages.
+    pub origin: (u32, u32),
+    /// Which point.
+    pub name: String,
+    /// Measured position, measuring frame \[m\].
+    pub position: Vector3<f64>,
+    /// Time \[s\], where there is a column for it.
+    pub time: Option<f64>,
+    /// Number of rows of the arm before it: what stands for the time where that is counted.
+    pub after: usize,
+    /// Session, empty where there is no column for it.
+    pub session: String,
+}
+
+/// A column of a joint's commands as a table has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommandColumn {
+    /// Joint, counted from 0.
+    pub joint: usize,
+    /// Its name in the table.
+    pub name: String,
+    /// Its unit in SI: π/180 for degrees.
+    pub unit: f64,
 }
 
 /// A word per row, stored as an index into the distinct words in order of appearance.
@@ -114,9 +161,31 @@ impl Measurements {
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
+    /// What was set in a row; time counts from its own first one.
+    pub fn conditions(&self, row: usize) -> PoseConditions {
+        let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+        let first = self.time.iter().copied().fold(f64::INFINITY, f64::min);
+        PoseConditions {
+            configuration: self.configuration(row).to_vec(),
+            payload: at(&self.payload),
+            hoist: at(&self.hoist),
+            temperature: at(&self.temperature),
+            time: self.time[row],
+            elapsed: self.time[row] - first,
+            approach: self.approach.as_ref().map(|all| all[row * self.joints..(row + 1) * self.joints].to_vec()),
+        }
+    }
+
     /// Configuration of a row, shape = (joints) \[rad\] or \[m\].
     pub fn configuration(&self, row: usize) -> &[f64] {
         &self.configurations[row * self.joints..(row + 1) * self.joints]
+    }
+
+    /// The same rows with the other of commands and readings as configurations, where the table has both and they differ.
+    pub fn by_other_joints(&self) -> Option<Self> {
+        let other = self.other_configurations.as_ref().filter(|other| **other != self.configurations)?;
+        let (configurations, own) = (other.clone(), self.configurations.clone());
+        Some(Self { configurations, other_configurations: Some(own), ..self.clone() })
     }
 
     /// The rows with these numbers, in this order; words that none of them uses are kept.
@@ -135,7 +204,11 @@ impl Measurements {
             origin: rows.iter().map(|&row| self.origin[row]).collect(),
             joints: self.joints,
             configurations: each(&self.configurations),
+            other_configurations: self.other_configurations.as_deref().map(each),
+            nests: self.nests.clone(),
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
+            position_measured: self.position_measured,
+            orientations: self.orientations.as_ref().map(|all| rows.iter().map(|&row| all[row]).collect()),
             sigma: self.sigma.as_deref().map(one),
             payload: self.payload.as_deref().map(one),
             hoist: self.hoist.as_deref().map(one),
@@ -147,6 +220,7 @@ impl Measurements {
             session: words(&self.session),
             target: self.target.as_ref().map(words),
             marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+            command_columns: self.command_columns.clone(),
             warnings: self.warnings.clone(),
         }
     }
@@ -159,7 +233,10 @@ impl Measurements {
         let mut all = self.clone();
         all.origin.extend(&other.origin);
         all.configurations.extend(&other.configurations);
+        all.other_configurations = both(&self.other_configurations, &other.other_configurations);
         all.positions.extend(&other.positions);
+        all.orientations =
+            self.orientations.as_ref().and_then(|own| Some([own.as_slice(), other.orientations.as_deref()?].concat()));
         all.sigma = both(&self.sigma, &other.sigma);
         all.payload = both(&self.payload, &other.payload);
         all.hoist = both(&self.hoist, &other.hoist);

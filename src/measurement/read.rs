@@ -7,11 +7,12 @@ use nalgebra::Vector3;
 
 use super::columns::{Column, Columns, Role};
 use super::limits::Commands;
+use super::orientation::Cells;
 use super::table::{Table, shortened};
-use super::{ColumnTable, Labels, Measurements};
-use crate::error::{InputError, InputErrorKind, Location, Warning};
+use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading};
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, one_line};
 use crate::files::same_file;
-use crate::problem::Problem;
+use crate::problem::{JointSource, Missing, Problem, RotationKind};
 
 impl Measurements {
     /// Reads the files, one after the other, and says which columns were passed over.
@@ -53,7 +54,7 @@ impl Measurements {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 return Err(named_by(file, problem).error(InputErrorKind::RepeatedFile { path: file.clone() }));
             }
-            tables.read(index, Table::open(file, || missing(file, problem))?)?;
+            tables.read(index, Table::open(file, &problem.data.dialect, || missing(file, problem))?)?;
         }
         tables.finish()
     }
@@ -65,7 +66,8 @@ impl Measurements {
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let name = table.name().to_owned();
         let mut tables = Tables::new(std::slice::from_ref(&name), problem, measured);
-        tables.read(0, Table::of_text(&name, Box::new(table.into_text()))?)?;
+        let written = problem.data.dialect.in_memory();
+        tables.read(0, Table::of_text(&name, &written, Box::new(table.into_text()))?)?;
         tables.finish()
     }
 }
@@ -87,17 +89,32 @@ impl<'a> Tables<'a> {
 
     /// Reads all rows of a table, that of the file with this number.
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
-        let columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
-        let rows = self.builder.get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
-        rows.same_columns(&table, &columns)?;
-        let before = rows.measurements.len();
-        while table.next_row()? {
-            rows.push(index, &table, &columns)?;
-        }
-        if rows.measurements.len() == before {
+        let dialect = &self.problem.data.dialect;
+        let mut columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
+        if !table.next_row()? {
             let line = table.line();
             return Err(Location::file(&table.file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
         }
+        columns.settle_time(&table, &mut self.warnings);
+        let rows = self.builder.get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
+        rows.same_columns(&table, &columns)?;
+        let (before, mut left_out) = (rows.seen(), LeftOut::default());
+        loop {
+            if let Some(name) = columns.nest(&table) {
+                rows.push_nest(index, name, &table, &columns)?;
+            } else if dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns)) {
+                left_out.count(&table);
+            } else {
+                rows.push(index, &table, &columns)?;
+            }
+            if !table.next_row()? {
+                break;
+            }
+        }
+        if rows.seen() == before {
+            return Err(Location::file(&table.file).error(InputErrorKind::AllMissing));
+        }
+        self.warnings.extend(left_out.warning());
         Ok(())
     }
 
@@ -116,6 +133,60 @@ impl<'a> Tables<'a> {
             None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
         }
     }
+}
+
+/// Rows of a table in which nothing was measured.
+#[derive(Default)]
+struct LeftOut {
+    rows: usize,
+    first: Option<Location>,
+}
+
+impl LeftOut {
+    fn count(&mut self, table: &Table) {
+        self.rows += 1;
+        self.first.get_or_insert_with(|| Location::file(&table.file).at_line(table.line()));
+    }
+
+    fn warning(self) -> Option<Warning> {
+        let rows = self.rows;
+        self.first.map(|location| Warning { location, kind: WarningKind::RowsMissing { rows } })
+    }
+}
+
+/// Whether the position of the row is what stands where nothing was measured.
+fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
+    let axis = |column: &&Column| match column.role {
+        Role::Position(axis) => Some((axis, column.place)),
+        _ => None,
+    };
+    let mut cells = columns.read.iter().filter_map(|column| axis(&column)).peekable();
+    match missing {
+        Missing::Word(word) => cells.any(|(_, place)| table.text(place).is_ok_and(|cell| cell == word)),
+        Missing::Position(nothing) => {
+            let same = |(axis, place): (usize, usize)| {
+                table
+                    .number(place)
+                    .is_ok_and(|value| nothing.get(axis).is_some_and(|own| own.to_bits() == (value + 0.0).to_bits()))
+            };
+            cells.peek().is_some() && cells.all(same)
+        }
+    }
+}
+
+/// Whether a table has commands and readings of the joints, of each as many.
+fn both_joints(columns: &Columns) -> bool {
+    let count = |reading: bool| {
+        let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
+        columns.read.iter().filter(of_joint).filter(|column| column.role.is_reading() == reading).count()
+    };
+    count(true) > 0 && count(true) == count(false)
+}
+
+/// How a table writes the commands of a joint, if that is what a column holds.
+fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
+    let Role::Joint(joint) = column.role else { return None };
+    Some(CommandColumn { joint, name: table.name_of(column.place).to_owned(), unit: (column.to_si)(1.0) })
 }
 
 /// The columns of commands among all of them.
@@ -170,6 +241,12 @@ struct Builder {
     measurements: Measurements,
     session: LabelsBuilder,
     target: LabelsBuilder,
+    /// Whether readings are the configurations.
+    uses: bool,
+    /// What rx, ry and rz are.
+    rotation: RotationKind,
+    /// What the files are called, where that stands for something.
+    stems: Vec<String>,
     /// Columns of the first file and their names.
     columns: Vec<(Column, String)>,
 }
@@ -183,7 +260,11 @@ impl Builder {
             origin: Vec::new(),
             joints: problem.joints.len(),
             configurations: Vec::new(),
+            other_configurations: both_joints(columns).then(Vec::new),
+            nests: Vec::new(),
             positions: Vec::new(),
+            position_measured: columns.has(Role::Position(0)),
+            orientations: (columns.orientations() != (false, false)).then(Vec::new),
             sigma: list(Role::Sigma),
             payload: list(Role::Payload),
             hoist: list(Role::Hoist),
@@ -195,10 +276,25 @@ impl Builder {
             session: Labels::default(),
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
+            command_columns: columns.read.iter().filter_map(|column| command(column, table)).collect(),
             warnings: Vec::new(),
         };
-        let columns = columns.read.iter().map(|column| (*column, table.name_of(column.place).to_owned())).collect();
-        Self { measurements, session: LabelsBuilder::default(), target: LabelsBuilder::default(), columns }
+        let columns = columns.read.iter().map(|column| (*column, columns.name_of(column).to_owned())).collect();
+        let (session, target) = (LabelsBuilder::default(), LabelsBuilder::default());
+        Self {
+            measurements,
+            session,
+            target,
+            uses: problem.data.joints == JointSource::Read,
+            rotation: problem.data.dialect.rotation,
+            stems: stems(files),
+            columns,
+        }
+    }
+
+    /// Rows so far, those of fixed points among them.
+    fn seen(&self) -> usize {
+        self.measurements.len() + self.measurements.nests.len()
     }
 
     /// Whether a file has the columns of the first one; `pose` alone may come and go.
@@ -220,6 +316,31 @@ impl Builder {
         Ok(())
     }
 
+    /// Adds the row that the table is at, which measures a fixed point.
+    fn push_nest(&mut self, file: usize, name: &str, table: &Table, columns: &Columns) -> Result<(), InputError> {
+        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let mut reading = NestReading {
+            origin: (narrow(file), narrow(table.line())),
+            name: name.to_owned(),
+            position: Vector3::zeros(),
+            time: None,
+            after: self.measurements.len(),
+            session: String::new(),
+        };
+        for column in &columns.read {
+            match column.role {
+                Role::Position(axis) => {
+                    set(reading.position.as_mut_slice(), axis, (column.to_si)(table.number(column.place)?));
+                }
+                Role::Time => reading.time = Some(table.time(column.place, column.to_si)?),
+                Role::Session => table.text(column.place)?.clone_into(&mut reading.session),
+                _ => {}
+            }
+        }
+        self.measurements.nests.push(reading);
+        Ok(())
+    }
+
     /// Adds the row that the table is at.
     fn push(&mut self, file: usize, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let measurements = &mut self.measurements;
@@ -228,41 +349,64 @@ impl Builder {
         let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         measurements.origin.push((narrow(file), narrow(table.line())));
         measurements.configurations.resize((row + 1) * joints, 0.0);
+        if let Some(other) = &mut measurements.other_configurations {
+            other.resize((row + 1) * joints, 0.0);
+        }
         if let Some(approach) = &mut measurements.approach {
             approach.resize((row + 1) * joints, 0.0);
         }
         if !measurements.time_measured {
             measurements.time.push(row as f64);
         }
-        let (mut position, mut pose) = (Vector3::zeros(), None);
+        let (mut position, mut pose, mut turned) = (Vector3::zeros(), None, Cells::default());
         for column in &columns.read {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
-                Role::Joint(joint) => set(&mut measurements.configurations, row * joints + joint, number()?),
+                Role::Joint(joint) | Role::Reading(joint) => {
+                    let value = number()?;
+                    if self.uses == column.role.is_reading() {
+                        set(&mut measurements.configurations, row * joints + joint, value);
+                    } else if let Some(other) = &mut measurements.other_configurations {
+                        set(other, row * joints + joint, value);
+                    }
+                }
                 Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
                 Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
                 Role::Hoist => add(&mut measurements.hoist, number()?),
                 Role::Temperature => add(&mut measurements.temperature, number()?),
-                Role::Time => measurements.time.push(number()?),
+                Role::Time => measurements.time.push(table.time(column.place, column.to_si)?),
                 Role::Approach(joint) => {
                     let direction = direction(table, column)?;
                     if let Some(approach) = &mut measurements.approach {
                         set(approach, row * joints + joint, direction);
                     }
                 }
-                // Kept for later: checked, not stored.
-                Role::Orientation(_) => _ = number()?,
+                Role::Orientation(axis) => set(turned.angles.as_mut_slice(), axis, number()?),
+                Role::Quaternion(axis) => set(&mut turned.quaternion, axis, number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
                 Role::Target => self.target.push(table.name(column.place)?),
+                // Rows of the arm name none.
+                Role::Nest => {}
                 Role::Pose => pose = table.text(column.place)?.parse().ok().filter(|number: &f64| number.is_finite()),
             }
+        }
+        match columns.file {
+            Some(Role::Session) => self.session.push(&self.stems.get(file).cloned().unwrap_or_default()),
+            Some(Role::Target) => self.target.push(&self.stems.get(file).cloned().unwrap_or_default()),
+            _ => {}
         }
         if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
             marked.push(is_validation(table, place)?);
         }
         measurements.positions.push(position);
+        if let Some(orientations) = &mut measurements.orientations {
+            orientations.push(match columns.orientations() {
+                (true, _) => turned.of_angles(self.rotation),
+                _ => turned.of_quaternion().ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
+            });
+        }
         match (&mut measurements.pose, pose) {
             (Some(poses), Some(pose)) => poses.push(pose),
             _ => measurements.pose = None,
@@ -272,7 +416,7 @@ impl Builder {
 
     /// All that was read, and the columns of the first file.
     fn finish(self) -> (Measurements, Vec<(Column, String)>) {
-        let Self { mut measurements, session, target, columns } = self;
+        let Self { mut measurements, session, target, columns, .. } = self;
         measurements.session = session.labels;
         if measurements.session.names.is_empty() {
             let of_row = vec![0; measurements.len()];
@@ -281,6 +425,17 @@ impl Builder {
         measurements.target = measurements.target.map(|_| target.labels);
         (measurements, columns)
     }
+}
+
+/// The names of files without their endings; of those that share one with their folders.
+fn stems(files: &[PathBuf]) -> Vec<String> {
+    let stem = |file: &PathBuf| file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()));
+    let all: Vec<String> = files.iter().map(stem).collect();
+    let named = |(file, own): (&PathBuf, &String)| {
+        let shared = all.iter().filter(|other| *other == own).count() > 1;
+        if shared { one_line(&file.with_extension("").to_string_lossy()) } else { own.clone() }
+    };
+    files.iter().zip(&all).map(named).collect()
 }
 
 /// Gives a place of a list, which is there, its value.

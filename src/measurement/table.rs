@@ -1,18 +1,27 @@
 //! A CSV file, record by record, with its lines counted.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
+use super::dialect::{LOOKED_AT, Layout, Rewritten};
 use super::lines::{Lines, RECORD_KIB};
+use super::time::iso_8601;
 use crate::error::{BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines};
+use crate::problem::Dialect;
 use crate::problem::item::GREATEST;
 
 /// Most columns of a table.
 const COLUMNS: usize = 10_000;
+
+/// How the workbooks of spreadsheet programs begin, which are archives.
+const WORKBOOK: &[u8] = b"PK\x03\x04";
+
+/// A text, its beginning looked at already.
+type Looked = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
 
 /// An open CSV file.
 pub(super) struct Table {
@@ -20,27 +29,38 @@ pub(super) struct Table {
     /// The names in the header line, without white space at their ends.
     pub header: Vec<String>,
     header_line: usize,
-    reader: Reader<Lines<BufReader<Box<dyn Read>>>>,
+    reader: Reader<Rewritten<Lines<BufReader<Looked>>>>,
     record: ByteRecord,
     line: usize,
+    delimiter: char,
+    decimal_comma: bool,
 }
 
 impl Table {
-    /// Opens a file and reads its header; `missing` makes the error where there is no such file.
-    pub fn open(file: &Path, missing: impl FnOnce() -> InputError) -> Result<Self, InputError> {
+    /// Opens a file written in a `dialect` and reads its header; `missing` makes the error where there is no such file.
+    pub fn open(file: &Path, dialect: &Dialect, missing: impl FnOnce() -> InputError) -> Result<Self, InputError> {
         let input = File::open(file).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => missing(),
             _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
         })?;
-        Self::of_text(file, Box::new(input))
+        Self::of_text(file, dialect, Box::new(input))
     }
 
-    /// Reads the header of a text that stands in no file; messages call it `file`.
-    pub fn of_text(file: &Path, input: Box<dyn Read>) -> Result<Self, InputError> {
+    /// Reads the header of a text; messages call it `file`.
+    pub fn of_text(file: &Path, dialect: &Dialect, mut input: Box<dyn Read>) -> Result<Self, InputError> {
+        let unreadable = |source| Location::file(file).error(InputErrorKind::Unreadable { source });
+        let mut beginning = Vec::new();
+        input.by_ref().take(LOOKED_AT).read_to_end(&mut beginning).map_err(unreadable)?;
+        if beginning.starts_with(WORKBOOK) {
+            return Err(Location::file(file).error(InputErrorKind::Workbook));
+        }
+        let layout = Layout::of(&beginning, dialect);
+        let lines = Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
-            .from_reader(Lines::new(BufReader::with_capacity(1 << 16, input)));
+            .delimiter(layout.byte())
+            .from_reader(Rewritten::new(lines, layout, dialect.comment.as_deref()));
         let mut table = Self {
             file: file.to_owned(),
             header: Vec::new(),
@@ -48,6 +68,8 @@ impl Table {
             reader,
             record: ByteRecord::new(),
             line: 1,
+            delimiter: char::from(layout.byte()),
+            decimal_comma: dialect.decimal_comma,
         };
         if !table.advance()? {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
@@ -71,7 +93,7 @@ impl Table {
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
         {
-            return Err(table.error(InputErrorKind::NotCommas { found }));
+            return Err(table.error(InputErrorKind::OtherDelimiter { found }));
         }
         Ok(table)
     }
@@ -153,14 +175,40 @@ impl Table {
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
         let word = self.word(place)?;
         let value = || shortened(word);
-        match word.parse::<f64>() {
+        let with_point = (self.decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
+        match with_point.as_deref().unwrap_or(word).parse::<f64>() {
             Ok(number) if number.abs() <= GREATEST => Ok(number),
             Ok(number) if number.is_finite() => {
                 Err(self.cell_error(place, InputErrorKind::TooGreat { value: value() }))
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
+            Err(_) if word.contains(',') && !self.decimal_comma => {
+                Err(self.cell_error(place, InputErrorKind::DecimalComma { value: value() }))
+            }
             Err(_) => Err(self.cell_error(place, InputErrorKind::NotANumber { value: value() })),
         }
+    }
+
+    /// A cell of the row as a time: a number in a unit, or a date and time after ISO 8601 \[s since 1970\].
+    pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
+        let word = self.word(place)?;
+        match iso_8601(word) {
+            Some(seconds) => Ok(seconds),
+            None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
+                Err(self.cell_error(place, InputErrorKind::NotATime { value: shortened(word) }))
+            }
+            None => match self.number(place).map(to_si) {
+                Ok(seconds) if !seconds.is_finite() => {
+                    Err(self.cell_error(place, InputErrorKind::NotATime { value: shortened(word) }))
+                }
+                other => other,
+            },
+        }
+    }
+
+    /// Whether a cell of the row is a date and time after ISO 8601.
+    pub fn is_date(&self, place: usize) -> bool {
+        self.text(place).is_ok_and(|word| iso_8601(word).is_some())
     }
 
     /// Name of a column.
@@ -179,7 +227,8 @@ impl Table {
         Location::file(&self.file).at_line(self.header_line).with_key(format!("column {}", shortened(name)))
     }
 
-    fn error(&self, kind: InputErrorKind) -> InputError {
+    /// A mistake in the row as a whole.
+    pub fn error(&self, kind: InputErrorKind) -> InputError {
         self.location(None).error(kind)
     }
 
@@ -188,7 +237,7 @@ impl Table {
         let (mut text, mut span) = (String::new(), None);
         for (index, cell) in self.record.iter().enumerate() {
             if index > 0 {
-                text.push(',');
+                text.push(self.delimiter);
             }
             let start = text.len();
             text.push_str(&String::from_utf8_lossy(cell));

@@ -4,21 +4,19 @@
 //! every load moves too.
 
 use nalgebra::{DVector, Vector3};
-use num_dual::DualSVec64;
 
 use super::Model;
 use super::driven::Commands;
 use super::elastic::Elastic;
 use super::inputs::inputs;
 use super::instrument::Instrument;
+use super::parts::{Base, Inner, Target};
 use super::pose::Pose;
 use super::rigid::Rigid;
 use super::rows::Rows;
+use super::turn;
 use crate::least_squares::Block;
 use crate::model::parameter::{Driver, Slot};
-use crate::problem::PoseView;
-use crate::scalar::{gradient, seeded};
-use crate::spatial::{Frame, rotation_axes};
 
 /// The model linearised about one parameter vector; reused for every pose.
 pub(super) struct Linearised {
@@ -30,46 +28,17 @@ pub(super) struct Linearised {
     bases: Vec<Base>,
     targets: Vec<Target>,
     inner: Inner,
-}
-
-/// A base frame, how its rotation turns with its rotation vector, and the columns of its six coordinates.
-pub(super) struct Base {
-    pub frame: Frame<f64>,
-    turning: [Frame<f64>; 3],
-    columns: [Option<usize>; 6],
-}
-
-pub(super) struct Target {
-    pub position: Vector3<f64>,
-    columns: [Option<usize>; 3],
-}
-
-/// How the arm's own parameters are differentiated.
-enum Inner {
-    /// Motion by motion.
-    Rigid(Rigid),
-    /// Through the statics.
-    Elastic(Box<Elastic>),
+    /// Memory for derivatives of orientations.
+    probe: Block,
 }
 
 impl Linearised {
-    /// About the full parameter vector `x`; `unknowns[j]` is the parameter of column j.
-    pub fn new(model: &Model, x: &DVector<f64>, unknowns: &[usize]) -> Self {
+    /// About the full parameter vector `x`; `unknowns[j]` is the parameter of column j, and poses may be `oriented`.
+    pub fn new(model: &Model, x: &DVector<f64>, unknowns: &[usize], oriented: bool) -> Self {
         let arm = model.arm(|k| x[k]);
-        let mut bases: Vec<Base> = model
-            .base_poses(x.as_slice())
-            .into_iter()
-            .map(|pose| Base {
-                frame: Frame::from_rotation_vector(pose.translation, &pose.rotation),
-                turning: turning(&pose.rotation),
-                columns: [None; 6],
-            })
-            .collect();
-        let mut targets: Vec<Target> = model
-            .target_positions(x.as_slice())
-            .into_iter()
-            .map(|position| Target { position, columns: [None; 3] })
-            .collect();
+        let mut bases: Vec<Base> = model.base_poses(x.as_slice()).iter().map(Base::new).collect();
+        let places = model.target_positions(x.as_slice()).into_iter().zip(model.target_rotations(x.as_slice()));
+        let mut targets: Vec<Target> = places.map(|(position, rotation)| Target::new(position, &rotation)).collect();
         let (mut scale, mut shifts) = (None, Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
             let parameter = &model.parameters[k];
@@ -89,10 +58,12 @@ impl Linearised {
         };
         let commands = model.commands(x.as_slice());
         let instrument = model.instrument_at(x.as_slice());
-        Self { commands, instrument, scale, shifts, bases, targets, inner }
+        let probe = Block::zeros(if oriented { turn::PROBE_ROWS } else { 0 }, unknowns.len());
+        Self { commands, instrument, scale, shifts, bases, targets, inner, probe }
     }
 
-    /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros.
+    /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros, six where its orientation
+    /// counts.
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
@@ -100,20 +71,18 @@ impl Linearised {
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
         let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, target, &mut rows) else {
+        let Some(last) = self.inner.write(&pose.setup, &setup, base, &target.position, &mut rows) else {
             rows.put(last_column, &Vector3::from_element(f64::NAN));
             return;
         };
         let predicted = last.point(&target.position);
-        for (axis, &column) in base.columns.iter().enumerate() {
-            if axis < 3 {
-                rows.put_if(column, || Vector3::ith(axis, 1.0));
-            } else {
-                let in_arm = || base.frame.resolve(&(predicted - base.frame.origin));
-                rows.put_if(column, || base.turning[axis - 3].vector(&in_arm()));
-            }
+        for (axis, &column) in base.columns.iter().take(3).enumerate() {
+            rows.put_if(column, || Vector3::ith(axis, 1.0));
         }
-        for (axis, &column) in target.columns.iter().enumerate() {
+        for (column, derivative) in base.turned(&predicted) {
+            rows.put(column, &derivative);
+        }
+        for (axis, &column) in target.columns.iter().take(3).enumerate() {
             rows.put_if(column, || last.axes[axis]);
         }
         rows.scale = per_sigma;
@@ -123,33 +92,9 @@ impl Linearised {
         }
         let seen = self.instrument.of(&predicted, &pose.setup);
         rows.put(last_column, &(seen - pose.measured));
-    }
-}
-
-impl Inner {
-    /// Writes the derivatives with respect to the arm's own parameters; returns the last frame of the pose, measuring
-    /// frame, `None` where it has no equilibrium.
-    ///
-    /// `setup` is the pose as the joints take it, `commanded` as it was commanded.
-    #[inline]
-    fn write(
-        &mut self,
-        commanded: &PoseView,
-        setup: &PoseView,
-        base: &Base,
-        target: &Target,
-        rows: &mut Rows,
-    ) -> Option<Frame<f64>> {
-        match self {
-            Self::Rigid(rigid) => Some(rigid.write(commanded, setup, &base.frame, &target.position, rows)),
-            Self::Elastic(elastic) => elastic.write(commanded, setup, &base.frame, &target.position, rows),
+        if let Some(orientation) = &pose.orientation {
+            let about = turn::About { setup: (&pose.setup, &setup), base, target, last: &last };
+            turn::write(&mut self.inner, &mut self.probe, &about, orientation, (block, row + 3));
         }
     }
-}
-
-/// Derivatives of a rotation exp(`[w]×`) with respect to the three coordinates of w, as the derivatives of its axes.
-fn turning(w: &Vector3<f64>) -> [Frame<f64>; 3] {
-    let seeded_w: Vector3<DualSVec64<3>> = Vector3::from_fn(|i, _| seeded(w[i], Some(i)));
-    let axes = rotation_axes(&seeded_w).map(|axis| axis.map(|coordinate| gradient(&coordinate)));
-    std::array::from_fn(|k| Frame { axes: axes.map(|axis| axis.map(|g| g[k])), origin: Vector3::zeros() })
 }

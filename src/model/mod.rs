@@ -12,14 +12,16 @@ mod enter;
 mod inputs;
 mod instrument;
 pub mod parameter;
+mod parts;
 mod pose;
 mod poses;
 mod rigid;
 mod rows;
 mod terms;
+mod turn;
 
 pub use ablation::Ablation;
-pub use pose::Pose;
+pub use pose::{Pose, SeenOrientation};
 pub use poses::PoseResiduals;
 
 use nalgebra::Vector3;
@@ -42,6 +44,8 @@ pub struct Model {
     instrument: Instrument,
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
+    /// Orientation of each target in the last frame, a rotation vector \[rad\].
+    turned: Vec<Vector3<f64>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
     /// Linear inequalities between them.
@@ -68,6 +72,7 @@ impl Model {
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
+            turned: vec![problem.tool.rotation; targets.len()],
             parameters,
         })
     }
@@ -164,10 +169,21 @@ impl Model {
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
-            if let Slot::Target { target, axis } = parameter.slot {
+            if let Slot::Target { target, axis: axis @ 0..3 } = parameter.slot {
                 targets[target][axis] += x;
             }
         }
         targets
+    }
+
+    /// Orientations of the targets in the last frame, rotation vectors \[rad\].
+    pub fn target_rotations(&self, x: &[f64]) -> Vec<Vector3<f64>> {
+        let mut turned = self.turned.clone();
+        for (parameter, x) in self.parameters.iter().zip(x) {
+            if let Slot::Target { target, axis: axis @ 3.. } = parameter.slot {
+                turned[target][axis - 3] += x;
+            }
+        }
+        turned
     }
 }

@@ -17,4 +17,15 @@ pub struct Pose<'a> {
     pub measured: Vector3<f64>,
     /// 1 σ of each coordinate \[m\].
     pub sigma: f64,
+    /// The orientation of the target, where it counts.
+    pub orientation: Option<SeenOrientation>,
+}
+
+/// A measured orientation of a target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenOrientation {
+    /// Its axes, measuring frame; `None`: as predicted, of poses that are still to be measured.
+    pub axes: Option<[Vector3<f64>; 3]>,
+    /// 1 σ about each axis \[rad\].
+    pub sigma: f64,
 }

@@ -10,8 +10,16 @@ use super::derivative::Linearised;
 use super::pose::Pose;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::mechanics::{Equilibrated, Workspace};
+use crate::spatial::{Frame, rotation_axes, turn_between};
+
+/// Coordinates of a position, and of a position with an orientation.
+const POSITION: usize = 3;
+const POSE: usize = 6;
 
 /// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the parameters.
+///
+/// Three rows a pose; six where any has an orientation that counts, the last three log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
+/// measuring frame, and 0 for poses without.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
     poses: Vec<Pose<'a>>,
@@ -19,12 +27,21 @@ pub struct PoseResiduals<'a> {
     unknowns: Vec<usize>,
     /// Full parameter vector; the unknowns' entries are overwritten.
     at: DVector<f64>,
+    rows: usize,
+}
+
+/// What is seen of a pose.
+struct Seen {
+    position: Vector3<f64>,
+    /// Rotation vector from the predicted to the measured orientation, where that counts \[rad\].
+    turn: Option<Vector3<f64>>,
 }
 
 impl<'a> PoseResiduals<'a> {
     /// Residuals of `poses`; the parameters listed in `unknowns` vary, the others stay as in `at`.
     pub fn new(model: &'a Model, poses: Vec<Pose<'a>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
-        Self { model, poses, unknowns, at }
+        let rows = if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
+        Self { model, poses, unknowns, at, rows }
     }
 
     /// The full parameter vector for unknowns `x`.
@@ -53,13 +70,23 @@ impl<'a> PoseResiduals<'a> {
 
     /// Residuals measured − predicted, measuring frame \[m\]; NaN where a pose has no equilibrium.
     pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        self.errors(x, |pose, seen| pose.measured - seen.position)
+    }
+
+    /// Rotation vectors from the predicted to the measured orientations, measuring frame \[rad\]; 0 for poses without, NaN where a
+    /// pose has no equilibrium.
+    pub fn orientation_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        self.errors(x, |_, seen| seen.turn.unwrap_or_default())
+    }
+
+    fn errors(&self, x: &DVector<f64>, of: impl Fn(&Pose, &Seen) -> Vector3<f64> + Sync) -> Vec<Vector3<f64>> {
         let mut errors = vec![Vector3::zeros(); self.poses.len()];
         let write = |(chunk, errors): (usize, &mut [Vector3<f64>])| {
             let first = chunk * CHUNK_ITEMS;
             let mut left = errors.iter_mut();
-            self.each_prediction(x, first..first + left.len(), |pose, predicted| {
+            self.each_prediction(x, first..first + left.len(), |pose, seen| {
                 if let Some(error) = left.next() {
-                    *error = pose.measured - predicted;
+                    *error = of(pose, &seen);
                 }
             });
         };
@@ -71,24 +98,31 @@ impl<'a> PoseResiduals<'a> {
         errors
     }
 
-    fn each_prediction(&self, x: &DVector<f64>, items: Range<usize>, mut use_it: impl FnMut(&Pose, Vector3<f64>)) {
+    fn each_prediction(&self, x: &DVector<f64>, items: Range<usize>, mut use_it: impl FnMut(&Pose, Seen)) {
         let full = self.full(x);
         let arm = self.model.arm(|k| full[k]);
         let bases = self.model.base_frames(full.as_slice());
         let targets = self.model.target_positions(full.as_slice());
+        let turned = self.model.target_rotations(full.as_slice());
+        let turned: Vec<_> = turned.iter().map(rotation_axes).collect();
         let instrument = self.model.instrument_at(full.as_slice());
         let mut commands = self.model.commands(full.as_slice());
         let mut ws = Workspace::default();
         let mut rest = Equilibrated::default();
         for pose in &self.poses[items] {
-            let predicted = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
+            let lost = Vector3::from_element(f64::NAN);
+            let seen = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
                 Ok(()) => {
                     let position = bases[pose.base].point(&rest.frame.point(&targets[pose.target]));
-                    instrument.of(&position, &pose.setup)
+                    let turn = pose.orientation.map(|own| {
+                        let axes = turned[pose.target].map(|axis| bases[pose.base].vector(&rest.frame.vector(&axis)));
+                        own.axes.map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
+                    });
+                    Seen { position: instrument.of(&position, &pose.setup), turn }
                 }
-                Err(_) => Vector3::from_element(f64::NAN),
+                Err(_) => Seen { position: lost, turn: pose.orientation.map(|_| lost) },
             };
-            use_it(pose, predicted);
+            use_it(pose, seen);
         }
     }
 }
@@ -107,19 +141,44 @@ impl Model {
         measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
     }
 
+    /// Rotation vectors from the predicted to the measured orientations of poses, measuring frame \[rad\], as
+    /// [`PoseResiduals::orientation_errors`].
+    pub fn orientation_residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        PoseResiduals::new(self, poses, Vec::new(), x.clone()).orientation_errors(&DVector::zeros(0))
+    }
+
+    /// Last frames of the arm in its base frame at the full parameter vector `x`; `None` without equilibrium.
+    pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
+        let arm = self.arm(|k| x[k]);
+        let mut commands = self.commands(x);
+        let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+        let frame = |pose: &Pose| {
+            arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest).ok()?;
+            Some(rest.frame)
+        };
+        poses.iter().map(frame).collect()
+    }
+
+    /// Predicted orientations of the targets at the full parameter vector `x`, rotation vectors, measuring frame \[rad\]; NaN where a
+    /// pose has no equilibrium.
+    pub fn orientations(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+        let (bases, turned) = (self.base_frames(x), self.target_rotations(x));
+        let still = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let orientation = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
+            let last = bases[pose.base].seen(&frame?);
+            Some(turn_between(&still, &rotation_axes(&turned[pose.target]).map(|axis| last.vector(&axis))))
+        };
+        let all = poses.iter().zip(self.frames(poses, x)).map(orientation);
+        all.map(|turn| turn.unwrap_or(Vector3::from_element(f64::NAN))).collect()
+    }
+
     /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.
     ///
     /// What effects do to the measurement is not in them.
     pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {
-        let arm = self.arm(|k| x[k]);
         let targets = self.target_positions(x);
-        let mut commands = self.commands(x);
-        let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
-        let point = |pose: &Pose| {
-            arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest).ok()?;
-            Some(rest.frame.point(&targets[pose.target]))
-        };
-        poses.iter().map(point).collect()
+        let frames = self.frames(poses, x);
+        poses.iter().zip(frames).map(|(pose, frame)| Some(frame?.point(&targets[pose.target]))).collect()
     }
 }
 
@@ -133,23 +192,25 @@ impl LeastSquares for PoseResiduals<'_> {
     }
 
     fn rows_per_item(&self) -> usize {
-        3
+        self.rows
     }
 
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-        let mut rows = out.chunks_exact_mut(3);
-        self.each_prediction(x, items, |pose, predicted| {
-            if let Some(row) = rows.next() {
-                row.copy_from_slice(((pose.measured - predicted) / pose.sigma).as_slice());
-            }
+        let mut rows = out.chunks_exact_mut(self.rows);
+        self.each_prediction(x, items, |pose, seen| {
+            let Some((position, turn)) = rows.next().map(|row| row.split_at_mut(POSITION)) else { return };
+            position.copy_from_slice(((pose.measured - seen.position) / pose.sigma).as_slice());
+            let sigma = pose.orientation.map_or(1.0, |own| own.sigma);
+            let error = seen.turn.unwrap_or_default() / sigma;
+            turn.iter_mut().zip(&error).for_each(|(out, error)| *out = *error);
         });
     }
 
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let full = self.full(x);
-        let mut linearised = Linearised::new(self.model, &full, &self.unknowns);
+        let mut linearised = Linearised::new(self.model, &full, &self.unknowns, self.rows == POSE);
         for (k, pose) in self.poses[items].iter().enumerate() {
-            linearised.write(pose, block, 3 * k);
+            linearised.write(pose, block, self.rows * k);
         }
     }
 }

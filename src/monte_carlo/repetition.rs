@@ -25,7 +25,7 @@ struct Data {
 
 /// The problem as a cell declares it.
 pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
-    let mut problem = study.problem.clone();
+    let mut problem = study.problem.positions_alone();
     problem.data.position_sigma = Some(cell.sigma);
     problem
 }
@@ -104,18 +104,15 @@ pub fn table(rows: &[Row]) -> Measurements {
         joints: rows.first().map_or(0, |row| row.conditions.configuration.len()),
         configurations: rows.iter().flat_map(|row| row.conditions.configuration.iter().copied()).collect(),
         positions: rows.iter().map(|row| row.position).collect(),
-        sigma: None,
+        position_measured: true,
         payload: of(|row| row.conditions.payload),
         hoist: of(|row| row.conditions.hoist),
         temperature: of(|row| row.conditions.temperature),
         time: rows.iter().map(|row| row.conditions.time).collect(),
         time_measured: true,
         approach: (!approach.is_empty()).then_some(approach),
-        pose: None,
         session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
-        target: None,
-        marked_held_out: None,
-        warnings: Vec::new(),
+        ..Measurements::default()
     }
 }
 

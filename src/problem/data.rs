@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::dialect::{self, Dialect};
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -20,12 +21,40 @@ pub struct Data {
     pub held_out: Option<HeldOut>,
     /// T₀ [°C].
     pub reference_temperature: Option<f64>,
+    /// Which of commands and readings of the joints are the configuration.
+    pub joints: JointSource,
+    /// 1 σ of a measured orientation about each axis \[rad\]; `None`: orientations are not fitted.
+    pub orientation_sigma: Option<f64>,
+    /// Whether orientations are fitted; without a σ they never are.
+    pub fits_orientation: bool,
+    /// How the files are written.
+    pub dialect: Dialect,
     /// Where `files` stands, or `[data]`, for errors.
     pub files_location: Location,
     /// Where `held_out` stands, or `[data]`, for errors.
     pub held_out_location: Location,
     /// Where `[data]` stands, for errors.
     pub location: Location,
+}
+
+/// Where the configurations come from, in tables that have both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum JointSource {
+    /// What the joints were told: `q1_deg`.
+    #[default]
+    Commanded,
+    /// What their encoders read: `q1_read_deg`.
+    Read,
+}
+
+impl JointSource {
+    /// As the file has it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Commanded => "commanded",
+            Self::Read => "read",
+        }
+    }
 }
 
 /// `held_out` of `[data]`.
@@ -55,6 +84,10 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
             position_sigma: None,
             held_out: None,
             reference_temperature: None,
+            joints: JointSource::Commanded,
+            orientation_sigma: None,
+            fits_orientation: false,
+            dialect: Dialect::default(),
             files_location: location.clone(),
             held_out_location: location.clone(),
             location,
@@ -81,8 +114,25 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         held_out = Some(held_out_rows(item.section()?)?);
     }
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
+    let sources = [JointSource::Commanded, JointSource::Read];
+    let joints = section.word("joints", &["commanded", "read"], &sources)?.unwrap_or_default();
+    let orientation_sigma =
+        section.positive("orientation_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+    let dialect = dialect::read(&mut section)?;
     section.finish()?;
-    Ok(Data { files, position_sigma, held_out, reference_temperature, files_location, held_out_location, location })
+    Ok(Data {
+        files,
+        position_sigma,
+        held_out,
+        reference_temperature,
+        joints,
+        orientation_sigma,
+        fits_orientation: orientation_sigma.is_some(),
+        dialect,
+        files_location,
+        held_out_location,
+        location,
+    })
 }
 
 fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {

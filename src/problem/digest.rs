@@ -15,7 +15,7 @@ impl Problem {
     /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
     /// (`5.00000000000e-1`):
     /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
-    ///   and rotation of the base; mass of the payload;
+    ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector;
     /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
     ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
     ///   and with a hoist `hoist`, force, hook and direction;
@@ -26,7 +26,7 @@ impl Problem {
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
-        let Tool { target, payload_at, payload_mass } = tool;
+        let Tool { target, rotation: turned, payload_at, payload_mass } = tool;
         let BasePose { translation, rotation } = base;
         let mut text = match equilibrium {
             Equilibrium::Undeflected => "undeflected".to_owned(),
@@ -35,6 +35,10 @@ impl Problem {
         let _ = write!(text, " {beam_elements}");
         vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
         number(&mut text, *payload_mass);
+        if *turned != Vector3::zeros() {
+            text.push_str(" turned");
+            vectors(&mut text, &[turned]);
+        }
         for own in joints {
             joint(&mut text, own);
         }

@@ -180,6 +180,11 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
+    /// Text, which may be empty.
+    pub fn any_text(&self) -> Result<&'a str, InputError> {
+        self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))
+    }
+
     /// The elements of a list, counted from 1 in messages.
     pub fn list(&self, expected: &'static str) -> Result<Vec<Self>, InputError> {
         let array = self.value.as_array().ok_or_else(|| self.wrong_type(expected))?;

@@ -8,6 +8,7 @@ mod arm;
 mod conditions;
 mod constraints;
 mod data;
+mod dialect;
 pub(crate) mod digest;
 pub(crate) mod effect;
 pub(crate) mod effects;
@@ -25,7 +26,8 @@ use nalgebra::Vector3;
 pub use argument::Argument;
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
-pub use data::{Data, HeldOut};
+pub use data::{Data, HeldOut, JointSource};
+pub use dialect::{ColumnOf, ColumnRule, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind};
 pub use parameters::{Freedom, ParameterRule, Quantities};
@@ -92,6 +94,8 @@ pub enum Equilibrium {
 pub struct Tool {
     /// The measured point in the last frame \[m\].
     pub target: Vector3<f64>,
+    /// Orientation of what is measured in the last frame, a rotation vector \[rad\].
+    pub rotation: Vector3<f64>,
     /// Where a payload hangs, in the last frame \[m\].
     pub payload_at: Vector3<f64>,
     /// Payload where no column `payload_kg` says otherwise \[kg\].

@@ -51,6 +51,14 @@ impl Problem {
         problem
     }
 
+    /// The same problem with orientations left out of fits, and the tools' own with them.
+    #[must_use]
+    pub fn positions_alone(&self) -> Self {
+        let mut problem = self.clone();
+        problem.data.fits_orientation = false;
+        problem
+    }
+
     /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint = 3 }`); `named` is what
     /// messages call the text.
     ///
@@ -111,9 +119,11 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
 }
 
 fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
-    let mut tool = Tool { target: Vector3::zeros(), payload_at: Vector3::zeros(), payload_mass: 0.0 };
+    let mut tool =
+        Tool { target: Vector3::zeros(), rotation: Vector3::zeros(), payload_at: Vector3::zeros(), payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
+    tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
     tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
     tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;

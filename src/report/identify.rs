@@ -10,7 +10,10 @@ use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentifie
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
 use super::quantity::{decimals, mm, number};
 use super::render::{Report, report, text};
-use crate::identify::{ActiveConstraint, ErrorSummary, Estimate, Identification, Noise, Outlier, QualityFlag};
+use crate::identify::{
+    ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise,
+    OrientationErrors, Outlier, QualityFlag,
+};
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
 
@@ -34,6 +37,7 @@ object! {
         #[serde(flatten)]
         fitted: Both = Both::of(&found.fitted),
         reduced_chi2: Option<f64> = found.reduced_chi2,
+        first_time_s: f64 = found.first_time,
         estimated_sigma_mm: Option<f64> = match found.noise {
             Noise::Declared | Noise::Unknown => None,
             Noise::Estimated(sigma) => Some(sigma * 1e3),
@@ -44,6 +48,7 @@ object! {
         rank: usize = found.identifiability.rank,
         #[serde(flatten)]
         conditioning: Conditioning<'a> = Conditioning::of(&found.identifiability, found.coordinates),
+        orientation: Option<OrientationEntry> = found.orientation.as_ref().map(OrientationEntry::of),
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         unidentified: Vec<Unidentified<'a>> = unidentified(&found.identifiability, |k| found.unknowns[k].as_str()),
         weak: Vec<Unidentified<'a>> = found.weak.iter().map(|own| Unidentified::of(own, |k: usize| found.unknowns[k].as_str())).collect(),
@@ -64,6 +69,39 @@ object! {
         at_bound: Option<&'a str> = estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
         identified: f64 = estimate.identified,
         fitted: bool = estimate.fitted,
+    }
+}
+object! {
+    /// Of each axis and of the length \[°\].
+    Degrees(values: &AxisValues) {
+        x: f64 = values.x.to_degrees(),
+        y: f64 = values.y.to_degrees(),
+        z: f64 = values.z.to_degrees(),
+        norm: f64 = values.norm.to_degrees(),
+    }
+}
+object! {
+    /// An error summary of orientations.
+    Turns(summary: &ErrorSummary) {
+        n: usize = summary.n,
+        mean_deg: Degrees = Degrees::of(&summary.mean),
+        max_deg: Degrees = Degrees::of(&summary.max),
+        rms_deg: Degrees = Degrees::of(&summary.rms),
+    }
+}
+object! {
+    BothTurns(errors: &Errors) {
+        identification: Turns = Turns::of(&errors.identification),
+        held_out: Turns = Turns::of(&errors.held_out),
+    }
+}
+object! {
+    /// Errors of orientation before and after.
+    OrientationEntry(found: &OrientationErrors) {
+        registered: BothTurns = BothTurns::of(&found.registered),
+        #[serde(flatten)]
+        fitted: BothTurns = BothTurns::of(&found.fitted),
+        sigma_taken_deg: f64 = found.sigma_taken.to_degrees(),
     }
 }
 object! {
@@ -103,6 +141,7 @@ pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks =
         vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
     blocks.extend(active_constraints(found));
@@ -132,6 +171,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
     blocks.extend(beware(found, plots));
     blocks.extend(errors(found));
+    blocks.extend(orientation(found));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
     blocks.extend(remainder(problem, found, plots, FILE));
     blocks
@@ -211,6 +251,22 @@ fn errors_by_axis(found: &Identification) -> Table {
     table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
+}
+
+/// Errors of orientation before and after, where it is fitted.
+fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
+    let OrientationErrors { registered, fitted, .. } = found.orientation.as_ref()?;
+    let row = |poses: &str, when: &str, of: &ErrorSummary| {
+        let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value.to_degrees(), 4));
+        [vec![poses.to_owned(), when.to_owned()], values.to_vec()].concat()
+    };
+    let rows = vec![
+        row("identification", "before", &registered.identification),
+        row("", "after", &fitted.identification),
+        row("held out", "before", &registered.held_out),
+        row("", "after", &fitted.held_out),
+    ];
+    Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
 }
 
 /// Before and after, on both kinds of poses.
@@ -319,6 +375,28 @@ fn noise(problem: &Problem, found: &Identification) -> String {
 /// Whether residual and priors contradict the declared σ.
 pub(super) fn contradicted(found: &Identification) -> bool {
     found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > 1e-9
+}
+
+/// Which of commands and readings of the joints fits better, in one line.
+pub fn joint_sources_text(sources: &JointSources) -> String {
+    let JointSources { used, commanded, read } = *sources;
+    let better = sources.better();
+    let advice = if better == used {
+        format!("which the problem takes (joints = \"{}\" in [data])", used.as_str())
+    } else {
+        format!("write joints = \"{}\" in [data]", better.as_str())
+    };
+    format!(
+        "Joints: commands leave {} mm rms of the fitted rows, readings {} mm; the {} ones fit better: {advice}.",
+        mm(commanded, 4),
+        mm(read, 4),
+        better.as_str(),
+    )
+}
+
+/// Whether a fit leaves more than the declared noise explains.
+pub fn lacks_something(found: &Identification) -> bool {
+    contradicted(found) && found.noise_factor > 1.0
 }
 
 /// A χ² / ν with two decimals, or two digits where it is small.

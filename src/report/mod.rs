@@ -21,6 +21,7 @@ mod paper_tables;
 mod parameters;
 mod plan;
 mod poses;
+mod predict;
 mod quantity;
 mod render;
 mod replica;
@@ -36,9 +37,12 @@ pub use closed_problem::closed_problem;
 pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use figures::{Cause, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure};
-pub use identify::{estimate_json, estimate_text, identification_report, why_not_trusted};
+pub use identify::{
+    estimate_json, estimate_text, identification_report, joint_sources_text, lacks_something, why_not_trusted,
+};
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
+pub use predict::{errors_json, prediction_text, predictions_csv, residuals_csv};
 pub use render::Report;
 pub use replica::{replica_json, replica_report, replica_text};
 pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};

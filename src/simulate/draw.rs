@@ -1,6 +1,6 @@
 //! Measurements of the true arm in poses drawn at random.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -19,6 +19,7 @@ const POSES: u64 = 1;
 const NOISE: u64 = 2;
 const SPLIT: u64 = 3;
 const EFFECTS: u64 = 4;
+const TURNS: u64 = 5;
 
 /// A simulated measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,8 @@ pub struct Row {
     pub conditions: PoseConditions,
     /// What the tracker read, measuring frame \[m\].
     pub position: Vector3<f64>,
+    /// The orientation that it read, measuring frame, where it reads any.
+    pub orientation: Option<UnitQuaternion<f64>>,
     /// Whether the row is held out.
     pub held_out: bool,
 }
@@ -73,7 +76,7 @@ pub struct Draw {
     pub arm: Problem,
     /// Every parameter with its true value.
     pub parameters: Vec<TrueParameter>,
-    /// The poses in order of time, no row held out; `position` is the noise alone \[m\].
+    /// The poses in order of time, no row held out; `position` and `orientation` are the noise alone \[m\].
     pub rows: Vec<Row>,
 }
 
@@ -81,11 +84,22 @@ pub struct Draw {
 ///
 /// More poses leave the arm and the first poses as they are; another σ of the noise scales it and changes nothing else.
 pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
+    drawn(problem, truth, draw_poses(problem, truth, poses, stream(seed, POSES)), seed)
+}
+
+/// The same in given poses.
+fn drawn(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Draw {
     let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
-    let mut rows = draw_poses(problem, truth, poses, stream(seed, POSES));
     let mut noise = stream(seed, NOISE);
     for row in &mut rows {
         row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
+    }
+    if let Some(sigma) = truth.orientation_sigma {
+        let mut noise = stream(seed, TURNS);
+        for row in &mut rows {
+            let turn = Vector3::from_fn(|_, _| normal(&mut noise) * sigma);
+            row.orientation = Some(UnitQuaternion::from_scaled_axis(turn));
+        }
     }
     Draw { arm, parameters, rows }
 }
@@ -95,12 +109,44 @@ pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
 /// # Errors
 /// The arm is too soft for its loads.
 pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Result<Simulation, SimulationError> {
-    let Draw { arm, parameters, mut rows } = draw(problem, truth, poses, seed);
+    measured(problem, truth, draw(problem, truth, poses, seed), seed)
+}
+
+/// The same in given poses, one after the other; what they do not say of temperature and sides is drawn where the truth has it.
+///
+/// # Errors
+/// The arm is too soft for its loads.
+pub fn simulate_poses(
+    problem: &Problem,
+    truth: &Truth,
+    poses: Vec<PoseConditions>,
+    seed: u64,
+) -> Result<Simulation, SimulationError> {
+    let mut rows = draw_poses(problem, truth, poses.len(), stream(seed, POSES));
+    for (row, given) in rows.iter_mut().zip(poses) {
+        let drawn = std::mem::take(&mut row.conditions);
+        row.conditions = PoseConditions {
+            temperature: given.temperature.or(drawn.temperature),
+            approach: given.approach.clone().or(drawn.approach),
+            time: drawn.time,
+            elapsed: drawn.elapsed,
+            ..given
+        };
+    }
+    measured(problem, truth, drawn(problem, truth, rows, seed), seed)
+}
+
+/// Measures what was drawn.
+fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<Simulation, SimulationError> {
+    let Draw { arm, parameters, mut rows } = draw;
+    let poses = rows.len();
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
-    let seen: Vec<_> = rows.par_iter().map(|row| rig.position(&row.conditions)).collect();
+    let seen: Vec<_> = rows.par_iter().map(|row| rig.pose(&row.conditions)).collect();
     for (index, (row, seen)) in rows.iter_mut().zip(seen).enumerate() {
-        row.position += seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
+        let (position, orientation) = seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
+        row.position += position;
+        row.orientation = row.orientation.map(|noise| noise * orientation);
     }
     let split_column = match &problem.data.held_out {
         Some(HeldOut::Column(name)) => name.clone(),
@@ -177,7 +223,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
             let signed = sides.map(|side| if random.random::<bool>() { side } else { -side });
             conditions.approach = Some(signed.collect());
         }
-        rows.push(Row { conditions, position: Vector3::zeros(), held_out: false });
+        rows.push(Row { conditions, position: Vector3::zeros(), orientation: None, held_out: false });
     }
     rows
 }

@@ -26,14 +26,14 @@ mod read;
 mod strengths;
 mod truth;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::problem::{Effect, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::AtRest;
 
 pub(crate) use draw::standard_normals;
-pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate};
+pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate, simulate_poses};
 pub use effect::{Cause, Shape, TrueEffect, ValueCount};
 pub use parameters::TrueParameter;
 pub use truth::{Deviation, HeldOutRows, RandomRule, Truth};
@@ -72,10 +72,22 @@ impl Rig {
     /// # Errors
     /// The arm is too soft for its loads.
     pub fn position(&self, conditions: &PoseConditions) -> Result<Vector3<f64>, NoRest> {
+        self.pose(conditions).map(|(position, _)| position)
+    }
+
+    /// The same with the orientation of the target, measuring frame.
+    ///
+    /// # Errors
+    /// The arm is too soft for its loads.
+    pub fn pose(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
         let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
         let seen = base.point(&rest.end.point(&self.arm.tool.target));
-        if seen.iter().all(|x| x.is_finite()) { Ok(self.track(seen, conditions)) } else { Err(NoRest) }
+        let axes = base.seen(&rest.end).axes;
+        let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+        let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(self.arm.tool.rotation);
+        let finite = seen.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());
+        if finite { Ok((self.track(seen, conditions), orientation)) } else { Err(NoRest) }
     }
 
     /// What the tracker makes of a position \[m\].

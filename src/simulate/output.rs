@@ -44,7 +44,7 @@ impl Simulation {
     }
 
     fn header(&self) -> Vec<String> {
-        let ranges = &self.truth.poses;
+        let set = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
         let unit = |turns| if turns { "deg" } else { "m" };
         names.extend(self.moving().map(|(index, turns)| format!("q{}_{}", index + 1, unit(turns))));
@@ -52,13 +52,16 @@ impl Simulation {
             (true, "x_mm"),
             (true, "y_mm"),
             (true, "z_mm"),
-            (!ranges.payloads.is_empty(), "payload_kg"),
-            (ranges.hoist.is_some(), "hoist_N"),
-            (ranges.temperature.is_some(), "temperature_C"),
+            (self.truth.orientation_sigma.is_some(), "rx_deg"),
+            (self.truth.orientation_sigma.is_some(), "ry_deg"),
+            (self.truth.orientation_sigma.is_some(), "rz_deg"),
+            (set.payload.is_some(), "payload_kg"),
+            (set.hoist.is_some(), "hoist_N"),
+            (set.temperature.is_some(), "temperature_C"),
             (true, "time_s"),
         ];
         names.extend(columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
-        if ranges.approach {
+        if set.approach.is_some() {
             names.extend(self.moving().map(|(index, _)| format!("approach{}", index + 1)));
         }
         names
@@ -73,6 +76,8 @@ impl Simulation {
             q => format!("{q:.9}"),
         }));
         cells.extend(row.position.iter().map(|x| format!("{:.6}", x * 1e3)));
+        let turn = row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
+        cells.extend(turn.iter().flatten().map(|angle| format!("{angle:.7}")));
         cells.extend(set.payload.map(|mass| mass.to_string()));
         cells.extend(set.hoist.map(|force| format!("{force:.3}")));
         cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));

@@ -69,6 +69,12 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
     for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(problem.base.rotation.iter_mut()) {
         see(format!("base.{axis}"), Angle, value);
     }
+    // Behind all others, so that they are drawn as without it.
+    if problem.data.orientation_sigma.is_some() {
+        for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(problem.tool.rotation.iter_mut()) {
+            see(format!("tool.{axis}"), Angle, value);
+        }
+    }
 }
 
 /// Every parameter of a problem at its nominal value.

@@ -11,7 +11,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::{Document, Item};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
-use crate::problem::{HeldOut, Problem};
+use crate::problem::{HeldOut, Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
 impl Truth {
@@ -41,14 +41,15 @@ impl Truth {
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
-    let noise_sigma = root.section("noise")?.map_or(Ok(0.0), noise)?;
+    let (noise_sigma, turn) = root.section("noise")?.map_or(Ok((0.0, None)), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
     }
-    Ok(Truth { noise_sigma, ..truth })
+    let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
+    Ok(Truth { noise_sigma, orientation_sigma, ..truth })
 }
 
 /// The sections that say what is true, without noise.
@@ -63,16 +64,40 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
         None => Ok(Vec::new()),
     }?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
-    let section = root.section("poses")?.ok_or_else(|| root.missing("poses", "[poses], the ranges of the joints"))?;
+    let section = root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
     let (poses, time_step, held_out) = ranges::read(section, &problem.joints)?;
     let effects = strengths::read(root, problem, &poses)?;
-    Ok(Truth { parameters, random, effects, noise_sigma: 0.0, poses, time_step, held_out, segments })
+    Ok(Truth {
+        parameters,
+        random,
+        effects,
+        noise_sigma: 0.0,
+        orientation_sigma: None,
+        poses,
+        time_step,
+        held_out,
+        segments,
+    })
 }
 
-fn noise(mut section: Section<'_, '_>) -> Result<f64, InputError> {
+/// How the section `[poses]` may be written for these joints.
+fn example(joints: &[Joint]) -> String {
+    let range = |(number, joint): (usize, &Joint)| match joint.kind {
+        JointKind::Revolute => Some(format!("q{number}_deg = [-90, 90]")),
+        JointKind::Prismatic => Some(format!("q{number}_mm = [0, 500]")),
+        JointKind::Fixed => None,
+    };
+    let ranges: Vec<String> = (1..).zip(joints).filter_map(range).collect();
+    format!("[poses] with the range of each joint: {}", ranges.join(", "))
+}
+
+/// 1 σ of a position \[m\], and of an orientation if it is given \[rad\].
+fn noise(mut section: Section<'_, '_>) -> Result<(f64, Option<f64>), InputError> {
     let sigma = section.not_negative("position_sigma", Unit::Length)?;
+    let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
     section.finish()?;
-    sigma.ok_or_else(|| section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma")))
+    let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
+    Ok((sigma.ok_or_else(missing)?, turn))
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {

@@ -15,6 +15,8 @@ pub struct Truth {
     pub effects: Vec<TrueEffect>,
     /// 1 σ of a measured coordinate \[m\].
     pub noise_sigma: f64,
+    /// 1 σ of a measured orientation about each axis, where orientations are measured \[rad\].
+    pub orientation_sigma: Option<f64>,
     /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
     pub poses: PoseRanges,
     /// `[poses]`: range of the time from one pose to the next \[s\].

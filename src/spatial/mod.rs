@@ -4,4 +4,4 @@ mod frame;
 mod rotation;
 
 pub use frame::Frame;
-pub use rotation::{rotate, rotation_axes, turn_x, turn_y, turn_z};
+pub use rotation::{logarithm_slope, rotate, rotation_axes, turn_between, turn_x, turn_y, turn_z};

@@ -1,6 +1,6 @@
 //! The exponential of rotations.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::scalar::Scalar;
 
@@ -33,6 +33,27 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
         Vector3::new(xy - aw.z, diagonal(2, 0), yz + aw.x),
         Vector3::new(zx + aw.y, yz - aw.x, diagonal(0, 1)),
     ]
+}
+
+/// The rotation vector \[rad\], in the reference frame, that turns the axes `from` into `to`: log(R₂ R₁ᵀ), at most half a turn.
+pub fn turn_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
+    let turn = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
+}
+
+/// How log(exp(`[w]×`) exp(`[δ]×`)) changes with a small δ at 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C = (1 − φ/2 cot φ/2) / φ².
+///
+/// The inverse of the right Jacobian of SO(3) at a rotation vector w \[rad\] of less than a turn.      [Chirikjian 2012, ch. 10]
+pub fn logarithm_slope(w: &Vector3<f64>) -> Matrix3<f64> {
+    let squared = w.norm_squared();
+    let c = if squared < SERIES_BELOW {
+        1.0 / 12.0 + squared / 720.0 + squared * squared / 30_240.0 + squared.powi(3) / 1_209_600.0
+    } else {
+        let half = squared.sqrt() / 2.0;
+        (1.0 - half / half.tan()) / squared
+    };
+    let cross = w.cross_matrix();
+    Matrix3::identity() + cross * 0.5 + cross * cross * c
 }
 
 /// A plain vector turned about the x axis, given (sin, cos).
@@ -81,8 +102,6 @@ fn coefficients<S: Scalar>(squared: S) -> (S, S) {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Rotation3;
-
     use super::*;
     use crate::scalar::{gradient, seeded};
 
@@ -94,6 +113,26 @@ mod tests {
         for (j, axis) in [Vector3::x(), Vector3::y(), Vector3::z()].iter().enumerate() {
             let derivative = rotated.map(|coordinate| gradient(&coordinate)[j]);
             assert!((derivative - axis.cross(&v)).norm() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_logarithm_and_its_slope_invert_the_exponential() {
+        let direction = Vector3::new(0.3, -0.5, 0.8).normalize();
+        for angle in [0.0, 1e-6, 0.05, 0.099_99, 0.100_01, 1.0, 3.0] {
+            let (w, base) = (direction * angle, Vector3::new(1.0, 2.0, -0.5));
+            let from = rotation_axes(&base);
+            let to = from.map(|axis| rotate(&w, &axis));
+            assert!((turn_between(&from, &to) - w).norm() < 1e-12, "{angle}");
+            for k in 0..3 {
+                let near = |step: f64| {
+                    let delta = rotation_axes(&Vector3::ith(k, step));
+                    let turned = delta.map(|axis| rotate(&w, &axis));
+                    turn_between(&rotation_axes(&Vector3::zeros()), &turned)
+                };
+                let difference = (near(1e-5) - near(-1e-5)) / 2e-5;
+                assert!((logarithm_slope(&w).column(k) - difference).norm() < 1e-8, "{angle}");
+            }
         }
     }
 

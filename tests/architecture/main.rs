@@ -35,7 +35,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("model", &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]]),
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
-    ("identify", &[GROUND, BELOW_IDENTIFY]),
+    ("identify", &[GROUND, BELOW_IDENTIFY, &["files"]]),
     ("diagnose", &[GROUND, BELOW_IDENTIFY, &["identify"]]),
     // Which poses to measure, and what they will tell.
     ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),

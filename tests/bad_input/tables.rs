@@ -18,7 +18,10 @@ fn headers() {
         ("q1_deg,x_m,x_mm,y_m,z_m\n", &["rows.csv:1: column x_mm: given already as column x_m"]),
         ("q1_deg,x_m,y_m,z_m,y_m\n", &["rows.csv:1: column y_m: given already"]),
         ("q1_deg,x_m,y_m,z_m,note,note\n", &["rows.csv:1: column note: given already"]),
-        ("q1_deg;x_m;y_m;z_m\n", &["rows.csv:1: columns are set apart by commas, not by ';'"]),
+        (
+            "q1_deg|x_m|y_m|z_m\n",
+            &["rows.csv:1: columns are set apart by '|'; write delimiter = \"|\" in [data.format]"],
+        ),
         ("q1_deg,x_m,y_m,z_m,sigma\n", &["rows.csv:1: column sigma: a length needs a unit"]),
         ("q1_deg,x_m,y_m,z_m,sigma_deg\n", &["rows.csv:1: column sigma_deg: a length is not given in deg"]),
         ("q1_deg,x_m,y_m,z_m,rx_mm\n", &["rows.csv:1: column rx_mm: an angle is not given in mm"]),

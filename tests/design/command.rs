@@ -238,9 +238,19 @@ fn quiet_is_quiet_and_progress_keeps_to_standard_error() {
 fn every_command_has_examples() {
     let help = text(&flexcal(&["--help"]).assert().success().get_output().stdout);
     assert!(help.contains("Examples:"), "{help}");
-    for command in
-        ["identify", "trace", "loop", "compare", "compensate", "simulate", "plan", "check", "completions", "man"]
-    {
+    for command in [
+        "identify",
+        "trace",
+        "loop",
+        "compare",
+        "predict",
+        "compensate",
+        "simulate",
+        "plan",
+        "check",
+        "completions",
+        "man",
+    ] {
         assert!(help.contains(command), "{command} missing in:\n{help}");
         let own = text(&flexcal(&[command, "--help"]).assert().success().get_output().stdout);
         assert!(own.contains("Examples:\n") && own.contains(&format!("\n  flexcal {command}")), "{own}");

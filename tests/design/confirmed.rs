@@ -44,7 +44,7 @@ fn gain(fits: &[Vec<Fitted>; 2], of: impl Fn(&Fitted) -> &DVector<f64>, paramete
 #[test]
 fn planned_poses_give_smaller_errors_than_random_ones() {
     let (problem, truth) = lunar();
-    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None };
+    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None, workspace: None };
     let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
     let meaningful = plan.meaningful();
     assert!(meaningful.len() > 12, "{meaningful:?}");
@@ -62,7 +62,7 @@ fn planned_poses_halve_the_errors() {
     let mut halved = Vec::new();
     for criterion in [Criterion::S, Criterion::A, Criterion::D, Criterion::E] {
         for seed in [1, 2] {
-            let options = PlanOptions { poses: 28, criterion: &criterion, seed, progress: None };
+            let options = PlanOptions { poses: 28, criterion: &criterion, seed, progress: None, workspace: None };
             let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
             let (meaningful, all) = (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());
             let found = fits(&problem, &truth, &plan, 1000);

@@ -84,7 +84,7 @@ fn poses_that_are_given_count() {
 fn a_plan_is_the_same_for_any_number_of_threads() {
     let (problem, truth) = lunar();
     let rows = Candidates::Rows(Box::new(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0)));
-    let options = PlanOptions { poses: 12, criterion: &Criterion::S, seed: 4, progress: None };
+    let options = PlanOptions { poses: 12, criterion: &Criterion::S, seed: 4, progress: None, workspace: None };
     let run = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let plan = pool.install(|| plan(&problem, &rows, None, &options)).unwrap();

@@ -39,7 +39,7 @@ fn planned(problem: &Problem, truth: &Truth, names: [&str; 2], few: bool) -> (Me
     } else {
         Candidates::Within(within)
     };
-    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None };
+    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None, workspace: None };
     let (plan, told) = separate(&pair(problem, names).unwrap(), &candidates, None, &options).unwrap();
     (plan.poses, told)
 }

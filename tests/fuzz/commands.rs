@@ -18,7 +18,7 @@ use super::mutation::mutated;
 use super::run::{LONGEST, Ran, files, flexcal};
 
 /// Commands with what each reads; the first file is mutated most.
-const COMMANDS: [(&str, &[&str]); 17] = [
+const COMMANDS: [(&str, &[&str]); 18] = [
     ("identify .", &["problem.toml", "rows.csv"]),
     ("identify . --strategy sequential", &["problem.toml", "rows.csv"]),
     ("identify . --strategy stiffness-only --solver bounded", &["problem.toml", "rows.csv"]),
@@ -30,6 +30,7 @@ const COMMANDS: [(&str, &[&str]); 17] = [
     ("compare . --paper", &["rows.csv", "problem.toml"]),
     ("compensate . --estimate estimate.json --data targets.csv", &["targets.csv", "estimate.json", "problem.toml"]),
     ("compensate . --estimate estimate.json --data targets.csv", &["estimate.json", "targets.csv"]),
+    ("predict . --estimate estimate.json --data rows.csv", &["rows.csv", "estimate.json", "problem.toml"]),
     ("check .", &["rows.csv", "problem.toml"]),
     ("check . --truth TRUTH.toml --poses 12", &["TRUTH.toml", "problem.toml"]),
     ("plan . --truth TRUTH.toml --poses 8", &["problem.toml", "TRUTH.toml"]),

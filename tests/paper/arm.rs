@@ -112,7 +112,8 @@ pub fn model(problem: &Problem) -> Model {
 
 /// ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
 pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
-    let pose = Pose { setup: row.setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0 };
+    let pose =
+        Pose { setup: row.setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0, orientation: None };
     let residuals = PoseResiduals::new(model, vec![pose], (0..x.len()).collect(), x.clone());
     -jacobian(&residuals, x)
 }

@@ -12,7 +12,14 @@ use super::arm::{Row, model, problem, rigid, rows};
 
 /// Poses of the rigid arm measured with the geometry of table 2, exactly.
 fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
-    let pose = |row| Pose { setup: Row::setup(row), base: 0, target: 0, measured: row.values[1], sigma: 1.0 };
+    let pose = |row| Pose {
+        setup: Row::setup(row),
+        base: 0,
+        target: 0,
+        measured: row.values[1],
+        sigma: 1.0,
+        orientation: None,
+    };
     rows.iter().map(pose).collect()
 }
 

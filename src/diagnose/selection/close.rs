@@ -110,7 +110,8 @@ pub fn close_by(
 ) -> Result<ClosedLoop, IdentifyError> {
     rules.check()?;
     let data = Data::new(data, rules).with_candidates(&options.candidates);
-    let first = Fitted::new(problem.clone(), &data, options)?;
+    // Evidence is of positions: so are the fits.
+    let first = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
     let mut rounds = Rounds::new(&data, options, first.effects());

@@ -29,11 +29,11 @@ pub enum Slot {
         /// 0..6.
         axis: usize,
     },
-    /// A coordinate of a target in the last frame.
+    /// A coordinate of a target in the last frame: x, y, z, then the rotation vector of its orientation x, y, z.
     Target {
         /// Index of the target.
         target: usize,
-        /// 0..3.
+        /// 0..6.
         axis: usize,
     },
     /// A displacement of every measured position, measuring frame.
@@ -217,7 +217,7 @@ impl Slot {
                 ArmField::MountingX | ArmField::MountingY => Unit::Compliance,
                 ArmField::GravityX | ArmField::GravityY => Unit::Angle,
             },
-            Self::Base { axis, .. } if axis >= 3 => Unit::Angle,
+            Self::Base { axis, .. } | Self::Target { axis, .. } if axis >= 3 => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
             Self::Scale => Unit::Ratio,
         }
@@ -235,6 +235,11 @@ impl Slot {
             Self::Arm(_) => true,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } | Self::Scale => false,
         }
+    }
+
+    /// Whether it turns a target, which positions do not show.
+    pub fn turns_target(self) -> bool {
+        matches!(self, Self::Target { axis: 3.., .. })
     }
 
     /// Whether the slot belongs to a session's set-up (base or target) rather than to the arm.

@@ -103,6 +103,9 @@ pub fn resolve(
             (None, Some(sigma)) => (Some(sigma), &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
         };
+        if candidate.slot.turns_target() && !problem.data.fits_orientation {
+            continue;
+        }
         let unit = candidate.unit();
         let bound = |q: &Quantities| of_kind(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v });
         parameters.push(Parameter {
@@ -198,7 +201,9 @@ pub(super) fn candidates(
         }
     }
     for (target, word) in targets.iter().enumerate() {
-        for (axis, (suffix, &nominal)) in ["x", "y", "z"].iter().zip(&problem.tool.target).enumerate() {
+        let turned = problem.tool.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
+        let pose = problem.tool.target.iter().chain(turned);
+        for (axis, (suffix, &nominal)) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate() {
             let name = format!("{}.{suffix}", label("tool", word));
             out.push(declared(name, format!("tool.{suffix}"), Slot::Target { target, axis }, nominal));
         }

@@ -1,0 +1,68 @@
+//! `flexcal predict`.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::Args;
+use flexcal::identify::{self, SavedEstimate};
+use flexcal::measurement::{Measurements, Split};
+use flexcal::problem::Problem;
+use flexcal::report;
+
+use super::input::Common;
+use super::outcome::Outcome;
+use super::{diagnostic, output};
+
+/// Arguments of `flexcal predict`.
+#[derive(Debug, Args)]
+#[command(
+    mut_arg("data", |arg| arg.help("Tables of poses like measurements; positions are not needed")),
+    after_help = "Writes predictions.csv; where the table holds measured positions also residuals.csv and errors.json, the errors of all \
+rows and of each session. A session that the estimate does not know is given a base and a tool fitted to its own rows, with the arm as \
+it is.
+
+Examples:
+  flexcal predict problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data tomorrow.csv
+  flexcal predict my-arm --data poses.csv"
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// The estimate.json of an identification of the same problem; without it the nominal arm is predicted
+    #[arg(long, value_name = "ESTIMATE.json")]
+    estimate: Option<PathBuf>,
+}
+
+/// Predicts, writes what was predicted and what measurements leave of it, and prints the errors.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let problem = Problem::read(common.problem())?;
+    let results = common.results("predict", &problem, arguments.estimate.as_slice(), &["predictions.csv"])?;
+    let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
+    if !common.quiet {
+        diagnostic::print_warnings(&warnings);
+    }
+    let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
+    let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
+    if !trusted && !common.quiet {
+        diagnostic::warn("the estimate is not to be trusted, and so are the predictions not");
+    }
+    // Rows that nobody divided are predicted all the same.
+    let split = Split::new(&problem, &rows).ok();
+    let prediction = identify::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
+    let mut texts = vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
+    texts.extend(prediction.residuals.as_ref().map(|all| ("residuals.csv", report::residuals_csv(&rows, all))));
+    let errors = prediction.errors.as_ref().map(report::errors_json);
+    texts.extend(errors.clone().map(|json| ("errors.json", json)));
+    let borrowed: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
+    results.write(&borrowed)?;
+    if common.json {
+        output::print_json(&errors.unwrap_or_else(|| "{}\n".to_owned()))?;
+    } else if common.talks() {
+        let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
+        output::print(&report::prediction_text(&problem, arm, &prediction))?;
+        let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
+        output::print(&format!("\nWritten to {}: {}\n", results.folder.display(), names.join(", ")))?;
+    }
+    Ok(if trusted { Outcome::Done } else { Outcome::NotTrusted })
+}

@@ -1,0 +1,203 @@
+//! An estimate applied to rows of which it knows nothing, without another fit of the arm.
+
+use nalgebra::{DVector, Vector3};
+
+use super::outliers::outlying;
+use super::placement::UNKNOWN_SIGMA;
+use super::predict::Residual;
+use super::registration::register;
+use super::saved::{SavedEstimate, SavedEstimateError};
+use super::stage::{Stage, StageError};
+use super::{ErrorSummary, Placement, SolverChoice};
+use crate::error::InputError;
+use crate::least_squares::Loss;
+use crate::least_squares::solver::Settings;
+use crate::measurement::{Measurements, Split};
+use crate::model::parameter::Slot;
+use crate::model::{Model, Pose};
+use crate::problem::Problem;
+
+/// What an arm makes of some rows.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Prediction {
+    /// Predicted position of each row, measuring frame \[m\]; NaN where the arm has no equilibrium.
+    pub positions: Vec<Vector3<f64>>,
+    /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\], where orientation is fitted.
+    pub orientations: Option<Vec<Vector3<f64>>>,
+    /// What the rows hold beyond that; `None` where they hold no positions.
+    pub residuals: Option<Vec<Residual>>,
+    /// Their errors; `None` likewise.
+    pub errors: Option<ErrorsBySession>,
+    /// Parameters of bases and tools that the estimate lacks, fitted to their own rows with the arm as it is.
+    pub placed: Vec<String>,
+}
+
+/// Errors of all rows, and of those of each session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorsBySession {
+    /// Of all rows.
+    pub all: ErrorSummary,
+    /// Of each session by its name, in the order of the rows; none where there are no sessions.
+    pub sessions: Vec<(String, ErrorSummary)>,
+}
+
+/// Why an estimate cannot be applied.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PredictError {
+    /// Problem and rows do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The estimate is not of this problem, or lacks what the rows need.
+    #[error(transparent)]
+    Estimate(#[from] SavedEstimateError),
+    /// Bases and tools of new sessions could not be placed.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+}
+
+impl ErrorsBySession {
+    /// Of the errors measured − predicted of every row \[m\].
+    pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
+        let session = |(label, name): (usize, &String)| {
+            let own = rows.session.of_row.iter().zip(errors).filter(|(of_row, _)| **of_row == label);
+            let own: Vec<Vector3<f64>> = own.map(|(_, error)| *error).collect();
+            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), ErrorSummary::of(&own)))
+        };
+        let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
+        Self { all: ErrorSummary::of(errors), sessions }
+    }
+}
+
+/// What the arm of `problem` makes of `rows`: as identified in `estimate`, or the nominal arm without one.
+///
+/// A base or tool that is free and of which the estimate says nothing (a session that took no part in it; all of them without an
+/// estimate) is fitted to its own rows, with the arm as it is, if they hold positions and enough of them. `split` says which rows
+/// are held out, where that is known.
+///
+/// # Errors
+/// The estimate is not of this problem, or lacks a parameter that the rows need.
+pub fn predict(
+    problem: &Problem,
+    estimate: Option<&SavedEstimate>,
+    rows: &Measurements,
+    split: Option<&Split>,
+) -> Result<Prediction, PredictError> {
+    let placement = Placement::of(rows);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let model = estimate.map_or(model.clone(), |estimate| estimate.model(model));
+    if let Some(estimate) = estimate {
+        estimate.check(problem, &model)?;
+    }
+    let known = |name: &str| estimate.and_then(|estimate| estimate.value(name));
+    let mut x = DVector::zeros(model.parameters.len());
+    let mut missing = Vec::new();
+    for (k, parameter) in model.parameters.iter().enumerate() {
+        match known(&parameter.name) {
+            Some(value) => x[k] = parameter.deviation(value),
+            None if parameter.slot.is_placement() => missing.push(k),
+            None if estimate.is_none() => {}
+            None => return Err(lacking(estimate, &parameter.name)),
+        }
+    }
+    let sigma = problem.data.position_sigma.or(estimate.and_then(|estimate| estimate.estimated_sigma));
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(UNKNOWN_SIGMA), turn));
+    if let Some(first) = estimate.and_then(|estimate| estimate.first_time) {
+        for pose in &mut poses {
+            pose.setup.elapsed = pose.setup.time - first;
+        }
+    }
+    if !missing.is_empty() && rows.position_measured {
+        if let Some(k) = too_few(&model, &poses, &missing) {
+            return Err(lacking(estimate, &model.parameters[k].name));
+        }
+        x = place(&model, &poses, &missing, x)?;
+    } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
+        return Err(lacking(estimate, &model.parameters[k].name));
+    }
+    let sigmas: Vec<Option<f64>> =
+        all.iter().map(|&row| rows.sigma.as_ref().map_or(sigma, |own| Some(own[row]))).collect();
+    let orientations = turn.map(|_| model.orientations(&poses, x.as_slice()));
+    let turns = turn.filter(|_| rows.orientations.is_some()).map(|_| model.orientation_residuals(poses.clone(), &x));
+    let errors = model.residuals(poses, &x);
+    let positions = rows.positions.iter().zip(&errors).map(|(measured, error)| measured - error).collect();
+    let residuals = rows.position_measured.then(|| residuals(&errors, &sigmas, turns.as_deref().zip(turn), split));
+    let errors = rows.position_measured.then(|| ErrorsBySession::of(rows, &errors));
+    let placed = if rows.position_measured { missing } else { Vec::new() };
+    let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
+    Ok(Prediction { positions, orientations, residuals, errors, placed })
+}
+
+/// The error of an estimate that lacks a parameter; without an estimate all have their nominal values.
+fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
+    let file = estimate.map(|estimate| estimate.file.clone()).unwrap_or_default();
+    SavedEstimateError::Missing { file, name: name.to_owned() }.into()
+}
+
+/// Whether a pose uses the base or tool that a parameter belongs to.
+fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
+    match model.parameters[k].slot {
+        Slot::Base { base, .. } => pose.base == base,
+        Slot::Target { target, .. } => pose.target == target,
+        _ => false,
+    }
+}
+
+/// The first of the parameters `missing` without a prior that poses are too few for.
+fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
+    let open: Vec<usize> = missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
+    open.iter().copied().find(|&k| {
+        let own: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
+        3 * own.len() < open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count()
+    })
+}
+
+/// The full parameter vector `x` with the bases and tools `missing` from it fitted to the poses that use them.
+fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) -> Result<DVector<f64>, StageError> {
+    let own: Vec<Pose> = poses.iter().filter(|pose| missing.iter().any(|&k| uses(model, pose, k))).copied().collect();
+    let of_base = |k: usize| matches!(model.parameters[k].slot, Slot::Base { .. });
+    let new_base = |pose: &&Pose| missing.iter().any(|&k| of_base(k) && uses(model, pose, k));
+    let registrable: Vec<Pose> = own.iter().filter(new_base).copied().collect();
+    register(model, &registrable, &mut x);
+    let stage = Stage {
+        model,
+        declared: own.iter().map(|pose| pose.sigma).collect(),
+        declared_turn: own.iter().find_map(|pose| pose.orientation).map(|own| own.sigma),
+        poses: own,
+        unknowns: missing.to_vec(),
+        solver: SolverChoice::Auto.decide(model),
+        max_steps: Settings::default().max_iterations,
+        loss: Loss::Squares,
+        counts_fixed: true,
+        progress: None,
+    };
+    Ok(stage.run(&x)?.x)
+}
+
+/// Residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it is not known, and from those of
+/// orientation and their σ \[rad\].
+fn residuals(
+    errors: &[Vector3<f64>],
+    sigmas: &[Option<f64>],
+    turns: Option<(&[Vector3<f64>], f64)>,
+    split: Option<&Split>,
+) -> Vec<Residual> {
+    let whitened: Vec<Vector3<f64>> =
+        errors.iter().zip(sigmas).map(|(error, sigma)| error / sigma.unwrap_or(f64::NAN)).collect();
+    let lengths: Vec<f64> = whitened.iter().map(Vector3::norm).collect();
+    let outliers = outlying(&lengths, 3);
+    let held_out = |row: usize| split.is_some_and(|split| split.held_out.binary_search(&row).is_ok());
+    let residual = |(row, (&position, &whitened)): (usize, (&Vector3<f64>, &Vector3<f64>))| Residual {
+        row,
+        held_out: held_out(row),
+        position,
+        whitened,
+        orientation: turns.map(|(turns, _)| turns[row]),
+        whitened_orientation: turns.map(|(turns, sigma)| turns[row] / sigma),
+        outlier: outliers[row],
+    };
+    errors.iter().zip(&whitened).enumerate().map(residual).collect()
+}
