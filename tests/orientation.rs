@@ -24,7 +24,7 @@ fn ur10() -> Problem {
     let arm = arm.replace("[tool]\n", "[tool]\nrotation_deg = [10, -20, 100]\n");
     let text = format!(
         "{arm}[parameters]\n'joint*.alpha' = {{ sigma_deg = 0.5 }}\n'joint*.a' = {{ sigma_mm = 3 }}\n'joint*.theta' = {{ sigma_deg = 0.5 }}\n\
-         'joint*.d' = {{ sigma_mm = 3 }}\n'base.*' = {{ free = true }}\n'tool.*' = {{ sigma_mm = 5, sigma_deg = 2 }}\n\
+         'joint*.d' = {{ sigma_mm = 3 }}\n'joint*.beta' = {{ sigma_deg = 0.5 }}\n'base.*' = {{ free = true }}\n'tool.*' = {{ sigma_mm = 5, sigma_deg = 2 }}\n\
          [data]\nposition_sigma_mm = 0.05\norientation_sigma_deg = 0.02\nheld_out = {{ column = 'split' }}\n"
     );
     Problem::parse(&text, Path::new("problem.toml")).unwrap()
