@@ -64,14 +64,17 @@ fn derivatives_of_orientations_are_those_of_differences() {
     let lunar = Problem::parse(&lunar, Path::new("problem.toml")).unwrap();
     let bent = lunar.with_effect(Effect::GearRatio { joint: 2 }).with_effect(Effect::BaseCompliance);
     for problem in [ur10(), lunar, bent] {
-        let (_, data) = rig(&problem, 6, 3, "held_out = 0.3\n");
+        let (_, mut data) = rig(&problem, 6, 3, "held_out = 0.3\n");
+        data.measurements.session = ["A", "B", "A", "B", "B", "A"].into_iter().collect();
         let placement = Placement::of(&data.measurements);
         let model = Model::new(&problem, &placement.bases, &placement.targets).unwrap();
         let n = model.parameters.len();
         let rows: Vec<usize> = (0..6).collect();
         let poses = placement.oriented_poses(&data.measurements, &rows, (1e-3, Some(1e-3)));
         let residuals = PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n));
-        let at = DVector::from_fn(n, |k, _| 2e-3 * (k as f64 + 0.5).sin());
+        // Bases turned by some 0.3 rad.
+        let size = |k: usize| if model.parameters[k].slot.is_placement() { 0.3 } else { 2e-3 };
+        let at = DVector::from_fn(n, |k, _| size(k) * (k as f64 + 0.5).sin());
         let checked = check_jacobian(&residuals, &at, &DVector::from_element(n, 1e-2));
         let (k, worst) = checked.worst().unwrap();
         assert!(worst.relative_error < 1e-6, "{}: {worst:?}", model.parameters[k].name);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::near::{instead, meant, question};
+use super::shortened;
 
 /// What is wrong with the input.
 ///
@@ -249,7 +250,7 @@ pub enum InputErrorKind {
     OtherDelimiter { found: char },
     #[error("a decimal comma goes with another delimiter than a comma")]
     DecimalDelimiter,
-    #[error("{} has no such column{}; {}", file.display(), meant(name, known), list("there are", known, "its header is empty"))]
+    #[error("{} has no such column{}; {}", file.display(), meant(name, known), in_quotes(known))]
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
     #[error("{} has several columns of this name; say which by its place, as in \"#{place}\"", file.display())]
     AmbiguousColumn { file: PathBuf, place: usize },
@@ -346,6 +347,12 @@ fn near(text: &str) -> String {
 fn difference(other: &Path, has: bool) -> String {
     let says = if has { "has it, this file does not" } else { "does not have it" };
     format!("{} {says}", other.display())
+}
+
+/// `there are "a", "b"`.
+fn in_quotes(names: &[String]) -> String {
+    let names: Vec<String> = names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
+    list("there are", &names, "its header is empty")
 }
 
 fn list(verb: &str, names: &[String], none: &str) -> String {

@@ -67,6 +67,5 @@ fn no_such(rule: &ColumnRule, file: &Path, header: &[String]) -> InputError {
         ColumnOf::Place(place) => format!("#{place}"),
         ColumnOf::File => "#file".to_owned(),
     };
-    let known = header.iter().map(|name| format!("\"{name}\"")).collect();
-    rule.location.clone().error(InputErrorKind::NoSuchColumn { file: file.to_owned(), name, known })
+    rule.location.clone().error(InputErrorKind::NoSuchColumn { file: file.to_owned(), name, known: header.to_vec() })
 }

@@ -34,6 +34,10 @@ pub(super) fn write(
     (block, row): (&mut Block, usize),
 ) {
     let About { setup: (commanded, setup), base, target, last } = *about;
+    // What the last pose left there may be of another base.
+    for column in 0..probe.parameters() {
+        probe.column_mut(column).fill(0.0);
+    }
     let ends = target.axes.map(|axis| target.position + axis);
     for (k, point) in std::iter::once(&target.position).chain(&ends).enumerate() {
         let mut rows = Rows { block: probe, row: 3 * k, scale: 1.0 };
