@@ -101,6 +101,9 @@ pub struct SelectionRules {
     pub extended: usize,
     /// Hypotheses, those that explain most alone, that extend any but the best of them, which all extend.
     pub extending: usize,
+    /// Columns of a hypothesis with another error in every pose up to which it is extended by further ones: what that costs grows with
+    /// their cube.
+    pub widest: usize,
     /// ln of the odds behind the best explanation from which on larger ones are not looked for.
     pub hopeless: f64,
     /// Lengths over which smooth functions change, as parts of the range that was measured.
@@ -161,6 +164,7 @@ impl SelectionRules {
         together: 4,
         extended: 8,
         extending: 80,
+        widest: 240,
         hopeless: 12.0,
         smooth_lengths: [0.5, 0.2, 0.08],
         surface_length: 0.4,
@@ -211,6 +215,7 @@ impl SelectionRules {
             ("together", self.together >= 1),
             ("extended", self.extended >= 1),
             ("extending", self.extending >= 1),
+            ("widest", self.widest >= 1),
             ("hopeless", size(self.hopeless)),
             ("smooth_lengths", self.smooth_lengths.iter().all(|&length| size(length))),
             ("surface_length", size(self.surface_length)),

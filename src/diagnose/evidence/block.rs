@@ -135,6 +135,11 @@ impl Block {
         }
     }
 
+    /// Whether it has more columns than a set that is extended may hold.
+    pub fn is_wide(&self, rules: &SelectionRules) -> bool {
+        matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > rules.widest)
+    }
+
     /// A, everything that was fitted projected out.
     pub fn columns(&self, fit: &LinearNeighbourhood) -> Cow<'_, DMatrix<f64>> {
         match &self.columns {

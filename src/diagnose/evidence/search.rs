@@ -137,8 +137,8 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             }
             promising
         });
-        sets.truncate(rules.extended);
-        front = sets;
+        let has_wide = |set: &Set| set.members.iter().any(|&member| blocks[member].is_wide(rules));
+        front = sets.into_iter().filter(|set| !has_wide(set)).take(rules.extended).collect();
         if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
             break;
         }

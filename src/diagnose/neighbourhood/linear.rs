@@ -200,7 +200,8 @@ impl LinearNeighbourhood {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Twice is enough [Giraud, Langou & Rozložník 2005].
         for _ in 0..2 {
-            let along = self.basis.tr_mul(&left);
+            // The narrow side is transposed: this is the product that is fast.
+            let along = (left.transpose() * &self.basis).transpose();
             left.gemm(-1.0, &self.basis, &along, 1.0);
         }
         left
