@@ -12,12 +12,8 @@ use crate::problem::{Effect, EffectDeclaration, Problem};
 /// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in the choice of effects.
 const WITHOUT_WEIGHT: f64 = 1e6;
 
-/// |r|² of an outlier in units of the others' scatter of a coordinate: by chance one pose in a million is beyond.
-const GROSS: f64 = 30.0;
 /// Median of |r|² of three normal coordinates of unit scatter.
 const MEDIAN: f64 = 2.366;
-/// Part of the poses that may be outliers; where more are far off, they are no outliers.
-const FEW: f64 = 0.1;
 /// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
 const TIMES: usize = 5;
 
@@ -206,14 +202,14 @@ impl Fitted {
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let rows = data.rows();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
-    let most = (FEW * rows.len() as f64) as usize;
+    let most = (data.rules.few * rows.len() as f64) as usize;
     // The worst first.
     let far = |residual: &DVector<f64>| -> Vec<usize> {
         let squares: Vec<f64> = (0..rows.len()).map(|k| residual.fixed_rows::<3>(3 * k).norm_squared()).collect();
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
         let scatter = order.get(rows.len() / 2).map_or(0.0, |&middle| squares[middle] / MEDIAN);
-        order.retain(|&k| squares[k] > GROSS * scatter);
+        order.retain(|&k| squares[k] > data.rules.gross * scatter);
         order
     };
     let whitened = |aside: &[usize]| {

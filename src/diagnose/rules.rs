@@ -78,6 +78,16 @@ pub struct SelectionRules {
     pub resamples: usize,
     /// Draws of whole configurations that tell how often a finding returns.
     pub drawn_again: u64,
+    /// Of so many configurations one is left out in each of them.
+    pub left_out: usize,
+    /// Odds to another effect from which on it is named as an alternative.
+    pub beside: f64,
+    /// |r|² of an outlier in units of the others' scatter of a coordinate: by chance one pose in a million is beyond.
+    pub gross: f64,
+    /// Part of the poses that may be outliers; where more are far off, they are no outliers.
+    pub few: f64,
+    /// Effects that the loop added beyond which none is taken out again to be weighed.
+    pub crowd: usize,
     /// Part of the resamples within that interval.
     pub covered: f64,
     /// Poses, taken evenly, on which hypotheses are weighed against each other at most: with more, rounds find the effects.
@@ -153,6 +163,11 @@ impl SelectionRules {
         time_step: 60.0,
         resamples: 2000,
         drawn_again: 20,
+        left_out: 5,
+        beside: 0.05,
+        gross: 30.0,
+        few: 0.1,
+        crowd: 16,
         covered: 0.95,
         weighed_poses: 1500,
         unknown_law: 0.25,
@@ -209,6 +224,10 @@ impl SelectionRules {
             ("sure", part(self.sure)),
             ("stated", part(self.stated)),
             ("drawn_again", self.drawn_again >= 1),
+            ("left_out", self.left_out >= 1),
+            ("beside", part(self.beside)),
+            ("gross", size(self.gross)),
+            ("few", part(self.few)),
             ("displacements", self.displacements.iter().all(|&size_of| size(size_of))),
             ("trust_declared", size(self.trust_declared)),
             ("trust_estimated", size(self.trust_estimated)),

@@ -40,10 +40,6 @@ const NEGLIGIBLE: f64 = 1e-10;
 const FINEST: usize = 4;
 /// Probability below which an explanation is not looked at in fits to fewer poses.
 const WORTH_A_DRAW: f64 = 1e-3;
-/// One configuration in so many is left out.
-const LEFT_OUT: usize = 5;
-/// Odds to another effect from which on it is named as an alternative.
-const BESIDE: f64 = 0.05;
 
 /// Hypotheses that may be at work together.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,9 +162,9 @@ impl Evidence {
         self
     }
 
-    /// Effects that may stand in the place of one of an explanation, each as probable without it as a twentieth of it, best
+    /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
     /// first.
-    pub fn alternatives(&self, effect: &Effect, best: &Explanation) -> Vec<Effect> {
+    pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
         let has = |explanation: &Explanation, own: &Effect| {
             explanation.hypotheses.iter().any(|hypothesis| hypothesis.effect() == Some(own))
         };
@@ -187,7 +183,7 @@ impl Evidence {
                 }
             }
         }
-        others.retain(|(_, probability)| *probability >= with * BESIDE);
+        others.retain(|(_, probability)| *probability >= with * beside);
         others.sort_by(|a, b| b.1.total_cmp(&a.1));
         others.into_iter().map(|(effect, _)| effect.clone()).collect()
     }
@@ -293,7 +289,7 @@ pub(super) fn stability(
     let again = |seed: u64| {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
-        let left_out = &order[..count / LEFT_OUT];
+        let left_out = &order[..count / data.rules.left_out];
         let poses: Vec<usize> = (0..rows.len()).filter(|&pose| left_out.contains(&configurations[pose])).collect();
         let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &poses)?;
         let most = search(&blocks, &target, data.rules, &present).into_iter().next()?;

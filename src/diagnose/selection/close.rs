@@ -17,9 +17,6 @@ use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Opt
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
 
-/// A model is crowded that holds so many times the effects that an explanation may.
-const CROWD: usize = 4;
-
 /// What the loop came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -132,7 +129,7 @@ pub fn close_by(
     let findings = check_fit(&fitted, &data);
     let added = rounds.added(&fitted);
     // Of very many effects none is taken out again: what is left beside all of them is weighed.
-    let crowded = added.iter().flat_map(Effect::parts).count() > CROWD * rules.together;
+    let crowded = added.iter().flat_map(Effect::parts).count() > rules.crowd;
     let taken_out: &[Effect] = if crowded { &[] } else { &added };
     let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out));
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
@@ -255,7 +252,7 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| {
-        let alternatives = best.map_or_else(Vec::new, |(evidence, best)| alternatives(evidence, best, &effect));
+        let alternatives = best.map_or_else(Vec::new, |best| alternatives(best, &effect, rounds.data.rules.beside));
         let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
         Found {
             stability: own.reduce(f64::min),
@@ -279,9 +276,9 @@ fn claims(evidence: &Evidence, effect: &Effect, several: usize) -> Option<Claims
 }
 
 /// What may stand in the place of an effect: of a family at one place the most probable.
-fn alternatives(evidence: &Evidence, best: &Explanation, effect: &Effect) -> Vec<Effect> {
+fn alternatives((evidence, best): (&Evidence, &Explanation), effect: &Effect, beside: f64) -> Vec<Effect> {
     let mut all: Vec<Effect> = Vec::new();
-    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best)) {
+    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best, beside)) {
         let is_known = |known: &Effect| known.name_and_place() == other.name_and_place();
         // Other times of the same shift are the same effect; other orders of a harmonic are not.
         let is_own = effect.is_searched() && is_known(effect);
