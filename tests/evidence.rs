@@ -8,12 +8,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnose::{Evidence, Hypothesis, Law, trace};
+use flexcal::diagnose::{Evidence, Hypothesis, Law, Says, Verdict, close, trace};
 use flexcal::identify::Options;
-use flexcal::measurement::{Dataset, Split};
+use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::Problem;
 use flexcal::simulate::{Truth, simulate};
+use nalgebra::Vector3;
 use serde_json::Value;
 
 /// A law that is stated: from this probability on.
@@ -148,4 +149,37 @@ fn sag_of_links_whose_masses_nobody_declared_is_called_that() {
     let evidence = trace(&light, &data, &Options::default()).unwrap().evidence.unwrap();
     assert!(evidence.probability(|own| own.law == Law::Sag) > STATED, "{:?}", evidence.best());
     assert_eq!(stated(&evidence), Vec::<String>::new());
+}
+
+#[test]
+fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let (data, _) = Dataset::read_files(&[cases.join("f-two.csv")], &problem).unwrap();
+    let last = data.measurements.time.iter().copied().fold(0.0, f64::max);
+    let plain = close(&problem, &data, &Options::default()).unwrap();
+    let found = plain.effects.iter().find(|found| found.effect.name() == "tracker-drift").unwrap();
+    let drift = Vector3::from_iterator(found.estimates.iter().map(|estimate| estimate.estimate));
+    for (moves, says) in [(1.0, Some(Says::Corroborated)), (0.0, Some(Says::Contradicted))] {
+        let mut data = data.clone();
+        for k in 0..5 {
+            let time = last * f64::from(k) / 4.0;
+            let position = Vector3::new(1.0, 2.0, 0.5) + drift * moves * time;
+            let (name, session) = ("floor".to_owned(), String::new());
+            data.measurements.nests.push(NestReading {
+                origin: (0, 2),
+                name,
+                position,
+                time: Some(time),
+                after: 0,
+                session,
+            });
+        }
+        let closure = close(&problem, &data, &Options::default()).unwrap();
+        let own = |name: &str| closure.effects.iter().find(|found| found.effect.name() == name).unwrap();
+        let drift = own("tracker-drift");
+        assert_eq!(drift.witness.as_ref().map(|witness| witness.says), says);
+        assert_eq!((drift.is_named(STATED), closure.verdict == Verdict::Explained), (moves > 0.0, moves > 0.0));
+        assert_eq!(own("gear-ratio").witness, None);
+    }
 }

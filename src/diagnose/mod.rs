@@ -21,6 +21,7 @@ mod selection;
 mod separation;
 mod telling_pose;
 mod unexplained;
+mod witness;
 
 pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
 pub use covariate::Covariate;
@@ -35,3 +36,4 @@ pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, clos
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};
+pub use witness::{Says, Witness};

@@ -12,7 +12,9 @@ use super::quantity::{decimals, mm, number, p_value};
 use super::render::{Report, report, text};
 use super::unexplained::{correction, place, unexplained};
 use super::{effect, findings, trace};
-use crate::diagnose::{ClosedLoop, Correction, Found, Interval, Round, SelectionRules, Trace, Unexplained, Verdict};
+use crate::diagnose::{
+    ClosedLoop, Correction, Found, Interval, Round, Says, SelectionRules, Trace, Unexplained, Verdict, Witness,
+};
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
 use crate::problem::{Effect, Problem};
 
@@ -66,12 +68,18 @@ object! {
         claims: Option<trace::ClaimsEntry> = found.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, &closure.before)),
         /// Part of fits to configurations drawn anew that name it.
         stability: Option<f64> = found.stability,
-        /// What data that took no part say: none do.
-        witness: Option<&'a str> = None,
+        /// What data that took no part say.
+        witness: Option<WitnessEntry<'a>> = found.witness.as_ref().map(WitnessEntry::of),
         p_value: f64 = found.p_value,
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
         alternatives: &'a [Effect] = &found.alternatives,
         held_out_after: Summary = Summary::of(&found.held_out_after),
+    }
+}
+object! {
+    WitnessEntry<'a>(own: &'a Witness) {
+        data: &'a str = &own.data,
+        says: &'static str = says(own),
     }
 }
 object! {
@@ -347,6 +355,7 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
             .stability
             .map(|share| format!("named by {} % of fits to four fifths of the poses", number(share * 100.0, 0))),
     );
+    details.extend(found.witness.as_ref().map(|own| format!("{} by {}, which took no part", says(own), own.data)));
     let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));
     if let Some(then) = closure.held_out_once(found) {
         let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
@@ -360,12 +369,21 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     }
     let own = effect::both(&found.effect, &closure.before);
     let text = match &found.claims {
+        _ if found.is_contradicted() => format!("contradicted: {own}"),
         Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
             format!("{}: its law is not known, such as: {own}", claims.place.0)
         }
         _ => own,
     };
     Point { text, details, mark: None }
+}
+
+/// What a witness says, in a word.
+fn says(own: &Witness) -> &'static str {
+    match own.says {
+        Says::Corroborated => "corroborated",
+        Says::Contradicted => "contradicted",
+    }
 }
 
 /// What each round of fit, trace and refit came to.

@@ -8,6 +8,7 @@ use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
 use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
+use super::super::witness::{Says, Witness, witness};
 use super::alternatives::Replacements;
 use super::harmonics;
 use super::interval::{self, Interval};
@@ -43,15 +44,23 @@ pub struct Found {
     pub alternatives: Vec<Effect>,
     /// Part of fits to whole configurations drawn anew that name it; `None` where no evidence could be weighed.
     pub stability: Option<f64>,
+    /// What data say that took no part in the fit; `None` where none speak of it.
+    pub witness: Option<Witness>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to the end; that of the final
     /// fit where no round is such.
     pub held_out_after: ErrorSummary,
 }
 
 impl Found {
-    /// Whether it is named as found: its law is surer than `stated`. Below that a place is found, and the law is such as this one.
+    /// Whether data that took no part speak against it.
+    pub fn is_contradicted(&self) -> bool {
+        self.witness.as_ref().is_some_and(|witness| witness.says == Says::Contradicted)
+    }
+
+    /// Whether it is named as found: its law is surer than `stated`, and no witness contradicts it. Otherwise a place is found, and the
+    /// law is such as this one.
     pub fn is_named(&self, stated: f64) -> bool {
-        self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
+        !self.is_contradicted() && self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
     }
 }
 
@@ -138,7 +147,9 @@ pub fn close_by(
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
-    let verdict = match (unexplained.is_empty(), effects.is_empty()) {
+    // What a witness contradicts explains nothing.
+    let holds = unexplained.is_empty() && !effects.iter().any(Found::is_contradicted);
+    let verdict = match (holds, effects.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::NothingFound,
         (true, false) => Verdict::Explained,
@@ -261,6 +272,7 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
             estimates: fitted.parameters_of(&effect).into_iter().map(|k| fitted.found.estimates[k].clone()).collect(),
             held_out_after: first_with(&effect),
             alternatives,
+            witness: witness(fitted, rounds.data, &effect),
             effect,
         }
     };
