@@ -187,7 +187,7 @@ pub fn plan(
         let sweep = |sweep: PlanProgress| {
             sink(Progress { iteration: sweep.sweep as u64, unknowns: 0, poses, cost: sweep.value });
         };
-        let options = PlanOptions { poses, criterion: &chosen, seed, progress: Some(&sweep) };
+        let options = PlanOptions { poses, criterion: &chosen, seed, workspace: None, progress: Some(&sweep) };
         match &pair {
             Some(pair) => design::separate(pair, &candidates, given.as_deref(), &options)
                 .map(|(plan, separated)| (plan, Some(separated))),

@@ -26,7 +26,8 @@ pub fn jacobian(
         return Err(IdentifyError::JointCount { found, joints });
     }
     let placement = Placement::of(rows);
-    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let declared = Model::new(problem, &placement.bases, &placement.targets)?;
+    let model = identified.map_or(declared.clone(), |identified| identified.strategy.model(declared));
     let all: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(rows, &all, 1.0);
     let mut x = DVector::zeros(model.parameters.len());
