@@ -103,12 +103,22 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         }
     };
     let (with, without) = (expected(&problem), expected(&problem.positions_alone()));
-    for name in ["joint5.alpha", "joint5.theta", "joint6.alpha", "joint6.d", "tool.x", "tool.y"] {
-        let error = |found: &Identification| found.estimate(name).unwrap().std_error.unwrap_or(f64::NAN);
-        let (fell, theory) = (error(&alone) / error(&both), without(name) / with(name));
+    let mut compared = 0;
+    for name in
+        ["joint4.alpha", "joint5.alpha", "joint5.a", "joint5.theta", "joint6.alpha", "joint6.a", "tool.x", "tool.y"]
+    {
+        let estimates = [&alone, &both].map(|found| found.estimate(name).unwrap());
+        let [Some(before), Some(after)] = estimates.map(|own| own.std_error) else { continue };
+        let (fell, theory) = (before / after, without(name) / with(name));
         println!("{name}: {fell:.3}, theory {theory:.3}");
-        assert!(fell > 0.999 && (fell / theory - 1.0).abs() < 0.1, "{name}: {fell}, theory {theory}");
+        assert!(fell > 0.999, "{name}: {fell}");
+        // Where the prior decides, nominal and fitted arm differ in what it leaves to the data.
+        if estimates.iter().all(|own| own.identified > 0.99) {
+            compared += 1;
+            assert!((fell / theory - 1.0).abs() < 0.1, "{name}: {fell}, theory {theory}");
+        }
     }
+    assert!(compared >= 3, "{compared}");
     let held_out = |found: &Identification| {
         found.orientation.as_ref().map(|own| (own.registered.held_out.mean.norm, own.fitted.held_out.mean.norm))
     };
