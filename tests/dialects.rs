@@ -97,7 +97,7 @@ fn wrong_maps_are_named() {
         (
             "'x_m'",
             "'x_meter'",
-            &["problem.toml:8: data.columns.X", "not a column that flexcal knows (did you mean x_m?)"],
+            &["problem.toml:8: data.columns.X", "not a column that flexcal knows (did you mean x_m or x_mm?)"],
         ),
         ("'x_m'", "'xx_mm'", &["problem.toml:8: data.columns.X: not a column that flexcal knows"]),
         ("'q2_deg'", "'q2'", &["problem.toml:7: data.columns.A2: an angle needs a unit; write q2_deg or q2_rad"]),

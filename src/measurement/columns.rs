@@ -143,6 +143,9 @@ impl Columns {
                     columns.read.push(Column { role, place, to_si });
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
+                Meaning::Ignored(WarningKind::UnitIgnored { write }) if rule.is_some() => {
+                    return Err(error(InputErrorKind::UnknownMeaning { meant: Some(write) }));
+                }
                 Meaning::Ignored(_) | Meaning::Unknown if rule.is_some() => {
                     let meant = numbering.meant(name, &there, problem);
                     return Err(error(InputErrorKind::UnknownMeaning { meant }));
