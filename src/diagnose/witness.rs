@@ -37,6 +37,9 @@ pub struct Witness {
     pub says: Says,
 }
 
+/// z and f of a reading.
+type Reading = (Vector3<f64>, f64);
+
 /// What readings of fixed points say of an effect of the instrument; `None` for other effects, and where they do not decide.
 pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Witness> {
     let measurements = data.measurements;
@@ -58,17 +61,17 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
     let [x, y, z] = parameters.as_slice() else { return None };
     let strength = Vector3::new(fitted.found.x[*x], fitted.found.x[*y], fitted.found.x[*z]);
     // A session has a place of its own for the instrument.
-    let mut points: BTreeMap<(&str, &str), Vec<(Vector3<f64>, f64)>> = BTreeMap::new();
+    let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
     for reading in &measurements.nests {
         let own = (reading.position, moves(reading)?);
         points.entry((&reading.session, &reading.name)).or_default().push(own);
     }
-    let gain = |readings: &Vec<(Vector3<f64>, f64)>| {
+    let gain = |readings: &Vec<Reading>| {
         let count = readings.len() as f64;
         let (place, moved) =
             readings.iter().fold((Vector3::zeros(), 0.0), |(place, moved), (z, f)| (place + z, moved + f));
         let (place, moved) = (place / count, moved / count);
-        let one = |(z, f): &(Vector3<f64>, f64)| {
+        let one = |(z, f): &Reading| {
             let left = z - place;
             left.norm_squared() - (left - strength * (f - moved)).norm_squared()
         };

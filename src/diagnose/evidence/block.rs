@@ -168,7 +168,7 @@ impl Block {
                 Columns::Dense(columns) => within * columns,
                 Columns::Grouped { levers, groups } => along(within, levers, groups),
             };
-            of_block(&self.normal.beside(along, taken), left, grid, prior)
+            of_block(&self.normal.beside(&along, taken), left, grid, prior)
         };
         (with - without, size)
     }

@@ -64,20 +64,20 @@ pub(super) enum Normal {
 
 impl Normal {
     /// The same beside a set that takes Z A = `along` off the columns and `taken` = Z r off the residual.
-    pub fn beside(&self, along: DMatrix<f64>, taken: &DVector<f64>) -> Self {
+    pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {
             Self::Dense { gram, product } => {
                 let (mut gram, mut product) = (gram.clone(), product.clone());
-                gram.gemm(-1.0, &along.transpose(), &along, 1.0);
-                product.gemv_tr(-1.0, &along, taken, 1.0);
+                gram.gemm(-1.0, &along.transpose(), along, 1.0);
+                product.gemv_tr(-1.0, along, taken, 1.0);
                 Self::Dense { gram, product }
             }
             Self::LessFew { diagonal, less, product } => {
                 let mut product = product.clone();
-                product.gemv_tr(-1.0, &along, taken, 1.0);
+                product.gemv_tr(-1.0, along, taken, 1.0);
                 let (few, more) = (less.nrows(), along.nrows());
                 let mut less = less.clone().resize_vertically(few + more, 0.0);
-                less.rows_mut(few, more).copy_from(&along);
+                less.rows_mut(few, more).copy_from(along);
                 Self::LessFew { diagonal: diagonal.clone(), less, product }
             }
         }
