@@ -119,9 +119,12 @@ fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hyp
     }
     let fitted = &whole;
     let (here, there) = (data.rows(), &data.split.held_out);
+    let weighed = data.thinned(data.rules.weighed_poses);
+    let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
+    let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;
     let rows = [here, there.as_slice()].concat();
     let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
-    let (own, sigma) = best_form(fitted, data, (&hypotheses, here.len()), best, hypothesis)?;
+    let own = hypotheses.form(best, hypothesis, (shape, here.len()))?;
     let linearised = fitted.linearised(data, &[]);
     let fit = fitted.neighbourhood(&linearised);
     let first = 3 * here.len();

@@ -20,7 +20,7 @@ const FINER: ([f64; 9], [f64; 5]) = ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4
 
 /// A single bump exp(−u²/2) or step tanh u with u = (x − centre) / width, x from 0 to 1 over the range.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(in crate::diagnose) struct Shape {
     is_bump: bool,
     centre: f64,
     width: f64,

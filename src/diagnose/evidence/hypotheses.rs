@@ -57,6 +57,20 @@ impl<'a> Hypotheses<'a> {
         self.all.iter().find(|own| own.variant == variant && own.hypothesis == *hypothesis)
     }
 
+    /// Columns of a function that an explanation holds at all poses, shape = (3 N, k): smooth, or of one shape.
+    pub fn form(
+        &self,
+        explanation: &Explanation,
+        hypothesis: &Hypothesis,
+        (shape, weighed): (Option<Shape>, usize),
+    ) -> Option<DMatrix<f64>> {
+        let Some(shape) = shape else {
+            return Some(self.candidate(explanation, hypothesis)?.design.columns().into_owned());
+        };
+        let (_, own) = self.shaped(hypothesis, weighed, &[shape]).pop()?;
+        Some(own.design.columns().into_owned())
+    }
+
     /// Single bumps and steps in the place of a function of one covariate at one coordinate; all together as probable as the function.
     pub(super) fn shaped(&self, hypothesis: &Hypothesis, weighed: usize, shapes: &[Shape]) -> Vec<(Shape, Candidate)> {
         let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };

@@ -15,7 +15,6 @@ mod marginal;
 mod sag;
 mod search;
 
-use nalgebra::DMatrix;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +28,7 @@ use crate::identify::Noise;
 use crate::problem::Effect;
 use block::Block;
 use columns::Candidate;
-use functions::Shape;
+pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
 use search::{Target, Weighted, search};
@@ -229,19 +228,19 @@ pub(super) fn ln_posterior(
     search::ln_posterior(&blocks, &target, data.rules)
 }
 
-/// The most probable form of a function without a law, beside what the fit holds: its columns at all poses of `hypotheses`, weighed on the
-/// first of them, and 1 σ of their coefficients.
+/// The most probable form of a function without a law, beside what the fit holds, and 1 σ of the coefficients of its columns: one of
+/// `hypotheses`, smooth where it has no shape.
 pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,
-    (hypotheses, weighed): (&Hypotheses, usize),
+    hypotheses: &Hypotheses,
     best: &Explanation,
     hypothesis: &Hypothesis,
-) -> Option<(DMatrix<f64>, f64)> {
+) -> Option<(Option<Shape>, f64)> {
     let smooth = hypotheses.candidate(best, hypothesis)?;
-    let beyond: Vec<usize> = (weighed..hypotheses.linearised.poses().len()).collect();
+    let weighed = hypotheses.linearised.poses().len();
     let gains = |forms: &[&Candidate]| {
-        let (blocks, target) = blocks(fitted, data, hypotheses, forms, &beyond)?;
+        let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
         let all: Vec<usize> = (0..blocks.len()).collect();
         let mut gains = search::gains_beside(&[], &all, (&blocks, &target), data.rules);
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -259,7 +258,7 @@ pub(super) fn best_form(
     // Half of the chance for the smooth function, half for all shapes together.
     let even = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
     let (k, _, size) = gains(&forms)?.into_iter().map(even).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((forms[k].design.columns().into_owned(), size))
+    Some((k.checked_sub(1).map(|shaped| finer[shaped].0), size))
 }
 
 /// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth left out, whose most probable

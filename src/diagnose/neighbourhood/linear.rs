@@ -200,8 +200,9 @@ impl LinearNeighbourhood {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Twice is enough [Giraud, Langou & Rozložník 2005].
         for _ in 0..2 {
-            // The narrow side is transposed: this is the product that is fast.
-            let along = (left.transpose() * &self.basis).transpose();
+            // Of several columns the narrow side is transposed: this is the product that is fast.
+            let several = left.ncols() > 4;
+            let along = if several { (left.transpose() * &self.basis).transpose() } else { self.basis.tr_mul(&left) };
             left.gemm(-1.0, &self.basis, &along, 1.0);
         }
         left
