@@ -432,3 +432,96 @@ fn effects_that_cannot_act_are_bad_input() {
     let error = text(&bench.identify(&[]).code(2).get_output().stderr);
     assert!(error.contains("effect[1].deflected-equilibrium") && error.contains("[statics]"), "{error}");
 }
+
+/// The JSON of a command that succeeds.
+fn json(bench: &Bench, arguments: &[&str]) -> Value {
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let done = flexcal.current_dir(bench.folder.path()).args(arguments).arg("--json").assert().success();
+    serde_json::from_slice(&done.get_output().stdout).unwrap()
+}
+
+/// Names of the procedures in a comparison.
+fn procedures(comparison: &Value) -> Vec<&str> {
+    comparison["procedures"].as_array().unwrap().iter().map(|own| own["procedure"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn compare_has_the_papers_tables_from_each_procedure_of_its_arm() {
+    let bench = Bench::new();
+    let compared = json(&bench, &["compare", ".", "--out", "out"]);
+    let papers = ["nominal-stiffness", "from-positions"].map(|stage| format!("paper-{stage}"));
+    let expected = [&["joint".to_owned()], &papers[..], &papers.clone().map(|name| name + "-as-printed")].concat();
+    assert_eq!(procedures(&compared), expected);
+    let rows: Vec<&str> =
+        compared["rows"].as_array().unwrap().iter().map(|row| row["strategy"].as_str().unwrap()).collect();
+    assert!(rows.contains(&"paper-rigid") && rows.contains(&"rigid") && rows.contains(&"geometry-only"), "{rows:?}");
+    for own in compared["procedures"].as_array().unwrap() {
+        let (table_2, table_3, figure) = (&own["table_2"], &own["table_3"], &own["figure_13"]);
+        assert_eq!((table_2.as_array().unwrap().len(), &table_3["before_registered"]), (4, &false.into()));
+        let (beta, theta) = (&table_2[0]["beta_deg"], &table_2[1]["theta_deg"]);
+        assert!(beta["seen"].as_f64().unwrap() < 0.6 && theta["seen"].as_f64().unwrap() < 0.6, "{own}");
+        for (key, kind) in
+            [("before", "before_mm"), ("after", "after_mm"), ("ignoring_elasticity", "ignoring_elasticity_mm")]
+        {
+            let poses = figure[kind].as_array().unwrap();
+            let norm = |pose: &Value| (0..3).map(|k| pose[k].as_f64().unwrap().powi(2)).sum::<f64>().sqrt();
+            let mean = poses.iter().map(norm).sum::<f64>() / 50.0;
+            assert_eq!(poses.len(), 50);
+            assert!((table_3[key]["mean_mm"]["norm"].as_f64().unwrap() - mean).abs() < 1e-9, "{key}");
+        }
+        let name = own["procedure"].as_str().unwrap();
+        let figure = if name == "joint" { String::new() } else { format!("-{name}") };
+        assert!(bench.path(&format!("out/figures/held-out-errors{figure}.svg")).exists(), "{name}");
+    }
+    let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
+    for words in
+        ["paper: before", "48.9644", "85.44", "(0.", "nominal arm without elasticity, base and tool as declared"]
+    {
+        assert!(page.contains(words), "{words} missing in:\n{page}");
+    }
+}
+
+#[test]
+fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
+    let bench = Bench::new();
+    let problem = "name = \"own\"\ntitle = \"Two joints\"\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\na_m = 0.1\n\
+                   [tool]\ntarget_m = [0.5, 0.05, 0.0]\n[parameters]\n\"joint*.theta\" = { sigma_deg = 0.5 }\n\
+                   [data]\nfiles = [\"made/measurements.csv\"]\nposition_sigma_mm = 0.1\nheld_out = { column = \"split\" }\n";
+    let truth = "[random]\n\"*\" = { sigma_deg = 0.1, sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.1\n\
+                 [poses]\nq1_deg = [-120, 120]\nq2_deg = [-40, 80]\nidentification = 12\n";
+    fs::write(bench.path("problem.toml"), problem).unwrap();
+    fs::write(bench.path("TRUTH.toml"), truth).unwrap();
+    json(&bench, &["simulate", ".", "--truth", "TRUTH.toml", "--poses", "20", "--seed", "1", "--out", "made"]);
+    let own = json(&bench, &["compare", ".", "--out", "out"]);
+    assert_eq!(procedures(&own), ["joint"]);
+    assert!(own["rows"].as_array().unwrap().iter().all(|row| row["strategy"] != "rigid"), "nothing to ignore");
+    let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
+    assert!(!page.contains("with elasticity") && !page.contains("paper:") && page.contains("identified"), "{page}");
+    let asked = json(&bench, &["compare", ".", "--paper", "--out", "asked"]);
+    assert_eq!(procedures(&asked), ["joint", "paper-rigid"]);
+    // A base that nobody knows has to be found first.
+    bench.edit("problem.toml", "[parameters]\n", "[parameters]\n\"base.*\" = { free = true }\n");
+    let placed = json(&bench, &["compare", ".", "--out", "out"]);
+    assert_eq!(placed["procedures"][0]["table_3"]["before_registered"], true);
+    assert!(placed["procedures"][0]["table_2"][0]["a_mm"]["seen"].is_null(), "fixed");
+}
+
+#[test]
+fn an_arm_identified_as_rigid_is_used_as_rigid() {
+    let bench = Bench::new();
+    let found = json(&bench, &["identify", ".", "--strategy", "rigid", "--out", "out"]);
+    let named = |own: &Value| own["name"].as_str().unwrap().to_owned();
+    let names: Vec<String> = found["parameters"].as_array().unwrap().iter().map(named).collect();
+    assert!(names.iter().all(|name| !name.ends_with("stiffness") && !name.ends_with("EI")), "{names:?}");
+    let geometry = json(&bench, &["identify", ".", "--strategy", "geometry-only", "--out", "geometry"]);
+    let rms = |found: &Value| found["held_out"]["rms_mm"]["norm"].as_f64().unwrap();
+    assert!(rms(&found) > 3.0 * rms(&geometry), "{} {}", rms(&found), rms(&geometry));
+    // Where the rigid arm is predicted to be is where its commands bring it.
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let arguments =
+        ["compensate", ".", "--estimate", "out/estimate.json", "--data", "a-none.csv", "--out", "out", "--json"];
+    let output = flexcal.current_dir(bench.folder.path()).args(arguments).output().unwrap();
+    let commands: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let before = commands["mean_miss_before_mm"].as_f64().unwrap();
+    assert!((0.5..20.0).contains(&before), "{before} mm, what the rigid fit leaves");
+}

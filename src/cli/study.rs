@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Request::Fits(study) => *study,
         Request::Misprints(study) if arguments.shard.is_none() => return misprints(common, &study),
         // Reads it as what has shares, which says what is wrong.
-        _ => Study::read(&common.study)?,
+        Request::Misprints(_) => Study::read(&common.study)?,
     };
     let results = common.results(&study)?;
     let store = Store::new(&results.folder);
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
-    let bar = common.talks().then(|| FitBar::new((study.specimens * study.links_over_joints.len()) as u64, 0));
+    let bar = common.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
     let found = monte_carlo::replicate(study, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     let found = found?;

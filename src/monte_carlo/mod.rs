@@ -22,7 +22,8 @@ mod tally;
 pub use read::Request;
 pub use repetition::table;
 pub use replica::{
-    Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError, ReplicaResults, Rival, Spread, readings, replicate,
+    Case, Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError, ReplicaResults, Rival, Spread, readings,
+    replicate,
 };
 pub use results::{CellResult, ParameterResult, Results, Timing};
 pub use run::{RunError, collect, pending, run};

@@ -85,7 +85,7 @@ pub fn stiffness(
     let mut equations: Vec<Equations> =
         poses.iter().map(|pose| equations_of(problem, &parameters, &unknowns, pose, reading)).collect();
     if stage == StiffnessStage::LoadDifferences {
-        equations = differences(poses, equations)?;
+        equations = differences(poses, &equations)?;
     }
     let mut columns = DMatrix::zeros(3 * equations.len(), unknowns.len());
     let mut rest = DVector::zeros(3 * equations.len());
@@ -115,7 +115,7 @@ fn equations_of(
 
 /// Each pose less the mean of its configuration, for configurations that were measured under several loads; `None` where
 /// there is none.
-fn differences(poses: &[Measured], equations: Vec<Equations>) -> Option<Vec<Equations>> {
+fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equations>> {
     let load = |pose: &Measured| (pose.setup.payload, pose.setup.hoist);
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, pose) in poses.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::json::{Summary, object, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::ErrorSummary;
-use crate::monte_carlo::{Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
+use crate::monte_carlo::{Case, Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
 use crate::paper::Misprint;
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
 
@@ -24,8 +24,7 @@ object! {
         position_sigma_mm: f64 = study.truth.noise_sigma * 1e3,
         rigid_leaves_mm: f64 = study.rigid_leaves * 1e3,
         misprints: Vec<Size<'a>> = Misprint::ALL.iter().zip(&found.sizes).map(Size::of).collect(),
-        shares: Vec<Share<'a>> =
-            study.links_over_joints.iter().map(|&share| Share::of(share, found)).collect(),
+        cases: Vec<CaseEntry<'a>> = study.cases.iter().map(|case| CaseEntry::of(case, found)).collect(),
     }
 }
 object! {
@@ -36,10 +35,12 @@ object! {
     }
 }
 object! {
-    Share<'a>(links_over_joints: f64, found: &'a ReplicaResults) {
-        links_over_joints: f64 = links_over_joints,
-        specimens: Vec<Specimen<'a>> =
-            found.of_share(links_over_joints).map(|own| Specimen::of(own, found)).collect(),
+    CaseEntry<'a>(case: &Case, found: &'a ReplicaResults) {
+        links_over_joints: f64 = case.links_over_joints,
+        payload_kg: Option<f64> = case.load.and_then(|load| load.payload),
+        #[serde(rename = "hoist_N")]
+        hoist: Option<f64> = case.load.and_then(|load| load.hoist),
+        specimens: Vec<Specimen<'a>> = found.of_case(case).map(|own| Specimen::of(own, found)).collect(),
     }
 }
 object! {
@@ -86,9 +87,9 @@ pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
 
 /// The report of a study of the misprints.
 pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
-    let share = main_share(study);
+    let main = main_case(study, found);
     let error = |pick: fn(&Replica) -> Left| {
-        let spread = Spread::of(found.of_share(share).map(|own| Some(pick(own)?.mean.norm)));
+        let spread = Spread::of(main.iter().map(|own| Some(pick(own)?.mean.norm)));
         or_dash(spread, |spread| mm(spread.mean, 3))
     };
     let head = Headline {
@@ -104,10 +105,10 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
 
 fn counts(study: &MisprintStudy) -> String {
     format!(
-        "{} specimens for each of {} shares of flexibility, measured by the virtual test rig: {} poses to identify, {} held out, \
+        "{} specimens of each of {} cases, measured by the virtual test rig: {} poses to identify, {} held out,\n\
          noise {} mm per axis; as elastic as makes the rigid fit leave {} mm",
         study.specimens,
-        study.links_over_joints.len(),
+        study.cases.len(),
         study.identification,
         study.held_out,
         mm(study.truth.noise_sigma, 2),
@@ -115,10 +116,9 @@ fn counts(study: &MisprintStudy) -> String {
     )
 }
 
-/// The share of flexibility nearest to the declared one.
-pub(super) fn main_share(study: &MisprintStudy) -> f64 {
-    let distance = |share: &f64| share.ln().abs();
-    study.links_over_joints.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(1.0)
+/// The specimens that everything is tried on.
+fn main_case<'a>(study: &MisprintStudy, found: &'a ReplicaResults) -> Vec<&'a Replica> {
+    study.cases.first().map_or_else(Vec::new, |case| found.of_case(case).collect())
 }
 
 fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
@@ -140,11 +140,11 @@ fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
 }
 
 fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
-    let share = main_share(study);
+    let main = main_case(study, found);
     let row = |(place, named): (usize, &crate::monte_carlo::NamedReading)| {
         let size = Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
         let cell = |stage: usize| {
-            let means = found.of_share(share).map(|own| Some(own.left(place, stage)?.mean.norm));
+            let means = main.iter().map(|own| Some(own.left(place, stage)?.mean.norm));
             shown(Spread::of(means), |value| mm(value, 3))
         };
         let head = [named.name.clone(), named.place.clone(), or_dash(size, |(_, size)| mm(*size, 3))];
@@ -159,10 +159,10 @@ fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
 }
 
 fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
-    let share = main_share(study);
+    let main = main_case(study, found);
     let row = |name: &str, of: fn(&Replica) -> Left, published: Option<&Published>| {
         let of_kind = |kind: fn(&ErrorSummary) -> f64| {
-            shown(Spread::of(found.of_share(share).map(|own| of(own).as_ref().map(kind))), |value| mm(value, 3))
+            shown(Spread::of(main.iter().map(|own| of(own).as_ref().map(kind))), |value| mm(value, 3))
         };
         let [mean, max] = [published.map(|own| own.mean[3]), published.map(|own| own.max[3])];
         let paper = [mean, max].map(|value| or_dash(value, |value| number(value, 3)));
@@ -186,18 +186,18 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
 }
 
 fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
-    let main = main_share(study);
+    let main = main_case(study, found);
     let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> Left| {
-        let ratio = |&share: &f64| {
-            let ratios = found.of_share(share).map(|own| own.ratio(left(own)));
+        let ratio = |case: &Case| {
+            let ratios = found.of_case(case).map(|own| own.ratio(left(own)));
             shown(Spread::of(ratios), |value| number(value, 3))
         };
-        let of_z = |own: &Replica| left(own).map(|left| left.mean.z / left.mean.norm);
-        let along = shown(Spread::of(found.of_share(main).map(of_z)), |value| number(value, 2));
-        let largest = Spread::of(found.of_share(main).map(|own| own.largest_ratio(left(own))));
-        let shares: Vec<String> = study.links_over_joints.iter().map(ratio).collect();
+        let of_z = |own: &&Replica| left(own).map(|left| left.mean.z / left.mean.norm);
+        let along = shown(Spread::of(main.iter().map(of_z)), |value| number(value, 2));
+        let largest = Spread::of(main.iter().map(|own| own.largest_ratio(left(own))));
+        let cases: Vec<String> = study.cases.iter().map(ratio).collect();
         let largest = shown(largest, |value| number(value, 2));
-        [vec![name.to_owned(), summary.to_owned()], shares, vec![along, largest]].concat()
+        [vec![name.to_owned(), summary.to_owned()], cases, vec![along, largest]].concat()
     };
     let mut rows: Vec<Vec<String>> = found
         .readings
@@ -210,18 +210,15 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let paper = [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
     let [ratio, along, largest] = paper;
     let mut last = vec!["the paper".to_owned(), "table 3".to_owned()];
-    last.extend(study.links_over_joints.iter().map(|_| number(ratio, 3)));
+    last.extend(study.cases.iter().map(|_| number(ratio, 3)));
     last.extend([number(along, 2), number(largest, 2)]);
     rows.push(last);
-    let shares = study.links_over_joints.len();
     let mut header = vec!["as printed, or assumed", ""];
-    header.extend(std::iter::repeat_n("mean/mean", shares));
+    header.extend(std::iter::repeat_n("mean/mean", study.cases.len()));
     header.extend(["z/sum", "max/max"]);
-    let words: Vec<String> = study.links_over_joints.iter().map(|share| number(*share, 2)).collect();
-    let note = format!(
-        "mean/mean: flexibility of links over that of joints {} times as declared; the last two at {}",
-        words.join(", "),
-        number(main, 2)
-    );
-    Table::new(&header, rows, &[0, 1]).noted(&[&note])
+    let words: Vec<String> = study.cases.iter().map(Case::name).collect();
+    let note =
+        format!("mean/mean: of {}; links: their flexibility over that of joints, as multiples", words.join(", "));
+    let rest = "of what is declared; one load: every pose under the same; z/sum and max/max: of the first";
+    Table::new(&header, rows, &[0, 1]).noted(&[&note, rest])
 }

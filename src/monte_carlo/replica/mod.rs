@@ -21,4 +21,4 @@ pub use reading::{NamedReading, readings};
 pub use results::{Left, Replica, ReplicaResults, Spread};
 pub use rival::Rival;
 pub use run::replicate;
-pub use study::{Load, MisprintStudy};
+pub use study::{Case, Load, MisprintStudy};

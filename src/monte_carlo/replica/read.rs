@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::study::{Load, MisprintStudy};
+use super::study::{Case, Load, MisprintStudy};
 use crate::error::{InputError, InputErrorKind};
 use crate::monte_carlo::input::{count, distinct, problem_of};
 use crate::problem::read::name;
@@ -19,7 +19,7 @@ impl MisprintStudy {
         let asked = root.require("problem", "problem = \"…\", a problem.toml")?;
         let (problem, _, problem_file) = problem_of(&asked, folder)?;
         let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
-        let specimens = count(&root.require("specimens", "specimens = …, arms of each share of flexibility")?)?;
+        let specimens = count(&root.require("specimens", "specimens = …, arms of each case")?)?;
         let identification = count(&root.require("identification_poses", "identification_poses = 28")?)?;
         let held_out = count(&root.require("held_out_poses", "held_out_poses = 50")?)?;
         let sigma = root.positive("position_sigma", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
@@ -27,14 +27,21 @@ impl MisprintStudy {
         let leaves = root.positive("rigid_leaves", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
         let rigid_leaves = leaves.ok_or_else(|| root.missing("rigid_leaves_mm", "rigid_leaves_mm = 3.9673"))?;
         let shares = root.require("links_over_joints", "links_over_joints = [1.0]")?;
-        let links_over_joints = distinct(&shares, |item| {
+        let mut links_over_joints = distinct(&shares, |item| {
             let value = item.number()?;
             if value > 0.0 { Ok(value) } else { Err(item.error(InputErrorKind::NotPositive { value })) }
         })?;
+        // As declared, or nearest to it, first.
+        links_over_joints.sort_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
+        let one_load = root.section("one_load")?.map(load).transpose()?;
         let second_load = match root.section("second_load")? {
             Some(section) => load(section)?,
             None => return Err(root.missing("second_load", "[second_load] with payload_kg or hoist_N")),
         };
+        let shares = links_over_joints.iter().map(|&links_over_joints| Case { links_over_joints, load: None });
+        let main = links_over_joints.first().copied().unwrap_or(1.0);
+        let loaded = one_load.map(|load| Case { links_over_joints: main, load: Some(load) });
+        let cases = shares.chain(loaded).collect();
         let mut truth = Truth::of_sections(&mut root, &problem)?;
         (truth.noise_sigma, truth.held_out) = (sigma, HeldOutRows::Share(0.0));
         root.finish()?;
@@ -50,7 +57,7 @@ impl MisprintStudy {
             identification,
             held_out,
             rigid_leaves,
-            links_over_joints,
+            cases,
             second_load,
         })
     }

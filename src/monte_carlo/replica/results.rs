@@ -2,6 +2,7 @@
 
 use super::reading::NamedReading;
 use super::rival::Rival;
+use super::study::Case;
 use crate::identify::ErrorSummary;
 
 /// What a procedure left of the held-out poses; `None` where its iteration did not converge.
@@ -10,8 +11,8 @@ pub type Left = Option<ErrorSummary>;
 /// One specimen, identified in every way: what is left of its held-out poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replica {
-    /// Flexibility of links over that of joints, as multiples of what is declared.
-    pub links_over_joints: f64,
+    /// What it has in common with others.
+    pub case: Case,
     /// By what the declared flexibilities were multiplied.
     pub scale: f64,
     /// By the nominal arm without elasticity.
@@ -37,7 +38,7 @@ pub struct ReplicaResults {
     pub sizes: Vec<f64>,
     /// The readings.
     pub readings: Vec<NamedReading>,
-    /// The specimens, share by share.
+    /// The specimens, case by case.
     pub replicas: Vec<Replica>,
 }
 
@@ -69,9 +70,9 @@ impl Spread {
 }
 
 impl ReplicaResults {
-    /// Specimens of one share of flexibility.
-    pub fn of_share(&self, links_over_joints: f64) -> impl Iterator<Item = &Replica> {
-        self.replicas.iter().filter(move |own| own.links_over_joints.total_cmp(&links_over_joints).is_eq())
+    /// Specimens of one case.
+    pub fn of_case(&self, case: &Case) -> impl Iterator<Item = &Replica> {
+        self.replicas.iter().filter(move |own| own.case == *case)
     }
 }
 

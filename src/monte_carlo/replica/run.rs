@@ -9,7 +9,7 @@ use super::rival::Rival;
 use super::shot::Shot;
 use super::size::sizes;
 use super::specimen::Specimen;
-use super::study::MisprintStudy;
+use super::study::{Case, MisprintStudy};
 use crate::identify::{ErrorSummary, Options as FitOptions, Strategy, identify};
 use crate::paper::{Form, Options, Parameters, Reading, StiffnessStage};
 use crate::problem::Problem;
@@ -21,13 +21,10 @@ use crate::random::stream;
 /// A specimen cannot be scaled, or a procedure cannot be set up.
 pub fn replicate(study: &MisprintStudy, done: impl Fn() + Sync) -> Result<ReplicaResults, ReplicaError> {
     let readings = readings();
-    let all: Vec<(f64, usize)> = study
-        .links_over_joints
-        .iter()
-        .flat_map(|&share| (0..study.specimens).map(move |index| (share, index)))
-        .collect();
-    let one = |&(share, index): &(f64, usize)| {
-        let replica = replica(study, &readings, share, index);
+    let of_case = |case| (0..study.specimens).map(move |index| (case, index));
+    let all: Vec<(&Case, usize)> = study.cases.iter().flat_map(of_case).collect();
+    let one = |&(case, index): &(&Case, usize)| {
+        let replica = replica(study, &readings, case, index);
         done();
         replica
     };
@@ -38,12 +35,12 @@ pub fn replicate(study: &MisprintStudy, done: impl Fn() + Sync) -> Result<Replic
 fn replica(
     study: &MisprintStudy,
     readings: &[NamedReading],
-    links_over_joints: f64,
+    case: &Case,
     index: usize,
 ) -> Result<Replica, ReplicaError> {
     use rand::Rng as _;
     let seed = stream(study.seed, index as u64).next_u64();
-    let own = Specimen::find(study, links_over_joints, seed)?;
+    let own = Specimen::find(study, case, seed)?;
     let twice = [own.identification.as_slice(), own.again.as_slice()].concat();
     let left = |problem: &Problem, shots: &[Shot], reading: &Reading, stage| -> Result<Left, ReplicaError> {
         let options = Options::new(*reading, stage);
@@ -77,7 +74,7 @@ fn replica(
     };
     let rigid = left(&own.declared, &own.identification, &Reading::default(), StiffnessStage::Rigid)?;
     Ok(Replica {
-        links_over_joints,
+        case: *case,
         scale: own.scale,
         before: judged(&own.declared, &own.held_out, &Parameters::rigid(&own.declared), &Reading::default()),
         rigid,

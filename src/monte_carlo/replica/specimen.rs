@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::fit::{ReplicaError, fitted, judged};
 use super::rival::stiffen;
 use super::shot::Shot;
-use super::study::MisprintStudy;
+use super::study::{Case, MisprintStudy};
 use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};
 use crate::simulate::{Draw, NoRest, Rig, Row, draw};
@@ -34,10 +34,10 @@ pub struct Specimen {
 
 impl Specimen {
     /// Specimen of a seed, its flexibility scaled until the rigid fit leaves what the study says.
-    pub fn find(study: &MisprintStudy, links_over_joints: f64, seed: u64) -> Result<Self, ReplicaError> {
+    pub fn find(study: &MisprintStudy, case: &Case, seed: u64) -> Result<Self, ReplicaError> {
         let mut scale = 1.0;
         for _ in 0..TRIALS {
-            let Ok(specimen) = Self::at(study, (scale, links_over_joints), seed) else {
+            let Ok(specimen) = Self::at(study, case, scale, seed) else {
                 // Too soft to stand.
                 scale *= 0.5;
                 continue;
@@ -54,12 +54,17 @@ impl Specimen {
         Err(ReplicaError::Scale { leaves: study.rigid_leaves })
     }
 
-    fn at(study: &MisprintStudy, (scale, links_over_joints): (f64, f64), seed: u64) -> Result<Self, NoRest> {
+    fn at(study: &MisprintStudy, case: &Case, scale: f64, seed: u64) -> Result<Self, NoRest> {
         let mut declared = study.problem.clone();
-        stiffen(&mut declared, scale.recip(), (scale * links_over_joints).recip());
+        stiffen(&mut declared, scale.recip(), (scale * case.links_over_joints).recip());
         let (held_out, identification) = (study.held_out, study.identification);
         // Held-out poses first, so that they are the same for every number of the others; the noise of the second load last.
-        let Draw { arm, rows, .. } = draw(&declared, &study.truth, held_out + 2 * identification, seed);
+        let Draw { arm, mut rows, .. } = draw(&declared, &study.truth, held_out + 2 * identification, seed);
+        if let Some(load) = case.load {
+            for row in &mut rows {
+                row.conditions = load.put_on(&row.conditions);
+            }
+        }
         let rig = Rig::new(arm.clone(), study.truth.effects.clone()).with_segments(study.truth.segments);
         let shot = |conditions: &PoseConditions, noise: &Vector3<f64>| -> Result<Shot, NoRest> {
             Ok(Shot { conditions: conditions.clone(), position: rig.position(conditions)? + noise })
@@ -69,11 +74,10 @@ impl Specimen {
         };
         let (judging, others) = rows.split_at(held_out);
         let (first, second) = others.split_at(identification);
-        let again = first.iter().zip(second).map(|(row, noise)| {
-            let load = study.second_load;
-            let (payload, hoist) = (load.payload.or(row.conditions.payload), load.hoist.or(row.conditions.hoist));
-            shot(&PoseConditions { payload, hoist, ..row.conditions.clone() }, &noise.position)
-        });
+        let again = first
+            .iter()
+            .zip(second)
+            .map(|(row, noise)| shot(&study.second_load.put_on(&row.conditions), &noise.position));
         let again = again.collect::<Result<Vec<Shot>, NoRest>>()?;
         let (held_out, identification) = (taken(judging)?, taken(first)?);
         Ok(Self { known: with_geometry(arm, &declared), declared, scale, held_out, identification, again })

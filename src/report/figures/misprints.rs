@@ -7,7 +7,7 @@ use super::frame::{
     ACCENT, Area, BELOW, Drawing, FAINT, Failure, GRID, INK, MUTED, Mark, WARM, WIDTH, figure, legend, line, px,
     radius, write,
 };
-use crate::monte_carlo::{Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
+use crate::monte_carlo::{Case, Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
 use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
 use crate::report::quantity::number;
 
@@ -17,24 +17,24 @@ const NAMES: i32 = 178;
 const TOP: i32 = 26;
 /// Ends of the logarithmic axis.
 const RANGE: (f64, f64) = (0.02, 5.0);
-const COLOURS: [RGBColor; 3] = [FAINT, INK, ACCENT];
+const COLOURS: [RGBColor; 4] = [INK, ACCENT, FAINT, MUTED];
 
-/// A row: its name, and mean and spread for each share of flexibility.
+/// A row: its name, and mean and spread for each case.
 type Row = (String, Vec<Option<Spread>>);
 
 /// Ratio of the held-out mean to that of the rigid fit, of every reading and every rival.
 pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
     let spreads = |left: &dyn Fn(&Replica) -> Left| -> Vec<Option<Spread>> {
-        let ratio = |&share: &f64| Spread::of(found.of_share(share).map(|own| own.ratio(left(own))));
-        study.links_over_joints.iter().map(ratio).collect()
+        let ratio = |case: &Case| Spread::of(found.of_case(case).map(|own| own.ratio(left(own))));
+        study.cases.iter().map(ratio).collect()
     };
     let named = found.readings.iter().enumerate();
     let mut rows: Vec<Row> =
         named.map(|(place, named)| (named.name.clone(), spreads(&|own| own.left(place, 0)))).collect();
     rows.extend(Rival::EACH.map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))));
     let caption = "Mean error of the held-out poses over that of the rigid fit, mean and standard deviation over specimens, stiffness \
-                   known: each misprint alone, their combinations, and below them other explanations. Colours: flexibility of \
-                   links over that of joints, as multiples of what is declared. The line is the paper's 2.136/3.967; a misprint \
+                   known: each misprint alone, their combinations, and below them other explanations. Colours: how links and joints \
+                   share the flexibility, and one load in place of many. The line is the paper's 2.136/3.967; a misprint \
                    explains it where its marks meet the line.";
     let title = "What each misprint costs";
     Drawing::new("misprints", title, caption, draw(study, &rows))
@@ -44,8 +44,7 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
     let bottom = TOP + ROW * i32::try_from(rows.len()).unwrap_or_default();
     let paper = WITH_ELASTICITY.mean[3] / IGNORING_IT.mean[3];
     let colour = |k: usize| COLOURS[k % COLOURS.len()];
-    let words: Vec<String> =
-        study.links_over_joints.iter().map(|share| format!("links {}", number(*share, 2))).collect();
+    let words: Vec<String> = study.cases.iter().map(Case::name).collect();
     figure((WIDTH, bottom + BELOW), "Error of every reading over that of the rigid fit", |area| {
         let mut marks: Vec<(&str, RGBColor, Mark)> =
             words.iter().enumerate().map(|(k, word)| (word.as_str(), colour(k), Mark::Dot)).collect();

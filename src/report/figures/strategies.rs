@@ -6,7 +6,7 @@ use plotters::style::text_anchor::HPos;
 use super::frame::{
     ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
 };
-use crate::identify::{Comparison, Errors};
+use crate::identify::{Baseline, Comparison, Errors};
 use crate::report::quantity::{decimals, number};
 
 const ROW: i32 = 22;
@@ -44,7 +44,7 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
             entries.push(Entry { strategy, name, solvers: 1, errors });
         }
     }
-    let papers: Vec<String> = comparison.paper.iter().map(|own| own.name()).collect();
+    let papers: Vec<String> = comparison.paper.iter().map(Baseline::name).collect();
     entries.extend(papers.iter().zip(&comparison.paper).map(|(name, own)| entry(name, own.errors)));
     let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
                    wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
