@@ -127,8 +127,9 @@ fn printed_forms_find_the_arm_less_well() {
 #[test]
 fn load_differences_find_the_stiffness_beside_geometric_errors() {
     let (problem, rows) = (problem(), rows("equilibrium.csv"));
-    // Every pose again under another load.
-    let again = rows.iter().map(|row| Row { q: row.q.clone(), payload: row.payload + 3.0, values: Vec::new(), ..*row });
+    // Every pose again under a load that lifts the arm.
+    let lifted = |row: &Row| Row { q: row.q.clone(), payload: 0.0, hoist: row.hoist + 15.0, values: Vec::new() };
+    let again = rows.iter().map(lifted);
     let twice: Vec<Row> = again.collect();
     let poses = measured(&problem, &rows, 1.0, 0.8);
     let both = [&poses[..FITTED], &measured(&problem, &twice[..FITTED], 1.0, 0.8)].concat();
@@ -138,7 +139,7 @@ fn load_differences_find_the_stiffness_beside_geometric_errors() {
     let positions = identify(&problem, &both, &corrected(StiffnessStage::Positions)).unwrap();
     let misled = case.judge(&positions.parameters, options.reading);
     println!("stage 1 from load differences {error:.4} mm, from positions {misled:.4} mm");
-    assert!(error < 0.3 && misled > 10.0 * error);
+    assert!(error < 1.0 && misled > 5.0 * error);
     let single = identify(&problem, &case.poses[..FITTED], &options).unwrap_err();
     assert_eq!(single, IdentifyError::NoLoadDifferences);
 }
