@@ -16,7 +16,7 @@
 //! 7. [`report`]: text, JSON, Markdown, HTML and figures.
 //!
 //! Beside this way stand [`design`] (which poses to measure, and what they will tell), [`monte_carlo`] (many fits where the
-//! truth is known), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`simulate`], a rig that shares no physics
+//! truth is known), [`urdf`] (arms from URDF, and identified ones back into it), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`simulate`], a rig that shares no physics
 //! with the model.
 //!
 //! # The same walk in code
@@ -53,7 +53,7 @@
 //! # Indices
 //!
 //! What reads input indexes nothing (`clippy::indexing_slicing` is denied there: [`error`], [`files`], [`problem`], [`quantity`],
-//! [`monte_carlo`], the readers of [`measurement`] and [`simulate`], the command line). What reckons does: its indices are those of arrays that one
+//! [`monte_carlo`], [`urdf`], the readers of [`measurement`] and [`simulate`], the command line). What reckons does: its indices are those of arrays that one
 //! constructor made of one length from what was read.
 
 // The command line names this library as any other program does.
@@ -86,6 +86,8 @@ pub mod report;
 pub mod scalar;
 pub mod simulate;
 pub mod spatial;
+#[deny(clippy::indexing_slicing)]
+pub mod urdf;
 
 /// Vectors and matrices in the interface are of this version of nalgebra.
 pub use nalgebra;

@@ -100,6 +100,32 @@ fn every_parameter_of_an_arm_with_every_kind_of_joint_and_link() {
     }
 }
 
+/// Fixed joints given by xyz and rpy, and a joint that follows another, behind whatever stands before.
+const PLACED: &str = "[[joint]]\nkind = \"fixed\"\nxyz_m = [0.1, -0.2, 0.3]\nrpy_deg = [10, -80, 200]\n[[joint.body]]\nmass_kg = 1.5\n\
+                      com_m = [0.1, 0, 0.2]\n[[joint]]\na_m = 0.2\nmimic = { joint = 1, ratio = -0.5 }\n[[joint]]\nkind = \"fixed\"\n\
+                      xyz_m = [0, 0.1, 0]\n";
+
+#[test]
+fn every_parameter_of_an_arm_with_placements() {
+    let odd = parse(&format!("{ODD}{PLACED}"));
+    let everything = "[parameters]\n\"*\" = { sigma_deg = 1.0, sigma_mm = 30.0 }\n";
+    let rigid = parse(&format!(
+        "name = 'placed'\n[[joint]]\nalpha_deg = 20\nd_m = 0.4\n{PLACED}[tool]\ntarget_m = [0.1, 0.2, 0.3]\n{everything}"
+    ));
+    for (problem, silent) in [(odd, &[][..]), (rigid, &[])] {
+        let mut rows = at_random(&problem, 10, 2.5, &mut ChaCha8Rng::seed_from_u64(3));
+        let (n, follower) =
+            (problem.joints.len(), problem.joints.iter().position(|joint| joint.mimic.is_some()).unwrap());
+        rows.configurations.chunks_exact_mut(n).for_each(|row| row[follower] = 0.0);
+        let names: Vec<String> = model_of(&problem, &rows).parameters.into_iter().map(|own| own.name).collect();
+        assert!(
+            names.contains(&format!("joint{}.pitch", n)) && !names.contains(&format!("joint{}.alpha", n)),
+            "{names:?}"
+        );
+        check(&problem.name, &problem, &rows, silent, silent);
+    }
+}
+
 #[test]
 fn every_parameter_of_a_rigid_arm_with_sessions_and_targets() {
     let problem = Problem::read(&path("problems/ur10-ipa")).unwrap();

@@ -5,7 +5,10 @@ mod compare;
 mod compensate;
 mod completions;
 mod diagnostic;
+mod estimate;
+mod export;
 mod identify;
+mod init;
 mod input;
 mod loop_command;
 mod man;
@@ -45,6 +48,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Make a problem of the arm in a URDF.
+    Init(init::Arguments),
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
     /// Put every strategy and solver, and every part of the elasticity left out, side by side.
@@ -57,6 +62,8 @@ enum Command {
     Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
+    /// Write the identified geometry into the URDF that the problem came from, or as YAML for a driver.
+    Export(export::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
     Check(check::Arguments),
     /// Choose the poses that identify best.
@@ -83,6 +90,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let outcome = match cli.command {
+        Command::Init(arguments) => init::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),

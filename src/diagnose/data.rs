@@ -118,7 +118,7 @@ impl<'a> Data<'a> {
     /// Everything that the residual may depend on, one value per identification row.
     pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
-        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         let joint = |(index, _): (usize, _)| CovariateValues {
             covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),

@@ -6,7 +6,11 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::near::{instead, meant, question};
+<<<<<<< HEAD
 use super::shortened;
+=======
+use super::urdf::UrdfMistake;
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 
 /// What is wrong with the input.
 ///
@@ -97,6 +101,12 @@ pub enum InputErrorKind {
     NoJoints,
     #[error("a beam lies along its joint's a, which is 0 here; give a_m or a_mm")]
     BeamWithoutLength,
+    #[error("a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")")]
+    BeamInStandardForm,
+    #[error("a fixed joint follows no other; leave mimic out, or give the joint another kind")]
+    FixedFollows,
+    #[error("joint {joint} takes no command of its own that another could follow")]
+    NoLeader { joint: u64 },
     #[error("\"{name}\" cannot name a beam, for parameters go by it; leave out . * [ ] and spaces")]
     NotABeamName { name: String },
     #[error("\"{name}\" names other parameters; choose another name")]
@@ -220,6 +230,9 @@ pub enum InputErrorKind {
     SolverIgnoresBounds { solver: &'static str },
     #[error("no parameter of the kind that {strategy} varies is free in the problem; leave it out")]
     NothingToVary { strategy: &'static str },
+
+    #[error(transparent)]
+    Urdf(#[from] UrdfMistake),
 
     // Held-out rows.
     #[error("give one of column, fraction (with seed) or session")]

@@ -3,6 +3,7 @@
 mod kind;
 mod near;
 mod plain;
+mod urdf;
 
 use std::fmt;
 use std::ops::Range;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::{nearest, one_typo};
 pub use plain::{is_hidden, one_line, veiled, visible};
+pub use urdf::UrdfMistake;
 
 /// How UTF-8 text may begin.
 pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";

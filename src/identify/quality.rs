@@ -191,7 +191,7 @@ impl fmt::Display for TooFewPoses {
 /// The parameter of the arm that lies furthest beyond its prior, if that is out of all proportion; those of effects may.
 pub(super) fn beyond_prior(model: &Model, x: &DVector<f64>) -> Option<QualityFlag> {
     let declared = |slot: Slot| match slot {
-        Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field) || field == JointField::Stiffness,
+        Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
         Slot::Beam { .. } => slot.unit().is_relative(),
         Slot::Base { .. } | Slot::Target { .. } => true,
         _ => false,

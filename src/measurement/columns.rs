@@ -5,8 +5,13 @@ use std::convert::identity;
 
 use super::mapped::Names;
 use super::table::Table;
+<<<<<<< HEAD
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
 use crate::problem::{HeldOut, JointKind, JointSource, Problem};
+=======
+use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest, one_typo};
+use crate::problem::{HeldOut, Joint, JointKind, Problem};
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 use crate::quantity::Unit;
 
 /// What a column stands for; joints and axes count from 0.
@@ -187,19 +192,30 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let missing = |base: &str, unit: Unit| {
-            let (write, near) = (unit.spelled(base), unit.spellings(base).find_map(|name| near(&name)));
-            Err(table.column(base).error(InputErrorKind::MissingColumn { write, near }))
+        let missing = |bases: &[&str], unit: Unit| {
+            let write = bases.iter().map(|base| unit.spelled(base)).collect::<Vec<_>>().join(" or ");
+            let near = bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
+            let first = bases.first().copied().unwrap_or_default();
+            Err(table.column(first).error(InputErrorKind::MissingColumn { write, near }))
         };
         let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
             JointSource::Commanded => (Role::Joint, ""),
             JointSource::Read => (Role::Reading, "_read"),
         };
         for (index, joint) in problem.joints.iter().enumerate() {
+<<<<<<< HEAD
             if let Some(unit) = unit_of(joint.kind)
                 && !self.has(source(index))
             {
                 return missing(&format!("q{}{suffix}", numbering.number(index)), unit);
+=======
+            if let Some(unit) = unit_of(joint.commanded())
+                && !self.has(Role::Joint(index))
+            {
+                let number = format!("q{}", numbering.number(index));
+                let named = Some(joint.name.as_str()).filter(|name| !name.contains(' '));
+                return missing(&[&[number.as_str()], named.as_slice()].concat(), unit);
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
             }
         }
         // One coordinate alone is no position.
@@ -208,7 +224,7 @@ impl Columns {
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             if !self.has(Role::Position(axis)) {
-                return missing(name, Unit::Length);
+                return missing(&[name], Unit::Length);
             }
         }
         if let (true, true) = self.orientations() {
@@ -274,7 +290,7 @@ impl Numbering {
     fn of<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
         let numbers: Vec<usize> = names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
         let all = || (0..problem.joints.len()).collect::<Vec<_>>();
-        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
         let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
         let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
@@ -292,25 +308,31 @@ impl Numbering {
 
     /// The column that an unknown name is meant to be, of those that the table does not have.
     fn meant(&self, name: &str, there: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
-        let joints = problem.joints.iter().enumerate().filter_map(|(index, joint)| Some((index, unit_of(joint.kind)?)));
-        let joints = joints.map(|(index, unit)| (self.number(index), unit));
+        let moving =
+            || problem.joints.iter().enumerate().filter_map(|(k, own)| Some((k, own, unit_of(own.commanded())?)));
+        let joints = moving().map(|(index, _, unit)| (self.number(index), unit));
+        let named = moving().map(|(_, joint, unit)| (joint.name.clone(), unit));
         let plain = PLAIN.iter().map(|(name, _)| (*name).to_owned());
         let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
         let measured = MEASURED.iter().map(|&(base, _, unit, _)| (base.to_owned(), unit));
         let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
-        let measured = measured.flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
+        let measured = measured.chain(named).flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
         let lacking = |name: &String| !there.contains(split_unit(name).0);
         nearest(name, plain.chain(approach).chain(measured).filter(lacking))
     }
 
     /// What the name of a column means.
     fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
+        if let Some(meaning) = by_joint_name(name, problem) {
+            return meaning;
+        }
         let plain = |role| Ok(Meaning::Read(role, identity));
         if let Some((_, role)) = PLAIN.iter().find(|(known, _)| *known == name) {
             return plain(*role);
         }
         if let Some(number) = numbered(name, "approach") {
-            let moves = |&joint: &usize| problem.joints.get(joint).is_some_and(|own| own.kind != JointKind::Fixed);
+            let moves =
+                |&joint: &usize| problem.joints.get(joint).is_some_and(|own| own.commanded() != JointKind::Fixed);
             return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
                 None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
@@ -325,7 +347,8 @@ impl Numbering {
         } else {
             let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
             let joint = self.joint(number);
-            let Some((joint, unit)) = joint.and_then(|joint| Some((joint, unit_of(problem.joints.get(joint)?.kind)?)))
+            let Some((joint, unit)) =
+                joint.and_then(|joint| Some((joint, unit_of(problem.joints.get(joint)?.commanded())?)))
             else {
                 return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
             };
@@ -347,6 +370,7 @@ impl Numbering {
     }
 }
 
+<<<<<<< HEAD
 /// What the name of the file may stand for: a word.
 fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
@@ -358,6 +382,37 @@ fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 /// Conversion of a time without a unit: a date, which needs none.
 pub(super) const DATE: fn(f64) -> f64 = |_| f64::NAN;
 
+=======
+/// What the name of a column means that is the name of a joint, with a unit: `shoulder_pan_joint_rad`. Names that two joints
+/// have, and those of other columns, mean no joint.
+fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
+    let base = split_unit(name).0;
+    let other = PLAIN.iter().any(|(known, _)| *known == name) || numbered(base, "q").is_some();
+    let measured = MEASURED.iter().find(|(known, ..)| *known == base);
+    if other || measured.is_some_and(|(known, _, unit, _)| unit.spellings(known).any(|spelled| spelled == name)) {
+        return None;
+    }
+    let joint_of = |name: &str| {
+        let mut joints = problem.joints.iter().enumerate().filter(|(_, joint)| joint.name == name);
+        joints.next().filter(|_| joints.next().is_none())
+    };
+    let unit = |(index, joint): (usize, &Joint)| Some((index, unit_of(joint.commanded())?));
+    if let Some((_, unit)) = joint_of(name).and_then(unit) {
+        return Some(Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: unit.spelled(name) }));
+    }
+    let (base, suffix) = name.rsplit_once('_')?;
+    let (index, unit) = joint_of(base).and_then(unit)?;
+    match unit.suffix(suffix) {
+        Some(suffix) => Some(Ok(Meaning::Read(Role::Joint(index), suffix.to_si))),
+        None if Unit::all_suffixes().any(|known| known == suffix) => {
+            let (suffix, write) = (suffix.to_owned(), unit.spelled(base));
+            Some(Err(InputErrorKind::WrongUnit { noun: unit.noun(), suffix, write }))
+        }
+        None => None,
+    }
+}
+
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 /// Whether a column that was meant would be missed: a pose's name and orientations decide nothing.
 fn counts(meant: &str) -> bool {
     let base = split_unit(meant).0;

@@ -84,7 +84,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// The last frame of the arm that does not deflect, arm base frame.
-    pub(super) fn rigid_frame(&self, setup: &PoseView) -> Frame<S> {
+    pub(crate) fn rigid_frame(&self, setup: &PoseView) -> Frame<S> {
         let mut frame = Frame::identity();
         for (joint, &q) in self.joints.iter().zip(setup.configuration) {
             joint.advance(&mut frame, q);

@@ -137,7 +137,7 @@ impl<S: Scalar> Arm<S> {
             walk.tilt(mounting, Segment::Mounting, ws);
         }
         for (i, joint) in self.joints.iter().enumerate() {
-            walk.frame.rotate_x(joint.alpha.sin_cos);
+            joint.begin(&mut walk.frame);
             if matches!(bend, Bend::Rigid) {
                 ws.rigid_roots.push(walk.frame);
             }

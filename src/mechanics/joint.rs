@@ -1,5 +1,7 @@
 //! A joint with the link before it.
 
+use nalgebra::Vector3;
+
 use super::imperfection::Nonlinear;
 use super::link::{Beam, PointMass, point_masses};
 use crate::problem::{self, JointKind};
@@ -22,11 +24,50 @@ impl<S: Scalar> Angle<S> {
     }
 }
 
-/// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1].
+impl Angle<f64> {
+    fn lift<S: Scalar>(&self) -> Angle<S> {
+        Angle { value: S::from(self.value), sin_cos: (S::from(self.sin_cos.0), S::from(self.sin_cos.1)) }
+    }
+}
+
+/// A transform of six numbers: Txyz Rz(yaw) Ry(pitch) Rx(roll), as URDF has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement<S> {
+    /// Origin \[m\].
+    pub xyz: Vector3<S>,
+    /// Roll, pitch and yaw.
+    pub rpy: [Angle<S>; 3],
+}
+
+impl Placement<f64> {
+    fn nominal(placement: &problem::Placement) -> Self {
+        let [roll, pitch, yaw] = placement.rpy.into();
+        Self { xyz: placement.xyz, rpy: [roll, pitch, yaw].map(Angle::new) }
+    }
+
+    fn lift<S: Scalar>(&self) -> Placement<S> {
+        Placement { xyz: self.xyz.map(S::from), rpy: self.rpy.each_ref().map(Angle::lift) }
+    }
+}
+
+impl<S: Scalar> Placement<S> {
+    fn advance(&self, frame: &mut Frame<S>) {
+        let [roll, pitch, yaw] = &self.rpy;
+        frame.translate(&self.xyz);
+        frame.rotate_z(yaw.sin_cos);
+        frame.rotate_y(pitch.sin_cos);
+        frame.rotate_x(roll.sin_cos);
+    }
+}
+
+/// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement where
+/// there is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint<S> {
     /// What q does.
     pub kind: JointKind,
+    /// A transform before all others.
+    pub placement: Option<Placement<S>>,
     /// α.
     pub alpha: Angle<S>,
     /// a \[m\].
@@ -62,6 +103,7 @@ impl Joint<f64> {
     pub(super) fn nominal(joint: &problem::Joint) -> Self {
         Self {
             kind: joint.kind,
+            placement: joint.placement.as_ref().map(Placement::nominal),
             alpha: Angle::new(joint.alpha),
             a: joint.a,
             theta: joint.theta,
@@ -77,15 +119,14 @@ impl Joint<f64> {
 
     /// The same joint with its parameters as constants of another scalar.
     pub fn lift<S: Scalar>(&self) -> Joint<S> {
-        let angle =
-            |a: &Angle<f64>| Angle { value: S::from(a.value), sin_cos: (S::from(a.sin_cos.0), S::from(a.sin_cos.1)) };
         Joint {
             kind: self.kind,
-            alpha: angle(&self.alpha),
+            placement: self.placement.as_ref().map(Placement::lift),
+            alpha: self.alpha.lift(),
             a: S::from(self.a),
             theta: S::from(self.theta),
             d: S::from(self.d),
-            beta: angle(&self.beta),
+            beta: self.beta.lift(),
             flexibility: self.flexibility.map(S::from),
             nonlinear: self.nonlinear.as_ref().map(Nonlinear::lift),
             lateral: self.lateral.map(|lateral| lateral.map(S::from)),
@@ -146,10 +187,25 @@ impl<S: Scalar> Joint<S> {
         }
     }
 
-    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: Rx(α) Tx(a).
-    pub(super) fn root(&self, frame: &mut Frame<S>) {
+    /// Moves `frame` to where the link begins: through the placement, if there is one, and Rx(α).
+    pub(super) fn begin(&self, frame: &mut Frame<S>) {
+        if let Some(placement) = &self.placement {
+            placement.advance(frame);
+        }
         frame.rotate_x(self.alpha.sin_cos);
+    }
+
+    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: the placement and Rx(α) Tx(a).
+    pub(super) fn root(&self, frame: &mut Frame<S>) {
+        self.begin(frame);
         frame.translate_x(self.a);
+    }
+
+    /// Moves `frame` to the joint's axis at q = 0: through `T_i` but for Ry(β).
+    pub(crate) fn walk_to_axis(&self, frame: &mut Frame<S>) {
+        self.root(frame);
+        frame.rotate_z(self.theta.sin_cos());
+        frame.translate_z(self.d);
     }
 
     /// Moves `frame` through the whole rigid `T_i`.

@@ -19,7 +19,7 @@ impl Model {
             .zip(&arm.joints)
             .enumerate()
             .filter_map(|(joint, (declared, own))| {
-                let (field, nominal) = match declared.kind {
+                let (field, nominal) = match declared.commanded() {
                     JointKind::Revolute => (JointField::Theta, own.theta),
                     JointKind::Prismatic => (JointField::D, own.d),
                     JointKind::Fixed => return None,

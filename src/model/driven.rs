@@ -1,7 +1,7 @@
 //! What adds to the joints' commands, pose by pose.
 
 use crate::model::parameter::{Driver, JointField, Parameter, Slot};
-use crate::problem::PoseView;
+use crate::problem::{Mimic, PoseView, Problem};
 
 /// A known addition to a joint's coordinate: value × driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,16 @@ pub(super) struct Driven {
 }
 
 impl Driven {
+    /// Joints that follow the commands of others.
+    pub fn declared(problem: &Problem) -> Vec<Self> {
+        let joints = problem.joints.iter().enumerate();
+        let driven = joints.filter_map(|(joint, own)| {
+            let Mimic { joint: other, ratio } = own.mimic?;
+            Some(Self { joint, driver: Driver::command(problem, other + 1), value: ratio })
+        });
+        driven.collect()
+    }
+
     /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate.
     fn of(slot: Slot, driver: Driver, x: f64) -> Option<Self> {
         match slot {

@@ -71,6 +71,12 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
     match slot {
         Slot::Joint { joint, field } => {
             let joint = &mut arm.joints[joint];
+            if let (Some(place), Some(placement)) = (field.placement(), &mut joint.placement) {
+                match place.checked_sub(3) {
+                    None => placement.xyz[place] = x + nominal,
+                    Some(angle) => placement.rpy[angle] = Angle::new(x + nominal),
+                }
+            }
             match (field, &mut joint.nonlinear, &mut joint.lateral) {
                 (JointField::Alpha, ..) => joint.alpha = Angle::new(x + nominal),
                 (JointField::A, ..) => joint.a = x + nominal,
@@ -83,8 +89,7 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play += x,
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
-                (JointField::Cubic | JointField::Play | JointField::SlidingPlay, None, _)
-                | (JointField::LateralX | JointField::LateralY, _, None) => {}
+                _ => {}
             }
         }
         Slot::Beam { joint, field } => {

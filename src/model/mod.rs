@@ -27,8 +27,8 @@ pub use poses::PoseResiduals;
 use nalgebra::Vector3;
 
 use crate::error::InputError;
-use crate::mechanics::Arm;
-use crate::model::parameter::{Driver, JointField, LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::mechanics::{Arm, Joint};
+use crate::model::parameter::{Driver, LinearConstraint, Parameter, Slot, constrain, resolve};
 use crate::problem::{BasePose, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -68,7 +68,7 @@ impl Model {
         Ok(Self {
             constraints: constrain(problem, bases, targets, effects, &parameters)?,
             nominal,
-            driven: Vec::new(),
+            driven: Driven::declared(problem),
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
@@ -86,7 +86,7 @@ impl Model {
         for &(slot, nominal) in slots {
             enter::prepare(&mut model.nominal, slot, nominal);
             let added = match slot {
-                Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field),
+                Slot::Joint { field, .. } => field.is_geometry(),
                 Slot::Shift { .. } => true,
                 _ => false,
             };
@@ -108,9 +108,12 @@ impl Model {
         self.nominal.joints.len()
     }
 
-    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²) over its joints and the farthest target; 1 m where all that is nought.
+    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over its joints and the farthest target; 1 m where all that is nought.
     pub fn size(&self) -> f64 {
-        let links: f64 = self.nominal.joints.iter().map(|joint| joint.a.hypot(joint.d)).sum();
+        let length = |joint: &Joint<f64>| {
+            joint.a.hypot(joint.d) + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
+        };
+        let links: f64 = self.nominal.joints.iter().map(length).sum();
         let target = self.targets.iter().map(Vector3::norm).fold(0.0, f64::max);
         if links + target > 0.0 { links + target } else { 1.0 }
     }

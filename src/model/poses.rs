@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::Model;
 use super::derivative::Linearised;
+use super::driven::Commands;
 use super::pose::Pose;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::mechanics::{Equilibrated, Workspace};
@@ -141,6 +142,7 @@ impl Model {
         measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
     }
 
+<<<<<<< HEAD
     /// Rotation vectors from the predicted to the measured orientations of poses, measuring frame \[rad\], as
     /// [`PoseResiduals::orientation_errors`].
     pub fn orientation_residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
@@ -170,6 +172,19 @@ impl Model {
         };
         let all = poses.iter().zip(self.frames(poses, x)).map(orientation);
         all.map(|turn| turn.unwrap_or(Vector3::from_element(f64::NAN))).collect()
+=======
+    /// Positions of poses as the geometry alone has them at the full parameter vector `x`, measuring frame \[m\]: nothing gives way,
+    /// and no effect acts.
+    pub fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+        let arm = self.arm(|k| x[k]);
+        let (bases, targets) = (self.base_frames(x), self.target_positions(x));
+        let mut commands = Commands::new(&self.driven, &[], &[]);
+        let position = |pose: &Pose| {
+            let tip = arm.rigid_frame(&commands.apply(&pose.setup));
+            bases[pose.base].point(&tip.point(&targets[pose.target]))
+        };
+        poses.iter().map(position).collect()
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
     }
 
     /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.

@@ -8,7 +8,7 @@ use num_dual::Dual64;
 
 use super::inputs::Input;
 use super::rows::Rows;
-use crate::mechanics::{Angle, Arm, Coordinates, Joint};
+use crate::mechanics::{Angle, Arm, Coordinates, Joint, Placement};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::PoseView;
 use crate::spatial::{Frame, turn_x, turn_y, turn_z};
@@ -19,12 +19,15 @@ pub(super) struct Rigid {
     inputs: Vec<Input>,
     /// Of the pose at hand, from the last link to the first.
     carried: Vec<Carried>,
+    /// The same of the links that have a placement: what its six numbers do.
+    placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// A link with each of its five parameters seeded, and which input each is.
+/// A link with each of its parameters seeded, and which input each is: the five of its motions, and the six of its placement.
 struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
+    placing: [Option<usize>; 6],
 }
 
 /// What the parameters of a link do to the target, each in the frame before its own motion, and where q puts the joint.
@@ -38,13 +41,16 @@ impl Rigid {
     pub fn new(arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
         let mut links: Vec<Link> = arm.joints.iter().map(Link::seeded).collect();
         for (index, input) in inputs.iter().enumerate() {
-            if let Slot::Joint { joint, field } = input.slot
-                && let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field)
-            {
-                links[joint].inputs[place] = Some(index);
+            if let Slot::Joint { joint, field } = input.slot {
+                if let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field) {
+                    links[joint].inputs[place] = Some(index);
+                }
+                if let Some(place) = field.placement() {
+                    links[joint].placing[place] = Some(index);
+                }
             }
         }
-        Self { links, inputs, carried: Vec::new() }
+        Self { links, inputs, carried: Vec::new(), placed: Vec::new() }
     }
 
     /// Writes the derivatives of the `target` \[m\] of a pose; returns the last frame, measuring frame.
@@ -57,17 +63,32 @@ impl Rigid {
         target: &Vector3<f64>,
         rows: &mut Rows,
     ) -> Frame<f64> {
-        let Self { links, inputs, carried } = self;
+        let Self { links, inputs, carried, placed } = self;
         carried.clear();
+        placed.clear();
         let mut point = *target;
         for (link, &q) in links.iter().zip(setup.configuration).rev() {
             let coordinates = link.joint.coordinates(q);
             let derivatives;
             (derivatives, point) = link.carry(&coordinates, &point);
             carried.push(Carried { derivatives, coordinates });
+            if let Some(placement) = &link.joint.placement {
+                let derivatives;
+                (derivatives, point) = carry_through(placement, &point);
+                placed.push(derivatives);
+            }
         }
         let mut frame = *base;
         for (link, Carried { derivatives, coordinates }) in links.iter().zip(carried.iter().rev()) {
+            if let Some((placement, derivatives)) =
+                link.joint.placement.as_ref().and_then(|own| Some((own, placed.pop()?)))
+            {
+                place(placement, &mut frame, |place, frame| {
+                    if let Some(input) = link.placing[place] {
+                        rows.put_input(&inputs[input], commanded, &frame.vector(&derivatives[place]));
+                    }
+                });
+            }
             link.advance(coordinates, &mut frame, |place, frame| {
                 if let Some(input) = link.inputs[place] {
                     rows.put_input(&inputs[input], commanded, &frame.vector(&derivatives[place]));
@@ -84,7 +105,12 @@ impl Link {
         let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
         let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
         let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
-        Self { joint: Joint { alpha, a, theta, d, beta, ..joint.lift() }, inputs: [None; 5] }
+        let placement = joint.placement.map(|own| Placement { xyz: own.xyz.map(seed), rpy: own.rpy.map(angle) });
+        Self {
+            joint: Joint { placement, alpha, a, theta, d, beta, ..joint.lift() },
+            inputs: [None; 5],
+            placing: [None; 6],
+        }
     }
 
     /// Carries a point \[m\] from the frame after the link to the frame before it, with what α, a, θ, d, β do to it.
@@ -103,7 +129,6 @@ impl Link {
     #[inline]
     fn advance(&self, at: &Coordinates<Dual64>, frame: &mut Frame<f64>, mut before: impl FnMut(usize, &Frame<f64>)) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        let real = |(sin, cos): (Dual64, Dual64)| (sin.re, cos.re);
         before(0, frame);
         frame.rotate_x(real(alpha.sin_cos));
         before(1, frame);
@@ -115,6 +140,35 @@ impl Link {
         before(4, frame);
         frame.rotate_y(real(beta.sin_cos));
     }
+}
+
+/// Carries a point \[m\] from behind a placement to before it, with what x, y, z, roll, pitch, yaw do to it, each in the frame
+/// before its own motion.
+fn carry_through(placement: &Placement<Dual64>, point: &Vector3<f64>) -> ([Vector3<f64>; 6], Vector3<f64>) {
+    let [roll, pitch, yaw] = &placement.rpy;
+    let (by_roll, point) = derivative(&turn_x(roll.sin_cos, point));
+    let (by_pitch, point) = derivative(&turn_y(pitch.sin_cos, &point));
+    let (by_yaw, point) = derivative(&turn_z(yaw.sin_cos, &point));
+    let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
+    ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
+}
+
+/// Moves `frame` through a placement; `before` sees it before each motion.
+fn place(placement: &Placement<Dual64>, frame: &mut Frame<f64>, mut before: impl FnMut(usize, &Frame<f64>)) {
+    let [roll, pitch, yaw] = &placement.rpy;
+    (0..3).for_each(|axis| before(axis, frame));
+    frame.translate(&placement.xyz.map(|coordinate| coordinate.re));
+    before(5, frame);
+    frame.rotate_z(real(yaw.sin_cos));
+    before(4, frame);
+    frame.rotate_y(real(pitch.sin_cos));
+    before(3, frame);
+    frame.rotate_x(real(roll.sin_cos));
+}
+
+/// (sin, cos) without derivatives.
+fn real((sin, cos): (Dual64, Dual64)) -> (f64, f64) {
+    (sin.re, cos.re)
 }
 
 /// The derivative of a vector, and its value.

@@ -113,7 +113,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
 /// Whether the problem's own parameters are there.
 fn is_declared(slot: Slot) -> bool {
     match slot {
-        Slot::Joint { field, .. } => JointField::GEOMETRY.contains(&field) || field == JointField::Stiffness,
+        Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
         Slot::Beam { field, .. } => field.is_rigidity() && field != BeamField::Flexibility,
         Slot::Base { .. } | Slot::Target { .. } => true,
         Slot::Arm(_) | Slot::Shift { .. } | Slot::Scale => false,

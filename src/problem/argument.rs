@@ -107,7 +107,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     /// The number of a joint that takes a command.
     pub fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let joint = self.any_joint(key)?;
-        let kind = self.joints.get(joint - 1).map(|own| own.kind);
+        let kind = self.joints.get(joint - 1).map(Joint::commanded);
         if let (Some(JointKind::Fixed), Some(item)) = (kind, self.section.peek(key)) {
             return Err(item.error(InputErrorKind::NoCommand { joint }));
         }
@@ -171,7 +171,7 @@ impl<'s> Examples<'s> {
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
-        (1..).zip(self.joints).filter(|(_, joint)| joint.kind != JointKind::Fixed).map(|(number, _)| number)
+        (1..).zip(self.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed).map(|(number, _)| number)
     }
 
     fn first(&self) -> usize {

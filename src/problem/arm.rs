@@ -4,35 +4,80 @@ use nalgebra::Vector3;
 
 use super::item::Item;
 use super::section::Section;
-use super::{Beam, Body, Hoist, Joint, JointKind, effect};
+use super::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, standard};
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
 
 /// Every `[[joint]]`, at least one.
 pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputError> {
-    let mut joints = Vec::new();
-    let mut beams = Vec::new();
-    for section in root.sections("joint")? {
-        joints.push(joint(section, joints.len() + 1, &mut beams)?);
+    let form = root.word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?.unwrap_or(Form::Modified);
+    let (mut joints, mut beams, mut mimics) = (Vec::new(), Vec::new(), Vec::new());
+    for mut section in root.sections("joint")? {
+        let mimic = section.section("mimic")?;
+        joints.push(joint(section, joints.len() + 1, (form, mimic.is_some()), &mut beams)?);
+        mimics.push(mimic);
     }
     if joints.is_empty() {
         return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
     }
-    Ok(joints)
+    let leads: Vec<bool> =
+        joints.iter().zip(&mimics).map(|(own, mimic)| own.kind != JointKind::Fixed && mimic.is_none()).collect();
+    for (joint, section) in joints.iter_mut().zip(mimics) {
+        joint.mimic = section.map(|section| mimic(section, &leads)).transpose()?;
+    }
+    Ok(if form == Form::Standard { standard::modified(joints) } else { joints })
 }
 
-fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -> Result<Joint, InputError> {
+/// In which order a row of the joint table moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// α and a before θ and d.
+    Modified,
+    /// θ and d before a and α.
+    Standard,
+}
+
+/// `mimic = { joint = 2, ratio = -1.0 }`; `leads` says of each joint whether others may follow it.
+fn mimic(mut section: Section<'_, '_>, leads: &[bool]) -> Result<Mimic, InputError> {
+    let item = section.require("joint", "joint = …, the number of the joint that it follows")?;
+    let number = item.whole(0)?;
+    let joint = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+    let mimic = match joint.and_then(|joint| Some((joint, *leads.get(joint)?))) {
+        Some((joint, true)) => Mimic { joint, ratio: section.get("ratio").map_or(Ok(1.0), |item| item.number())? },
+        Some((_, false)) => return Err(item.error(InputErrorKind::NoLeader { joint: number })),
+        None => return Err(item.error(InputErrorKind::UnknownJoint { joint: number, joints: leads.len() })),
+    };
+    section.finish()?;
+    Ok(mimic)
+}
+
+fn joint(
+    mut section: Section<'_, '_>,
+    number: usize,
+    (form, follows): (Form, bool),
+    beams: &mut Vec<String>,
+) -> Result<Joint, InputError> {
     let name = section.text("name")?.map_or_else(|| format!("joint {number}"), str::to_owned);
     let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed];
     let kind = section.word("kind", &["revolute", "prismatic", "fixed"], &kinds)?.unwrap_or(JointKind::Revolute);
-    let alpha = section.number("alpha", Unit::Angle)?.unwrap_or(0.0);
-    let a = section.number("a", Unit::Length)?.unwrap_or(0.0);
-    let theta = section.number("theta", Unit::Angle)?.unwrap_or(0.0);
-    let d = section.number("d", Unit::Length)?.unwrap_or(0.0);
-    let beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
-    let limits = limits(&mut section, kind)?;
+    if follows && kind == JointKind::Fixed {
+        return Err(section.error(InputErrorKind::FixedFollows));
+    }
+    let placement = if kind == JointKind::Fixed { placement(&mut section)? } else { None };
+    let (mut alpha, mut a, mut theta, mut d, mut beta) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    if placement.is_none() {
+        alpha = section.number("alpha", Unit::Angle)?.unwrap_or(0.0);
+        a = section.number("a", Unit::Length)?.unwrap_or(0.0);
+        theta = section.number("theta", Unit::Angle)?.unwrap_or(0.0);
+        d = section.number("d", Unit::Length)?.unwrap_or(0.0);
+    }
+    if placement.is_none() && form == Form::Modified {
+        beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
+    }
+    let limits = limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
+        Some(beam) if form == Form::Standard => return Err(beam.error(InputErrorKind::BeamInStandardForm)),
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
         Some(section) => Some(beam(section, beams)?),
         None => None,
@@ -40,7 +85,15 @@ fn joint(mut section: Section<'_, '_>, number: usize, beams: &mut Vec<String>) -
     let bodies = bodies(&mut section, "body", "com", false)?;
     section.finish()?;
     let location = section.location();
-    Ok(Joint { name, kind, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
+    let mimic = None;
+    Ok(Joint { name, kind, placement, mimic, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
+}
+
+/// `xyz_m` and `rpy_deg`, in URDF's order, if one of them is there.
+pub(super) fn placement(section: &mut Section<'_, '_>) -> Result<Option<Placement>, InputError> {
+    let (xyz, rpy) = (section.vector("xyz", Unit::Length)?, section.vector("rpy", Unit::Angle)?);
+    let given = xyz.is_some() || rpy.is_some();
+    Ok(given.then(|| Placement { xyz: xyz.unwrap_or_default(), rpy: rpy.unwrap_or_default() }))
 }
 
 /// Range of q, infinite where none is given.

@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 use sha2::{Digest as _, Sha256};
 
 use super::quoted::quoted;
-use super::{BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Problem, Statics, Tool};
+use super::{
+    BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem, Statics, Tool,
+};
 
 impl Problem {
     /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same on every machine, and
@@ -15,8 +17,14 @@ impl Problem {
     /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
     /// (`5.00000000000e-1`):
     /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
+<<<<<<< HEAD
     ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector;
     /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
+=======
+    ///   and rotation of the base; mass of the payload;
+    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it is placed by xyz and rpy `placed` and these; where
+    ///   it follows another `mimic`, its number and the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
+>>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
     ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
     ///   and with a hoist `hoist`, force, hook and direction;
     /// - for each effect, in the order of the alphabet, a new line with its declaration as in a problem file;
@@ -65,13 +73,20 @@ pub(crate) fn hexadecimal(text: &str) -> String {
 }
 
 fn joint(text: &mut String, joint: &Joint) {
-    let Joint { name: _, kind, alpha, a, theta, d, beta, limits: _, stiffness, beam: elastic, bodies, location: _ } =
-        joint;
+    let Joint { kind, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } = joint;
     text.push_str(match kind {
         JointKind::Revolute => "\nrevolute",
         JointKind::Prismatic => "\nprismatic",
         JointKind::Fixed => "\nfixed",
     });
+    if let Some(Placement { xyz, rpy }) = placement {
+        text.push_str(" placed");
+        vectors(text, &[xyz, rpy]);
+    }
+    if let Some(Mimic { joint, ratio }) = mimic {
+        let _ = write!(text, " mimic {}", joint + 1);
+        number(text, *ratio);
+    }
     for value in [alpha, a, theta, d, beta] {
         number(text, *value);
     }

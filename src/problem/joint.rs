@@ -15,13 +15,17 @@ pub enum JointKind {
     Fixed,
 }
 
-/// `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1].
+/// `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement where there is one.
 #[derive(Debug, Clone)]
 pub struct Joint {
     /// Name for people; parameters go by number.
     pub name: String,
     /// What q does.
     pub kind: JointKind,
+    /// A transform before all others of this joint; of fixed joints alone.
+    pub placement: Option<Placement>,
+    /// Whose command the joint follows, if it has none of its own.
+    pub mimic: Option<Mimic>,
     /// α \[rad\].
     pub alpha: f64,
     /// a \[m\].
@@ -42,6 +46,31 @@ pub struct Joint {
     pub bodies: Vec<Body>,
     /// For errors.
     pub location: Location,
+}
+
+impl Joint {
+    /// What a command of the joint's own does: nothing where it follows another one.
+    pub fn commanded(&self) -> JointKind {
+        if self.mimic.is_some() { JointKind::Fixed } else { self.kind }
+    }
+}
+
+/// `xyz_m` and `rpy_deg` of a fixed joint: Txyz Rz(yaw) Ry(pitch) Rx(roll), as URDF has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// Origin \[m\].
+    pub xyz: Vector3<f64>,
+    /// Roll, pitch and yaw \[rad\].
+    pub rpy: Vector3<f64>,
+}
+
+/// `mimic` of a joint: its q is `ratio` times the command of another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mimic {
+    /// Index of the other joint, counted from 0.
+    pub joint: usize,
+    /// q per q of the other one [rad or m per rad or m].
+    pub ratio: f64,
 }
 
 /// `[joint.beam]`: an elastic link, clamped after Rx(α), its x axis along the link.

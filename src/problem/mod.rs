@@ -16,10 +16,11 @@ pub(crate) mod item;
 mod joint;
 mod parameters;
 pub(crate) mod pattern;
-mod quoted;
+pub(crate) mod quoted;
 pub(crate) mod read;
 mod robust;
 pub(crate) mod section;
+mod standard;
 
 use nalgebra::Vector3;
 
@@ -29,7 +30,7 @@ pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, HeldOut, JointSource};
 pub use dialect::{ColumnOf, ColumnRule, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
-pub use joint::{Beam, Body, Hoist, Joint, JointKind};
+pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub use robust::{Robust, RobustLoss};
 
@@ -50,6 +51,8 @@ pub struct Problem {
     pub tool: Tool,
     /// Pose of the arm's base in the measuring frame.
     pub base: BasePose,
+    /// Which links of a URDF the arm lies between, if it came from one.
+    pub urdf: Option<UrdfEnds>,
     /// Effects that the model declares.
     pub effects: Vec<EffectDeclaration>,
     /// What is free, in the order of the file: a later rule wins.
@@ -100,6 +103,15 @@ pub struct Tool {
     pub payload_at: Vector3<f64>,
     /// Payload where no column `payload_kg` says otherwise \[kg\].
     pub payload_mass: f64,
+}
+
+/// `[urdf]`: the links of a URDF at both ends of the arm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UrdfEnds {
+    /// The arm's base frame is that of this link.
+    pub base: String,
+    /// The last frame is that of this link.
+    pub tip: String,
 }
 
 /// `[base]`: pose of the arm's base in the measuring frame.

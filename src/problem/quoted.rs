@@ -1,6 +1,6 @@
 //! Names as TOML writes them.
 
 /// A name in quotes, quotes and backslashes in it with a backslash before them; names hold nothing that is not seen.
-pub(super) fn quoted(name: &str) -> String {
+pub(crate) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }

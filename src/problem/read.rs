@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::item::Document;
 use super::section::Section;
 use super::{
-    BasePose, Effect, EffectDeclaration, Equilibrium, Problem, Statics, Tool, arm, constraints, data, effects,
-    parameters, robust,
+    BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, Tool, UrdfEnds, arm, constraints,
+    data, effects, parameters, robust,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -81,6 +81,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let joints = arm::joints(&mut root)?;
     let tool = tool(root.section("tool")?)?;
     let base = base(root.section("base")?)?;
+    let urdf = root.section("urdf")?.map(urdf).transpose()?;
     let effects = effects::read(&mut root, &joints)?;
     let parameters = parameters::read(&mut root)?;
     let constraints = constraints::read(&mut root)?;
@@ -88,14 +89,31 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let robust = robust::read(&mut root)?;
     root.finish()?;
     effects::check(&effects, statics, &joints, &data)?;
-    Ok(Problem { name, title, gravity, statics, joints, tool, base, effects, parameters, constraints, data, robust })
+    Ok(Problem {
+        name,
+        title,
+        gravity,
+        statics,
+        joints,
+        tool,
+        base,
+        urdf,
+        effects,
+        parameters,
+        constraints,
+        data,
+        robust,
+    })
 }
+
+/// Characters that no name of a folder holds everywhere.
+pub(crate) const BARRED_IN_NAMES: &str = "/\\:*?\"<>|";
 
 /// A name that is fit to name a folder.
 pub(crate) fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
     let item = root.require("name", "name = \"…\"")?;
     let name = item.text()?;
-    let barred = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
+    let barred = |c: char| c.is_control() || BARRED_IN_NAMES.contains(c);
     let edges = |c: char| c.is_whitespace() || c == '.';
     if name.contains(barred) || name.starts_with(edges) || name.ends_with(edges) || name.len() > 200 {
         let name = name.chars().take(200).collect();
@@ -130,9 +148,22 @@ fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
     Ok(tool)
 }
 
+fn urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {
+    let base = section.require("base", "base = \"…\", the link at the arm's base")?.text()?.to_owned();
+    let tip = section.require("tip", "tip = \"…\", the link at its tip")?.text()?.to_owned();
+    section.finish()?;
+    Ok(UrdfEnds { base, tip })
+}
+
 fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
     let mut base = BasePose { translation: Vector3::zeros(), rotation: Vector3::zeros() };
     let Some(mut section) = section else { return Ok(base) };
+    if let Some(Placement { xyz, rpy }) = arm::placement(&mut section)? {
+        base.translation = xyz;
+        base.rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z).scaled_axis();
+        section.finish()?;
+        return Ok(base);
+    }
     base.translation = section.vector("translation", Unit::Length)?.unwrap_or_default();
     base.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
     section.finish()?;

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::measurement::{Labels, Measurements};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Joint, JointKind, Problem};
 
 /// Names of columns.
 pub(super) fn names(names: &str) -> Vec<String> {
@@ -17,7 +17,7 @@ pub(super) fn commands(problem: &Problem) -> Vec<(usize, String, f64)> {
         JointKind::Prismatic => Some((index, format!("q{}_mm", index + 1), 1e3)),
         JointKind::Fixed => None,
     };
-    problem.joints.iter().map(|joint| joint.kind).enumerate().filter_map(column).collect()
+    problem.joints.iter().map(Joint::commanded).enumerate().filter_map(column).collect()
 }
 
 /// Sessions of some rows, where any has a name.

@@ -325,7 +325,7 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
 fn pose(problem: &Problem, apart: &TellingPose) -> String {
     let joints = problem.joints.iter().zip(&apart.configuration).enumerate();
     let mut words: Vec<String> = joints
-        .filter_map(|(index, (joint, q))| match joint.kind {
+        .filter_map(|(index, (joint, q))| match joint.commanded() {
             JointKind::Revolute => Some(format!("q{} {}°", index + 1, number(q.to_degrees(), 1))),
             JointKind::Prismatic => Some(format!("q{} {} mm", index + 1, mm(*q, 1))),
             JointKind::Fixed => None,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::Rig;
 use super::chain::{Chain, Force, Hinge};
 use super::effect::TrueEffect;
-use crate::problem::{Effect, Joint, JointKind, PoseConditions};
+use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
 
 /// An effect and its values.
@@ -19,12 +19,19 @@ impl Rig {
         let mut chain = Chain::new(self.base_hinge());
         for (index, joint) in self.arm.joints.iter().enumerate() {
             let number = index + 1;
+            if let Some(Placement { xyz, rpy }) = &joint.placement {
+                chain.end().translate(xyz);
+                chain.end().rotate_z(rpy.z.sin_cos());
+                chain.end().rotate_y(rpy.y.sin_cos());
+                chain.end().rotate_x(rpy.x.sin_cos());
+            }
             chain.end().rotate_x(joint.alpha.sin_cos());
             self.link(joint, number, &gravity, conditions, &mut chain);
             let (before, about) = self.joint_hinges(joint, number, conditions);
             chain.hinge(before);
             let (mut turn, mut slide) = (joint.theta, joint.d);
-            let q = conditions.configuration.get(index).copied().unwrap_or(0.0);
+            let command = |joint: usize| conditions.configuration.get(joint).copied().unwrap_or(0.0);
+            let q = joint.mimic.map_or_else(|| command(index), |mimic| mimic.ratio * command(mimic.joint));
             let miss = self.miss(number, conditions);
             match joint.kind {
                 JointKind::Revolute => turn += q + miss,

@@ -202,7 +202,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
     for _ in 0..poses {
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
-            let q = if joint.kind == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
+            let q = if joint.commanded() == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
             conditions.configuration.push(match joint.kind {
                 JointKind::Revolute => rounded(q.to_degrees(), 6).to_radians(),
                 _ => rounded(q, 9),
@@ -219,7 +219,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         conditions.elapsed = time - rows.first().map_or(time, |row| row.conditions.time);
         if ranges.approach {
             let side = |kind| if kind == JointKind::Fixed { 0.0 } else { 1.0 };
-            let sides = problem.joints.iter().map(|joint| side(joint.kind));
+            let sides = problem.joints.iter().map(|joint| side(joint.commanded()));
             let signed = sides.map(|side| if random.random::<bool>() { side } else { -side });
             conditions.approach = Some(signed.collect());
         }

@@ -1,6 +1,6 @@
 //! The parameters of an arm by name, to be given true values.
 
-use crate::problem::Problem;
+use crate::problem::{Placement, Problem};
 use crate::quantity::Unit;
 
 /// A parameter with its nominal and its true value, SI.
@@ -30,13 +30,20 @@ pub(super) fn spread(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
 pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mut f64)) {
     use Unit::{Angle, AxialRigidity, FlexuralRigidity, Length, TorsionalStiffness};
     for (index, joint) in problem.joints.iter_mut().enumerate() {
-        let fields = [
-            ("alpha", Angle, &mut joint.alpha),
-            ("a", Length, &mut joint.a),
-            ("theta", Angle, &mut joint.theta),
-            ("d", Length, &mut joint.d),
-            ("beta", Angle, &mut joint.beta),
-        ];
+        let fields = if let Some(Placement { xyz, rpy }) = &mut joint.placement {
+            let lengths = ["x", "y", "z"].into_iter().zip(xyz.iter_mut());
+            let angles = ["roll", "pitch", "yaw"].into_iter().zip(rpy.iter_mut());
+            let lengths = lengths.map(|(field, value)| (field, Length, value));
+            lengths.chain(angles.map(|(field, value)| (field, Angle, value))).collect()
+        } else {
+            vec![
+                ("alpha", Angle, &mut joint.alpha),
+                ("a", Length, &mut joint.a),
+                ("theta", Angle, &mut joint.theta),
+                ("d", Length, &mut joint.d),
+                ("beta", Angle, &mut joint.beta),
+            ]
+        };
         let stiffness = joint.stiffness.iter_mut().map(|stiffness| ("stiffness", TorsionalStiffness, stiffness));
         for (field, unit, value) in fields.into_iter().chain(stiffness) {
             see(format!("joint{}.{field}", index + 1), unit, value);

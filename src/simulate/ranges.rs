@@ -18,7 +18,7 @@ pub(super) fn read(
     joints: &[Joint],
 ) -> Result<(PoseRanges, (f64, f64), HeldOutRows), InputError> {
     let joints = joints.iter().enumerate();
-    let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.kind));
+    let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.commanded()));
     let joints = joints.collect::<Result<_, _>>()?;
     let payloads = payloads(&mut section)?;
     let hoist = range(&mut section, "hoist", Unit::Force)?;

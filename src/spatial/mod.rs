@@ -1,6 +1,7 @@
 //! Frames and rotations in three dimensions, generic over the scalar and differentiable everywhere they are used.
 
 mod frame;
+mod placement;
 mod rotation;
 
 pub use frame::Frame;

@@ -37,14 +37,20 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
     ("identify", &[GROUND, BELOW_IDENTIFY, &["files"]]),
     ("diagnose", &[GROUND, BELOW_IDENTIFY, &["identify"]]),
+    // Arms from URDF and back.
+    ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
     // Which poses to measure, and what they will tell.
     ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),
     // Many fits to what model or rig measure.
     ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate", "files"]]),
-    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "files"]]),
+    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "files", "urdf"]]),
     (
         "cli",
-        &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "files"]],
+        &[
+            GROUND,
+            BELOW_IDENTIFY,
+            &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "files", "urdf"],
+        ],
     ),
     (
         "main",

@@ -23,6 +23,7 @@ pub fn joint(a: f64) -> Joint<f64> {
         nonlinear: None,
         lateral: None,
         kind: JointKind::Fixed,
+        placement: None,
         alpha: Angle::new(0.0),
         a,
         theta: 0.0,

@@ -168,7 +168,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn known(&self) -> Vec<Known> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
-        let moving = self.problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind != JointKind::Fixed);
+        let moving = self.problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         for (joint, _) in moving.clone() {
             let q = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
             all.push((Covariate::Command(joint), q));
@@ -264,7 +264,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums of neighbouring ones.
     fn near_harmonics(&mut self, slot: Slot, at: &DVector<f64>, joint: usize) {
-        if self.problem.joints[joint].kind != JointKind::Revolute {
+        if self.problem.joints[joint].commanded() != JointKind::Revolute {
             return;
         }
         let q: Vec<f64> = self.linearised.poses().iter().map(|pose| pose.setup.configuration[joint]).collect();

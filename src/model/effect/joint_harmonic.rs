@@ -25,7 +25,7 @@ pub(super) const FAMILY: Family = Family {
         _ => Vec::new(),
     },
     candidates: |problem, data| {
-        let revolute = problem.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointKind::Revolute);
+        let revolute = problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() == JointKind::Revolute);
         let effects = |(index, _)| {
             (1..=HIGHEST_ORDER).map(move |order| Effect::JointHarmonic { joint: index + 1, orders: vec![order] })
         };

@@ -25,7 +25,7 @@ impl Driver {
 
 /// Numbers, from 1, of the joints that take a command.
 pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
-    let takes = |&(_, joint): &(usize, &crate::problem::Joint)| joint.kind != JointKind::Fixed;
+    let takes = |&(_, joint): &(usize, &crate::problem::Joint)| joint.commanded() != JointKind::Fixed;
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 

@@ -68,6 +68,14 @@ pub enum JointField {
     LateralX,
     /// Flexibility about y before the joint turns [rad/(N·m)].
     LateralY,
+    /// Coordinates of a fixed joint's placement \[m\].
+    X,
+    Y,
+    Z,
+    /// Angles of a fixed joint's placement \[rad\].
+    Roll,
+    Pitch,
+    Yaw,
 }
 
 /// A field of a beam that may be free: rigidities, then what effects add.
@@ -137,6 +145,19 @@ impl JointField {
     /// The geometric fields, in the order of the transform.
     pub const GEOMETRY: [Self; 5] = [Self::Alpha, Self::A, Self::Theta, Self::D, Self::Beta];
 
+    /// The fields of a placement by xyz and rpy, in the order of files.
+    pub const PLACEMENT: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
+
+    /// Its place in a placement: x, y, z, roll, pitch, yaw.
+    pub fn placement(self) -> Option<usize> {
+        Self::PLACEMENT.iter().position(|&own| own == self)
+    }
+
+    /// Whether it is geometry that a problem declares.
+    pub fn is_geometry(self) -> bool {
+        Self::GEOMETRY.contains(&self) || self.placement().is_some()
+    }
+
     /// Name after the dot.
     pub fn name(self) -> &'static str {
         match self {
@@ -152,6 +173,12 @@ impl JointField {
             Self::SlidingPlay => "sliding_play",
             Self::LateralX => "lateral_x",
             Self::LateralY => "lateral_y",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::Roll => "roll",
+            Self::Pitch => "pitch",
+            Self::Yaw => "yaw",
         }
     }
 }
@@ -192,7 +219,9 @@ impl Slot {
         match self {
             Self::Joint { field, .. } => match field {
                 JointField::Alpha | JointField::Theta | JointField::Beta | JointField::Play => Unit::Angle,
+                JointField::Roll | JointField::Pitch | JointField::Yaw => Unit::Angle,
                 JointField::A | JointField::D | JointField::SlidingPlay => Unit::Length,
+                JointField::X | JointField::Y | JointField::Z => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
                 JointField::Cubic => Unit::CubicCompliance,
@@ -227,7 +256,7 @@ impl Slot {
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
-                !JointField::GEOMETRY.contains(&field) && !matches!(field, JointField::Play | JointField::SlidingPlay)
+                !field.is_geometry() && !matches!(field, JointField::Play | JointField::SlidingPlay)
             }
             Self::Beam { field, .. } => {
                 !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)

@@ -4,7 +4,7 @@ use super::{BeamField, Driver, JointField, Parameter, Slot, unit};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::effect;
 use crate::problem::pattern::matches;
-use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
+use crate::problem::{Freedom, ParameterRule, Placement, Problem, Quantities};
 use crate::quantity::Unit;
 
 /// A scalar of the model that a rule may free.
@@ -170,10 +170,14 @@ pub(super) fn candidates(
         of_effect: None,
     };
     for (joint, own) in problem.joints.iter().enumerate() {
-        let nominal = [own.alpha, own.a, own.theta, own.d, own.beta];
-        let geometry = JointField::GEOMETRY.into_iter().zip(nominal);
+        let geometry: Vec<(JointField, f64)> = match &own.placement {
+            Some(Placement { xyz, rpy }) => {
+                JointField::PLACEMENT.into_iter().zip(xyz.iter().chain(rpy.iter()).copied()).collect()
+            }
+            None => JointField::GEOMETRY.into_iter().zip([own.alpha, own.a, own.theta, own.d, own.beta]).collect(),
+        };
         let stiffness = own.stiffness.map(|k| (JointField::Stiffness, k));
-        for (field, nominal) in geometry.chain(stiffness) {
+        for (field, nominal) in geometry.into_iter().chain(stiffness) {
             let name = format!("joint{}.{}", joint + 1, field.name());
             out.push(declared(name.clone(), name, Slot::Joint { joint, field }, nominal));
         }

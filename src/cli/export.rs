@@ -1,0 +1,129 @@
+//! `flexcal export`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use flexcal::identify::{ErrorSummary, Placement};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::model::Model;
+use flexcal::nalgebra::Vector3;
+use flexcal::problem::Problem;
+use flexcal::report::{self, ExportErrors, Exported};
+use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
+
+use super::estimate::Estimates;
+use super::outcome::Outcome;
+use super::output::Results;
+use super::{diagnostic, output};
+
+/// Arguments of `flexcal export`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal export panda --estimate out/panda/estimate.json --urdf panda.urdf
+  flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml")]
+pub struct Arguments {
+    /// A problem.toml, or the folder that holds one
+    problem: PathBuf,
+    /// The estimate.json of an identification of the problem
+    #[arg(long, value_name = "FILE")]
+    estimate: PathBuf,
+    /// The URDF that the problem came from; it is not changed
+    #[arg(long, value_name = "ARM.urdf", required_unless_present = "format", conflicts_with = "format")]
+    urdf: Option<PathBuf>,
+    /// Origins of the joints as YAML instead
+    #[arg(long, value_name = "FORMAT")]
+    format: Option<Format>,
+    /// The file to write [default: in out/<name of the problem>, under the name of the URDF or as kinematics.yaml]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Measurement files instead of those the problem names
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    data: Vec<PathBuf>,
+    /// Replace a file that flexcal did not write, or that was changed since
+    #[arg(long)]
+    force: bool,
+    /// Print what was written as JSON on standard output, and nothing else
+    #[arg(long)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// A form of YAML.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Format {
+    /// The calibration file of a Universal Robots driver
+    UrYaml,
+    /// Every joint by its name
+    RosYaml,
+}
+
+/// Writes the identified geometry, and says what it leaves out.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let problem = Problem::read(&arguments.problem)?;
+    let estimates = Estimates::read(&arguments.estimate, &problem)?;
+    let model = estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
+    let x = estimates.vector(&problem, &model)?;
+    let arm = model.arm(|k| x.get(k).copied().unwrap_or(0.0));
+    let (text, moved, default) = match (&arguments.urdf, arguments.format) {
+        (Some(file), _) => {
+            let robot = Robot::read(file)?;
+            let ends = problem.urdf.as_ref();
+            let chain = Chain::new(&robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))?;
+            let export = export(&chain, &problem, &arm)?;
+            let name = file.file_name().unwrap_or_default().to_owned();
+            (export.text, Some(export.moved), PathBuf::from(name))
+        }
+        (None, format) => {
+            let form = if matches!(format, Some(Format::UrYaml)) { Yaml::UniversalRobots } else { Yaml::Ros };
+            (yaml(&joint_origins(&problem, &arm, form)?, form), None, PathBuf::from("kinematics.yaml"))
+        }
+    };
+    let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name).join(default));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let own =
+        if arguments.problem.is_dir() { arguments.problem.join("problem.toml") } else { arguments.problem.clone() };
+    let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
+    let inputs = [&[own, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
+    let results = Results::claim("export", folder, inputs, &[&name], (arguments.force, arguments.quiet))?;
+    // Measurements that the problem names need not be at hand any more.
+    let at_hand = !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
+    let errors = if at_hand { Some(errors(&problem, files, &estimates, arguments.quiet)?) } else { None };
+    results.write(&[(&name, &text)])?;
+    let exported = Exported { problem: &problem, model: &model, file: &path, moved: moved.as_deref(), errors };
+    if arguments.json {
+        output::print_json(&report::export_json(&exported))?;
+    } else if !arguments.quiet {
+        output::print(&report::export_text(&exported))?;
+    }
+    if !estimates.trusted && !arguments.quiet {
+        diagnostic::warn("the estimate is not to be trusted, and so is this file not");
+    }
+    Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })
+}
+
+/// Errors on held-out rows of the whole model and of its geometry alone.
+fn errors(
+    problem: &Problem,
+    files: &[PathBuf],
+    estimates: &Estimates,
+    quiet: bool,
+) -> Result<ExportErrors, Box<dyn Error>> {
+    let (rows, warnings) = Measurements::read(files, problem)?;
+    if !quiet {
+        diagnostic::print_warnings(&warnings);
+    }
+    let Dataset { measurements, split } = Dataset::of(problem, rows)?;
+    let placement = Placement::of(&measurements);
+    let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let x = estimates.vector(problem, &model)?;
+    let poses = placement.poses(&measurements, &split.held_out, 1.0);
+    let geometric = model.geometric_positions(&poses, x.as_slice());
+    let off: Vec<Vector3<f64>> =
+        poses.iter().zip(geometric).map(|(pose, predicted)| pose.measured - predicted).collect();
+    let whole = placement.position_errors(&model, &x, &measurements, &split.held_out);
+    Ok(ExportErrors { whole: ErrorSummary::of(&whole), rigid: ErrorSummary::of(&off) })
+}

@@ -1,0 +1,74 @@
+//! Mistakes in a URDF, and what does not fit between one and a problem.
+
+use thiserror::Error;
+
+use super::near::meant;
+
+/// What is wrong with a URDF; the place comes from [`Location`](super::Location).
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum UrdfMistake {
+    #[error("no such file; give a URDF")]
+    Missing,
+    #[error("not valid XML: {message}")]
+    Syntax { message: String },
+    #[error(
+        "begins a document type declaration, which may hold entities without end and is not read; a URDF needs none"
+    )]
+    DocumentType,
+    #[error("not a URDF: its outermost element is <{found}>, not <robot>")]
+    NotARobot { found: String },
+    #[error("a xacro, not a URDF yet; expand it first: xacro FILE.xacro > FILE.urdf")]
+    Xacro,
+    #[error("<{element}> has no attribute {attribute}")]
+    NoAttribute { element: String, attribute: &'static str },
+    #[error("<joint> has no element <{element}>")]
+    NoElement { element: &'static str },
+    #[error("the name is empty, or holds a character that is not seen")]
+    BadName,
+    #[error("another {what} is called \"{name}\"")]
+    Repeated { what: &'static str, name: String },
+    #[error("\"{text}\" is not {count} finite number{}", if *count == 1 { "" } else { "s" })]
+    NotNumbers { text: String, count: usize },
+    #[error("the axis has no direction")]
+    NoAxis,
+    #[error(
+        "a joint of type \"{kind}\" is not one that an arm can have; known: revolute, continuous, prismatic, fixed"
+    )]
+    Kind { kind: String },
+    #[error("no link is called \"{name}\"{}", meant(name, known))]
+    NoLink { name: String, known: Vec<String> },
+    #[error("no joint is called \"{name}\"{}", meant(name, known))]
+    NoJoint { name: String, known: Vec<String> },
+    #[error("joints follow each other in a circle by <mimic>")]
+    MimicCircle,
+    #[error("link \"{link}\" is the child of two joints, \"{first}\" and \"{second}\"; a URDF is a tree")]
+    TwoParents { link: String, first: String, second: String },
+    #[error("the joints form a loop through link \"{link}\"; a URDF is a tree")]
+    Loop { link: String },
+    #[error("there are no links")]
+    NoLinks,
+    #[error("several links have no parent: {}; choose one with --base", roots.join(", "))]
+    Roots { roots: Vec<String> },
+    #[error("several links end the tree below \"{base}\": {}; choose one with --tip", leaves.join(", "))]
+    Leaves { base: String, leaves: Vec<String> },
+    #[error("link \"{tip}\" is not below link \"{base}\"; {}", if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) })]
+    NotBelow { base: String, tip: String, above: Vec<String> },
+    #[error("no joint moves between \"{base}\" and \"{tip}\"")]
+    NothingMoves { base: String, tip: String },
+    #[error("the chain has {found} joints; at most {most}")]
+    TooManyJoints { found: usize, most: usize },
+    #[error("the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}", found.join(", "), expected.join(", "))]
+    OtherJoints { base: String, tip: String, found: Vec<String>, expected: Vec<String> },
+    #[error(
+        "the nominal arm of the problem is not that of the URDF at joint \"{joint}\": {off}; was the problem made from this file?"
+    )]
+    OtherArm { joint: String, off: String },
+    #[error(
+        "no joint behind \"{joint}\" has an origin that could hold what was identified behind it ({off}); let the chain end in a link on a fixed joint"
+    )]
+    NoRoom { joint: String, off: String },
+    #[error("not an arm of Universal Robots' form: {why}")]
+    NotUr { why: String },
+}

@@ -1,0 +1,57 @@
+//! Tables of standard (distal) DH, told in the modified form that everything else is written in.
+
+use nalgebra::Vector3;
+
+use super::{Joint, JointKind, Placement};
+use crate::spatial::Frame;
+
+/// The same arm from rows that stand for Rz(θ+q) Tz(d) Tx(a) Rx(α).
+///
+/// a and α of a row are those of the next joint here, where Rx(α) Tx(a) = Tx(a) Rx(α) come first; those of the last row belong to
+/// a fixed joint that is added behind it. Bodies stay where they are: in the frame before a and α.
+pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
+    let mut joints = Vec::with_capacity(rows.len() + 1);
+    // a and α of the row before.
+    let mut before = (0.0, 0.0);
+    let mut last = None;
+    for mut row in rows {
+        let (a, alpha) = (row.a, row.alpha);
+        (row.a, row.alpha) = before;
+        if let Some(Placement { xyz, rpy }) = &mut row.placement {
+            let frame = link(before).seen(&Frame::placed(xyz, rpy));
+            (*xyz, *rpy) = (frame.origin, frame.roll_pitch_yaw());
+            (row.a, row.alpha) = (0.0, 0.0);
+        }
+        for body in &mut row.bodies {
+            body.position = link((a, alpha)).point(&body.position);
+        }
+        before = (a, alpha);
+        last = Some(row.location.clone());
+        joints.push(row);
+    }
+    if let Some(location) = last {
+        let (a, alpha) = before;
+        joints.push(Joint {
+            name: "flange".to_owned(),
+            kind: JointKind::Fixed,
+            placement: None,
+            mimic: None,
+            alpha,
+            a,
+            theta: 0.0,
+            d: 0.0,
+            beta: 0.0,
+            limits: (f64::NEG_INFINITY, f64::INFINITY),
+            stiffness: None,
+            beam: None,
+            bodies: Vec::new(),
+            location,
+        });
+    }
+    joints
+}
+
+/// Tx(a) Rx(α).
+fn link((a, alpha): (f64, f64)) -> Frame<f64> {
+    Frame::placed(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
+}

@@ -1,0 +1,118 @@
+//! What `export` says: what has moved, what that is worth, and what is left out.
+
+use std::path::Path;
+
+use super::document::{Block, Table};
+use super::errors;
+use super::json::{Summary, object, to_text};
+use super::quantity::{mm, number};
+use super::render::text;
+use crate::identify::ErrorSummary;
+use crate::model::Model;
+use crate::model::parameter::Slot;
+use crate::problem::Problem;
+use crate::urdf::MovedOrigin;
+
+/// Errors on held-out poses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExportErrors {
+    /// Of the model with everything that was identified.
+    pub whole: ErrorSummary,
+    /// Of its geometry alone, with the same base and tool.
+    pub rigid: ErrorSummary,
+}
+
+/// What was written.
+#[derive(Debug, Clone, Copy)]
+pub struct Exported<'a> {
+    /// The problem as declared.
+    pub problem: &'a Problem,
+    /// Its model.
+    pub model: &'a Model,
+    /// The file.
+    pub file: &'a Path,
+    /// The origins that have moved, in a URDF.
+    pub moved: Option<&'a [MovedOrigin]>,
+    /// Errors, where measurements are at hand.
+    pub errors: Option<ExportErrors>,
+}
+
+object! {
+    HeldOut(errors: &ExportErrors) {
+        whole: Summary = Summary::of(&errors.whole),
+        rigid: Summary = Summary::of(&errors.rigid),
+    }
+}
+object! {
+    Moved<'a>(origin: &'a MovedOrigin) {
+        joint: &'a str = &origin.joint,
+        xyz_m: [f64; 3] = origin.xyz.into(),
+        rpy_rad: [f64; 3] = origin.rpy.into(),
+        moved_mm: f64 = origin.distance * 1e3,
+        turned_deg: f64 = origin.angle.to_degrees(),
+    }
+}
+object! {
+    Document<'a>(exported: &Exported<'a>) {
+        problem: &'a str = &exported.problem.name,
+        file: String = exported.file.display().to_string(),
+        origins: Option<Vec<Moved<'a>>> = exported.moved.map(|moved| moved.iter().map(Moved::of).collect()),
+        held_out: Option<HeldOut> = exported.errors.as_ref().map(HeldOut::of),
+        not_held: Vec<String> = left_out(exported),
+    }
+}
+
+/// What was written, as JSON text.
+pub fn export_json(exported: &Exported) -> String {
+    to_text(&Document::of(exported))
+}
+
+/// What the model has beyond the geometry of the chain.
+fn left_out(exported: &Exported) -> Vec<String> {
+    let mut left_out: Vec<String> = Vec::new();
+    for (number, joint) in (1..).zip(&exported.problem.joints) {
+        if joint.stiffness.is_some() {
+            left_out.push(format!("joint{number}.stiffness"));
+        }
+        if let Some(beam) = &joint.beam {
+            left_out.push(format!("elastic link {}", beam.name));
+        }
+    }
+    left_out.extend(exported.problem.effects.iter().map(|own| own.effect.declaration()));
+    let set_up = |parameter: &&crate::model::parameter::Parameter| {
+        matches!(parameter.slot, Slot::Base { .. } | Slot::Target { .. })
+    };
+    let set_up: Vec<&str> =
+        exported.model.parameters.iter().filter(set_up).map(|parameter| parameter.name.as_str()).collect();
+    if !set_up.is_empty() {
+        left_out.push(format!("base and target of the set-up ({})", set_up.join(", ")));
+    }
+    left_out
+}
+
+/// What was written, in words.
+pub fn export_text(exported: &Exported) -> String {
+    let mut blocks = Vec::new();
+    if let Some(moved) = exported.moved {
+        let row = |own: &MovedOrigin| vec![own.joint.clone(), mm(own.distance, 4), number(own.angle.to_degrees(), 5)];
+        blocks.push(Block::Table(Table::new(
+            &["origin of", "moved, mm", "turned, °"],
+            moved.iter().map(row).collect(),
+            &[0],
+        )));
+    }
+    if let Some(ExportErrors { whole, rigid }) = &exported.errors {
+        blocks.push(Block::lines(format!(
+            "{} held-out poses: {} with the whole model, {} with the geometry that was exported",
+            whole.n,
+            errors::mean_and_rms(whole),
+            errors::mean_and_rms(rigid)
+        )));
+    }
+    let left_out = left_out(exported);
+    if !left_out.is_empty() {
+        blocks.push(Block::Lines("The file cannot hold".to_owned(), left_out));
+    }
+    blocks.push(Block::lines(format!("Written to {}", exported.file.display())));
+    text(&blocks)
+}

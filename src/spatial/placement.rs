@@ -1,0 +1,57 @@
+//! Frames given by xyz and roll, pitch, yaw, as URDF has them.
+
+use nalgebra::Vector3;
+
+use super::Frame;
+
+impl Frame<f64> {
+    /// Txyz Rz(yaw) Ry(pitch) Rx(roll), `xyz` \[m\], `rpy` \[rad\] in the order roll, pitch, yaw.
+    pub fn placed(xyz: &Vector3<f64>, rpy: &Vector3<f64>) -> Self {
+        let mut frame = Self { origin: *xyz, ..Self::identity() };
+        frame.rotate_z(rpy.z.sin_cos());
+        frame.rotate_y(rpy.y.sin_cos());
+        frame.rotate_x(rpy.x.sin_cos());
+        frame
+    }
+
+    /// Roll, pitch and yaw \[rad\] of the axes, yaw 0 where pitch is a right angle.
+    ///
+    /// Yaw is told from the x axis, and roll from what is left: to rounding at every pitch.
+    pub fn roll_pitch_yaw(&self) -> Vector3<f64> {
+        let [x, y, z] = &self.axes;
+        let level = x.x.hypot(x.y);
+        let yaw = if level > 1e-12 { x.y.atan2(x.x) } else { 0.0 };
+        let (sin, cos) = yaw.sin_cos();
+        let roll = (sin * z.x - cos * z.y).atan2(cos * y.y - sin * y.x);
+        Vector3::new(roll, (-x.z).atan2(level), yaw)
+    }
+
+    /// The reference frame, as seen from this one.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let axes = [0, 1, 2].map(|k| self.axes.map(|axis| axis[k]).into());
+        Self { axes, origin: -self.resolve(&self.origin) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+
+    #[test]
+    fn angles_come_back_at_every_pitch() {
+        let angles = [0.0, 0.3, -1.2, FRAC_PI_2, -FRAC_PI_2, FRAC_PI_2 - 1e-9, PI, 1.57, -2.9];
+        let all =
+            angles.iter().flat_map(|&roll| angles.iter().flat_map(move |&pitch| angles.map(|yaw| [roll, pitch, yaw])));
+        for rpy in all {
+            let frame = Frame::placed(&Vector3::new(1.0, -2.0, 0.5), &rpy.into());
+            let again = Frame::placed(&frame.origin, &frame.roll_pitch_yaw());
+            let off = (0..3).map(|k| (frame.axes[k] - again.axes[k]).norm()).fold(0.0, f64::max);
+            assert!(off < 1e-12, "{rpy:?}: {off}");
+            let back = frame.seen(&frame.inverse());
+            assert!((back.origin.norm() + (back.axes[0] - Vector3::x()).norm()) < 1e-14);
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! A chain as the text of a problem.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::chain::Chain;
+use super::free::told_apart;
+use super::lines::Step;
+use super::read::Kind;
+use super::weights::weights;
+use crate::error::InputError;
+use crate::problem::Problem;
+use crate::problem::quoted::quoted;
+use crate::problem::read::BARRED_IN_NAMES;
+use crate::spatial::Frame;
+
+/// Smaller numbers than this are rounding \[rad\] or \[m\].
+const ROUNDING: f64 = 1e-12;
+/// Most characters of a problem's name that come from a robot's.
+const LONGEST_NAME: usize = 60;
+
+/// A chain told as a problem.
+#[derive(Debug, Clone)]
+pub struct Description {
+    /// Name of the problem.
+    pub name: String,
+    /// Text of the `problem.toml`.
+    pub text: String,
+    /// What a reader of it should know.
+    pub notes: Vec<String>,
+}
+
+/// A section `[[joint]]`.
+#[derive(Default)]
+struct Row {
+    name: String,
+    kind: &'static str,
+    /// xyz and rpy, of those that have them.
+    placement: Option<Frame<f64>>,
+    mimic: Option<(usize, f64)>,
+    /// α, a, θ, d, β.
+    numbers: [f64; 5],
+    limits: Option<(f64, f64)>,
+    /// Name, mass and centre of mass.
+    bodies: Vec<(String, f64, Vector3<f64>)>,
+}
+
+/// The chain as a problem with a file of measurements still to be made.
+///
+/// # Errors
+/// Numbers so large that the text is no problem.
+pub fn describe(chain: &Chain) -> Result<Description, InputError> {
+    let mut notes = Vec::new();
+    let rows = rows(chain, &mut notes);
+    let name = name(&chain.robot.name);
+    let arm = arm(chain, &name, &rows);
+    let problem = Problem::parse(&arm, Path::new("problem.toml"))?;
+    let free = told_apart(&problem)?;
+    notes.extend(right_angles(chain));
+    let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
+    Ok(Description { name, text, notes })
+}
+
+fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
+    let mut steps: Vec<Step> = chain.stages.iter().map(|stage| Step::to(&stage.step)).collect();
+    let mut rows = Vec::new();
+    // The first axis may lie where no α and a reach it from the base.
+    if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
+        && [first.theta_before, first.d_before, first.beta].iter().any(|value| value.abs() > ROUNDING)
+    {
+        *first = Step::default();
+        rows.push(Row { name: "mounting".to_owned(), kind: "fixed", placement: Some(stage.step), ..Row::default() });
+    }
+    let lead = rows.len();
+    // What lies behind the last joint fits its θ and d, or is a joint of its own.
+    let [x, _, z] = &chain.end.axes;
+    let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < ROUNDING && z.z > 0.0;
+    let end = Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
+    steps.push(if on_axis { end } else { Step::default() });
+    for ((stage, own), next) in chain.stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
+        let Some(joint) = chain.robot.joints.get(stage.joint) else { continue };
+        rows.push(Row {
+            name: joint.name.clone(),
+            kind: if joint.kind == Kind::Prismatic { "prismatic" } else { "revolute" },
+            placement: None,
+            mimic: stage.mimic.map(|(leader, ratio)| (leader + lead + 1, ratio)),
+            numbers: [own.alpha, own.a, own.theta + next.theta_before, own.d + next.d_before, next.beta],
+            limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
+            bodies: Vec::new(),
+        });
+        if let (None, Some((leader, ..))) = (stage.mimic, joint.mimic)
+            && let Some(leader) = chain.robot.joints.get(leader)
+        {
+            notes.push(format!(
+                "{} follows {}, which is not in the chain: its own value is its q",
+                joint.name, leader.name
+            ));
+        }
+    }
+    if !on_axis {
+        let name = chain.ends().1.to_owned();
+        rows.push(Row { name, kind: "fixed", placement: Some(chain.end), ..Row::default() });
+    }
+    let mut frame = Frame::identity();
+    let frames: Vec<Frame<f64>> = rows
+        .iter()
+        .map(|row| {
+            frame = advanced(&frame, row);
+            frame
+        })
+        .collect();
+    let (weights, beside) = weights(chain);
+    for weight in weights {
+        let place = weight.stage + lead;
+        if let (Some(row), Some(frame)) = (rows.get_mut(place), frames.get(place)) {
+            let at = frame.resolve(&(weight.at - frame.origin));
+            row.bodies.push((weight.name, weight.mass, at));
+        }
+    }
+    if !beside.is_empty() {
+        notes.push(format!("masses beside the chain are taken with {} at zero", beside.join(", ")));
+    }
+    rows
+}
+
+/// `frame` behind a row with its q at zero.
+fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
+    let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.seen(placement));
+    let [alpha, a, theta, d, beta] = row.numbers;
+    frame.rotate_x(alpha.sin_cos());
+    frame.translate_x(a);
+    frame.rotate_z(theta.sin_cos());
+    frame.translate_z(d);
+    frame.rotate_y(beta.sin_cos());
+    frame
+}
+
+/// A name that is fit to name a folder.
+fn name(robot: &str) -> String {
+    let fit: String =
+        robot.chars().map(|c| if BARRED_IN_NAMES.contains(c) || c.is_whitespace() { '-' } else { c }).collect();
+    let fit: String = fit.trim_matches(|c| c == '.' || c == '-').chars().take(LONGEST_NAME).collect();
+    if fit.is_empty() || fit.chars().any(crate::error::is_hidden) { "arm".to_owned() } else { fit }
+}
+
+/// A number to twelve decimals.
+fn number(value: f64) -> String {
+    let rounded = (value * 1e12).round() / 1e12;
+    if rounded.is_finite() { (rounded + 0.0).to_string() } else { value.to_string() }
+}
+
+fn degrees(angle: f64) -> String {
+    let turns = (angle / std::f64::consts::TAU).round();
+    let within = angle - turns * std::f64::consts::TAU;
+    number(within.to_degrees())
+}
+
+fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
+    format!("[{}]", values.iter().map(|value| text(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// Everything up to `[parameters]`. Writing to a text cannot fail.
+fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
+    let (base, tip) = chain.ends();
+    let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let title: String = format!("{}, {base} to {tip}", chain.robot.name);
+    let title: String = title.chars().filter(|&c| !crate::error::is_hidden(c)).collect();
+    let file: String = file.chars().filter(|&c| !crate::error::is_hidden(c)).collect();
+    let mut text = format!(
+        "# From {file}: every [[joint]] is T = Rx(alpha) Tx(a) Rz(theta + q) Tz(d) Ry(beta); docs/problem.md explains all keys.\n\
+         name = {}\ntitle = {}\n\n[urdf]\nbase = {}\ntip = {}\n",
+        quoted(name),
+        quoted(&title),
+        quoted(base),
+        quoted(tip)
+    );
+    for row in rows {
+        let _ = write!(text, "\n[[joint]]\nname = {}\n", quoted(&row.name));
+        if row.kind != "revolute" {
+            let _ = writeln!(text, "kind = \"{}\"", row.kind);
+        }
+        if let Some((leader, ratio)) = row.mimic {
+            let _ = writeln!(text, "mimic = {{ joint = {leader}, ratio = {} }}", number(ratio));
+        }
+        if let Some(frame) = &row.placement {
+            let rpy = frame.roll_pitch_yaw();
+            let _ = writeln!(text, "xyz_m = {}\nrpy_deg = {}", list(&frame.origin, number), list(&rpy, degrees));
+        }
+        let [alpha, a, theta, d, beta] = row.numbers;
+        let all = [
+            ("alpha_deg", alpha, true),
+            ("a_m", a, false),
+            ("theta_deg", theta, true),
+            ("d_m", d, false),
+            ("beta_deg", beta, true),
+        ];
+        for (key, value, is_angle) in all {
+            if value.abs() > ROUNDING {
+                let _ = writeln!(text, "{key} = {}", if is_angle { degrees(value) } else { number(value) });
+            }
+        }
+        if let Some((min, max)) = row.limits {
+            let (unit, scale) =
+                if row.kind == "prismatic" { ("m", 1.0) } else { ("deg", 180.0 / std::f64::consts::PI) };
+            for (key, limit) in [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite()) {
+                let _ = writeln!(text, "{key}_{unit} = {}", number(limit * scale));
+            }
+        }
+        for (name, mass, com) in &row.bodies {
+            let (name, com) = (quoted(name), list(com, number));
+            let _ = write!(text, "\n[[joint.body]]\nname = {name}\nmass_kg = {mass}\ncom_m = {com}\n");
+        }
+    }
+    text.push_str(
+        "\n[tool]\ntarget_m = [0, 0, 0]                             # the measured point, in the frame of the tip\n",
+    );
+    text
+}
+
+/// `[parameters]`: priors for all, and those held that positions do not tell from others.
+fn parameters(rows: &[Row], free: &[String]) -> String {
+    let mut text = "[parameters]                                     # how far off the nominal arm may be, 1 σ\n\
+                    \"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }\n\
+                    \"tool.*\" = { sigma_mm = 100.0 }                    # where the target sits on the tip\n\
+                    \"base.*\" = { free = true }                       # pose in the measuring frame, found from the points\n\
+                    # Held are those that positions cannot tell from the ones above.\n\
+                    \"joint*.beta\" = { fixed = true }\n"
+        .to_owned();
+    for (number, row) in (1..).zip(rows) {
+        let is_free = |field: &str| free.iter().any(|name| *name == format!("joint{number}.{field}"));
+        let fields = ["alpha", "a", "theta", "d"];
+        let held: Vec<&str> = fields.into_iter().filter(|field| !is_free(field)).collect();
+        let mut hold = |name: &str| _ = writeln!(text, "\"joint{number}.{name}\" = {{ fixed = true }}");
+        if row.placement.is_some() || held.len() == fields.len() && !is_free("beta") {
+            hold("*");
+        } else {
+            held.into_iter().for_each(&mut hold);
+            if is_free("beta") {
+                let _ = writeln!(text, "\"joint{number}.beta\" = {{ sigma_deg = 0.5 }}");
+            }
+        }
+    }
+    text
+}
+
+/// `[data]`.
+fn data(chain: &Chain, rows: &[Row]) -> String {
+    let moving: Vec<&Row> = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none()).collect();
+    let column = |row: &&Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
+    let columns: Vec<String> = moving.iter().map(column).collect();
+    let last = chain.ends().1;
+    format!(
+        "# Columns of the measurements: {}, x_mm, y_mm, z_mm (q1_deg … and x_m … do as well); the target moves with {last}.\n\
+         [data]\nfiles = [\"measurements.csv\"]\n\
+         # position_sigma_mm = 0.05                       # 1 σ of a measured coordinate; without it the scatter tells\n\
+         held_out = {{ fraction = 0.3, seed = 1 }}          # poses that judge and are not fitted\n",
+        columns.join(", ")
+    )
+}
+
+/// What was taken as a right angle, or half of one.
+fn right_angles(chain: &Chain) -> Option<String> {
+    let origins = chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index));
+    let mut values: Vec<String> = Vec::new();
+    let mut joints = Vec::new();
+    for joint in origins {
+        let pairs = joint.origin.written.iter().zip(joint.origin.meant.iter());
+        let rounded: Vec<f64> =
+            pairs.filter(|(written, meant)| written != meant).map(|(written, _)| written.abs()).collect();
+        if !rounded.is_empty() {
+            joints.push(joint.name.as_str());
+        }
+        for value in rounded.into_iter().map(|value| value.to_string()) {
+            if !values.contains(&value) {
+                values.push(value);
+            }
+        }
+    }
+    (!values.is_empty()).then(|| {
+        let (values, joints) = (values.join(", "), joints.join(", "));
+        format!("{values} [rad] taken as the multiple of 45° that was rounded, at {joints}; more decimals are taken as they are")
+    })
+}

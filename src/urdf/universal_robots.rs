@@ -1,0 +1,88 @@
+//! Frames as the description of Universal Robots has them.
+//!
+//! | link | x y z | roll pitch yaw, nominal |
+//! |---|---|---|
+//! | shoulder | 0 0 d₁ | 0 0 0 |
+//! | upper_arm | 0 0 0 | π/2 0 0 |
+//! | forearm | a₂ 0 0 | 0 0 0 |
+//! | wrist_1 | a₃ 0 d₄ | 0 0 0 |
+//! | wrist_2 | 0 −d₅ 0 | π/2 0 0 |
+//! | wrist_3 | 0 d₆ 0 | −π/2 0 0 |
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::export::Steps;
+use crate::spatial::Frame;
+
+/// Names in the file.
+pub(super) const LINKS: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+const ROLLS: [f64; 6] = [0.0, FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2];
+/// How far the nominal arm may be from the form \[rad\] or \[m\].
+const SAME: f64 = 1e-6;
+
+/// Origins of the six links of an identified arm: its gauges are those that give the nominal arm the form above.
+///
+/// # Errors
+/// What of the nominal arm is not of that form.
+pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f64>>, String> {
+    if nominal.before.len() != LINKS.len() {
+        return Err(format!("it has {} moving joints, not 6", nominal.before.len()));
+    }
+    // The base of a problem is that of the controller, or turned by half a turn as base_link is.
+    let mut half = Frame::identity();
+    half.rotate_z((0.0, -1.0));
+    let gauges = gauges(nominal, &Frame::identity()).or_else(|_| gauges(nominal, &half))?;
+    let pairs = gauges.iter().zip(gauges.iter().skip(1));
+    Ok(identified
+        .before
+        .iter()
+        .zip(pairs)
+        .map(|(step, (before, own))| before.seen(step).seen(&own.inverse()))
+        .collect())
+}
+
+fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String> {
+    let mut gauges = vec![*base];
+    let mut before = *base;
+    for (k, (step, (roll, link))) in nominal.before.iter().zip(ROLLS.into_iter().zip(LINKS)).enumerate() {
+        let frame = before.seen(step);
+        let mut turned = Frame::identity();
+        turned.rotate_x(roll.sin_cos());
+        // The turn about the axis that is left, and where on the axis the form has its origin.
+        let rest = turned.inverse().seen(&frame);
+        if rest.axes[2].xy().norm() > SAME || rest.axes[2].z < 0.0 {
+            return Err(format!("the axis of {link} does not lie as that maker's arms have it"));
+        }
+        let next = nominal.before.get(k + 1);
+        let along = match k {
+            // Where the next axis comes nearest, so that the next origin has no shift along this one.
+            0 | 3 | 4 => rest.origin.z + next.map_or(0.0, nearest),
+            5 => rest.origin.z + nominal.end.origin.z,
+            _ => 0.0,
+        };
+        let mut own = Frame::identity();
+        own.rotate_z((rest.axes[0].y, rest.axes[0].x));
+        own.translate_z(rest.origin.z - along);
+        before = own;
+        gauges.push(own);
+        let placed = frame.seen(&own.inverse()).origin;
+        let off = match k {
+            0 => placed.xy().norm(),
+            1 => placed.norm(),
+            2 => placed.yz().norm(),
+            3 => placed.y.abs(),
+            _ => placed.xz().norm(),
+        };
+        if off > SAME {
+            return Err(format!("{link} lies {:.3} mm off where that maker's arms have it", off * 1e3));
+        }
+    }
+    Ok(gauges)
+}
+
+/// Where on the z axis another frame's z axis comes nearest \[m\]; 0 where they are parallel.
+fn nearest(frame: &Frame<f64>) -> f64 {
+    let (z, p) = (&frame.axes[2], &frame.origin);
+    let square = z.xy().norm_squared();
+    if square > SAME { (p.z - z.z * p.dot(z)) / square } else { 0.0 }
+}
