@@ -35,8 +35,8 @@ pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> Str
     let folder = folder.display();
     let _ = write!(
         words,
-        "\nWritten to {folder}/problem.toml. Put measurements.csv beside it (its columns stand in that file), then\n  \
-         flexcal identify {folder}\n  flexcal loop {folder}\n"
+        "\nWritten to {folder}/problem.toml. Put measurements.csv beside it (its columns stand in problem.toml) and\n\
+         position_sigma_mm of your instrument into it, then\n  flexcal identify {folder}\n  flexcal loop {folder}\n"
     );
     words
 }

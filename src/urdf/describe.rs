@@ -18,6 +18,8 @@ use crate::spatial::Frame;
 
 /// Smaller numbers than this are rounding \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-12;
+/// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop \[mm\].
+const SIGMA_MM: f64 = 0.05;
 /// Most characters of a problem's name that come from a robot's.
 const LONGEST_NAME: usize = 60;
 
@@ -151,6 +153,11 @@ fn number(value: f64) -> String {
     if rounded.is_finite() { (rounded + 0.0).to_string() } else { value.to_string() }
 }
 
+/// A limit of a joint, to six decimals.
+fn limit_number(value: f64) -> String {
+    number((value * 1e6).round() / 1e6)
+}
+
 fn degrees(angle: f64) -> String {
     let turns = (angle / std::f64::consts::TAU).round();
     let within = angle - turns * std::f64::consts::TAU;
@@ -205,7 +212,7 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
             let (unit, scale) =
                 if row.kind == "prismatic" { ("m", 1.0) } else { ("deg", 180.0 / std::f64::consts::PI) };
             for (key, limit) in [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite()) {
-                let _ = writeln!(text, "{key}_{unit} = {}", number(limit * scale));
+                let _ = writeln!(text, "{key}_{unit} = {}", limit_number(limit * scale));
             }
         }
         for (name, mass, com) in &row.bodies {
@@ -247,17 +254,20 @@ fn parameters(rows: &[Row], free: &[String]) -> String {
 
 /// `[data]`.
 fn data(chain: &Chain, rows: &[Row]) -> String {
-    let moving: Vec<&Row> = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none()).collect();
-    let column = |row: &&Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
-    let columns: Vec<String> = moving.iter().map(column).collect();
-    let last = chain.ends().1;
-    format!(
-        "# Columns of the measurements: {}, x_mm, y_mm, z_mm (q1_deg … and x_m … do as well); the target moves with {last}.\n\
+    let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
+    let column = |row: &Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
+    let columns: Vec<String> = moving.map(column).collect();
+    let mut text = "# Columns of the measurements (q1_deg, … and x_m, … do as well):\n".to_owned();
+    columns.chunks(4).for_each(|some| _ = writeln!(text, "#   {},", some.join(", ")));
+    let _ = write!(
+        text,
+        "#   x_mm, y_mm, z_mm: the target, which moves with {}, in the measuring frame\n\
          [data]\nfiles = [\"measurements.csv\"]\n\
-         # position_sigma_mm = 0.05                       # 1 σ of a measured coordinate; without it the scatter tells\n\
+         position_sigma_mm = {SIGMA_MM}                         # 1 σ of a measured coordinate: put in that of your instrument\n\
          held_out = {{ fraction = 0.3, seed = 1 }}          # poses that judge and are not fitted\n",
-        columns.join(", ")
-    )
+        chain.ends().1
+    );
+    text
 }
 
 /// What was taken as a right angle, or half of one.

@@ -1,0 +1,89 @@
+//! URDFs with mistakes: exit status 2, a message with file and line, nothing written.
+
+use std::fs;
+
+use assert_cmd::Command;
+
+const JOINT: &str = "<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/></joint>";
+
+fn with(links: &str, joints: &str) -> String {
+    format!("<robot name=\"r\">\n{links}\n{joints}\n</robot>\n")
+}
+
+#[test]
+fn mistakes_are_named_with_their_place() {
+    let links = "<link name=\"a\"/><link name=\"b\"/>";
+    let chain = |attributes: &str, inner: &str| {
+        with(
+            links,
+            &format!("<joint name=\"j\" {attributes}>\n<parent link=\"a\"/><child link=\"b\"/>\n{inner}\n</joint>"),
+        )
+    };
+    let revolute = |inner: &str| chain("type=\"revolute\"", inner);
+    let bomb = "<!DOCTYPE r [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n<robot name=\"&b;\"/>";
+    let deep = format!("{}{}", "<robot>".repeat(100_000), "</robot>".repeat(100_000));
+    let cases: Vec<(&str, String, &str)> = vec![
+        ("empty", String::new(), "not valid XML"),
+        ("cut", "<robot name=\"r\">\n<link name=\"a\">".to_owned(), ":2: not valid XML"),
+        ("other", "<sdf/>".to_owned(), ":1: not a URDF: its outermost element is <sdf>"),
+        ("bomb", bomb.to_owned(), "document type declaration"),
+        ("deep", deep, "not valid XML"),
+        ("large", format!("<robot name=\"r\">{}</robot>", " ".repeat(10 << 20)), "larger than 4 MiB"),
+        (
+            "xacro",
+            "<robot name=\"r\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n<xacro:arm/></robot>".to_owned(),
+            ":2: a xacro",
+        ),
+        ("no links", "<robot name=\"r\"/>".to_owned(), "there are no links"),
+        ("missing link", with("<link name=\"a\"/>", JOINT), ":3: no link is called \"b\""),
+        (
+            "no child",
+            with(links, "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/></joint>"),
+            "<joint> has no element <child>",
+        ),
+        ("two links", with("<link name=\"a\"/>\n<link name=\"a\"/>", ""), ":3: another link is called \"a\""),
+        ("no name", with("<link/>", ""), "<link> has no attribute name"),
+        ("type", chain("type=\"floating\"", ""), ":3: a joint of type \"floating\""),
+        ("no type", chain("", ""), "<joint> has no attribute type"),
+        ("axis", revolute("<axis xyz=\"0 0 0\"/>"), ":5: the axis has no direction"),
+        ("axis word", revolute("<axis xyz=\"z\"/>"), ":5: \"z\" is not 3 finite numbers"),
+        ("nan", revolute("<origin xyz=\"0 nan 0\"/>"), ":5: \"0 nan 0\" is not 3 finite numbers"),
+        ("huge", revolute("<origin rpy=\"1e300 0 0\"/>"), ":5: \"1e300 0 0\" is not 3 finite"),
+        (
+            "mass",
+            with("<link name=\"a\"><inertial>\n<mass value=\"-1\"/></inertial></link><link name=\"b\"/>", JOINT),
+            ":3: \"-1\" is not 1 finite number",
+        ),
+        ("mimic", revolute("<mimic joint=\"k\"/>"), ":5: no joint is called \"k\""),
+        ("mimic itself", revolute("<mimic joint=\"j\"/>"), "follow each other in a circle"),
+        (
+            "two parents",
+            with(
+                &format!("{links}<link name=\"c\"/>"),
+                &format!("{JOINT}\n<joint name=\"k\" type=\"fixed\"><parent link=\"c\"/><child link=\"b\"/></joint>"),
+            ),
+            ":4: link \"b\" is the child of two joints, \"j\" and \"k\"",
+        ),
+        (
+            "loop",
+            with(
+                links,
+                &format!("{JOINT}\n<joint name=\"k\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint>"),
+            ),
+            "the joints form a loop",
+        ),
+        ("roots", with(&format!("{links}<link name=\"c\"/>"), JOINT), "several links have no parent: a, c"),
+        ("nothing moves", chain("type=\"fixed\"", ""), "no joint moves between \"a\" and \"b\""),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, says) in cases {
+        let (file, out) = (folder.path().join("arm.urdf"), folder.path().join("out"));
+        fs::write(&file, text).unwrap();
+        let run =
+            Command::cargo_bin("flexcal").unwrap().arg("init").arg(&file).arg("--out").arg(&out).output().unwrap();
+        let error = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert_eq!(run.status.code(), Some(2), "{name}: {error}");
+        assert!(error.contains("arm.urdf") && error.contains(says), "{name}: {error}");
+        assert!(!out.exists(), "{name}");
+    }
+}

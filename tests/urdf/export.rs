@@ -1,0 +1,110 @@
+//! Identified geometry written back.
+
+use flexcal::mechanics::Arm;
+use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
+use nalgebra::{DVector, Vector3};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::common::arms::path;
+use super::common::made::{draw, model_of};
+use super::{apart, problem_of, robot, tips};
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+
+/// The text without what stands in its `<origin>`s, and without origins that have a line of their own.
+fn without_origins(text: &str) -> String {
+    let mut kept = String::new();
+    for (k, part) in text.split("<origin").enumerate() {
+        kept.push_str(if k == 0 { part } else { part.split_once("/>").unwrap().1 });
+    }
+    let lines: Vec<&str> = kept.lines().map(str::trim_end).filter(|line| !line.trim().is_empty()).collect();
+    lines.join("\n")
+}
+
+#[test]
+fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let original = robot("odd.urdf");
+    let chain = Chain::new(&original, None, Some("tool")).unwrap();
+    let mut problem = problem_of(&chain);
+    // Everything free, at both ends as well.
+    problem.parameters.retain(|rule| !matches!(rule.freedom, flexcal::problem::Freedom::Fixed));
+    let configurations: Vec<Vec<f64>> = (0..100)
+        .map(|_| {
+            let mut q: Vec<f64> = problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
+            (q[0], q[4], q[6]) = (0.0, 0.0, 0.0);
+            q
+        })
+        .collect();
+    let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
+    let arm_only = |x: &DVector<f64>| {
+        DVector::from_iterator(
+            x.len(),
+            x.iter().zip(&model.parameters).map(|(x, own)| if own.name.starts_with("joint") { *x } else { 0.0 }),
+        )
+    };
+    let x = arm_only(&draw(&model, |_| 0.0, &mut rng));
+    let exported = export(&chain, &problem, &model.arm(|k| x[k])).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("moved.urdf");
+    std::fs::write(&file, &exported.text).unwrap();
+    let moved = Robot::read(&file).unwrap();
+    let again = problem_of(&Chain::new(&moved, None, Some("tool")).unwrap());
+    let nominal =
+        DVector::zeros(model_of(&again, &Dataset::poses(&configurations).measurements().unwrap()).parameters.len());
+    let off = apart(&tips(&problem, &configurations, &x), &tips(&again, &configurations, &nominal));
+    assert!(off < 1e-9, "{off:e}");
+    let text = std::fs::read_to_string(path("tests/urdf/odd.urdf")).unwrap();
+    assert_eq!(without_origins(&text), without_origins(&exported.text));
+    assert!(exported.text.contains("<!-- the comment stays -->") && exported.text.contains("    <origin xyz=\""));
+    let names: Vec<&str> = exported.moved.iter().map(|origin| origin.joint.as_str()).collect();
+    assert_eq!(names, ["rail", "shoulder", "elbow", "level", "wrist", "flange"]);
+
+    // Nothing identified: nothing moves but what was rounded in the file.
+    let same = export(&chain, &problem, &Arm::nominal(&problem)).unwrap();
+    let rounded: Vec<&str> = same.moved.iter().map(|origin| origin.joint.as_str()).collect();
+    assert!(rounded.iter().all(|name| ["rail", "flange"].contains(name)), "{rounded:?}");
+    assert!(same.moved.iter().all(|origin| origin.distance < 3e-6 && origin.angle < 4e-6), "{:?}", same.moved);
+    let mut other = problem.clone();
+    other.joints[3].a += 1e-3;
+    let error = export(&chain, &other, &Arm::nominal(&other)).unwrap_err().to_string();
+    assert!(error.contains("not that of the URDF at joint \"elbow\""), "{error}");
+    other = problem.clone();
+    other.joints[3].name = "knee".to_owned();
+    assert!(
+        export(&chain, &other, &Arm::nominal(&other))
+            .unwrap_err()
+            .to_string()
+            .contains("the problem rail, shoulder, knee")
+    );
+}
+
+#[test]
+fn universal_robots_get_their_six_links() {
+    let problem = Problem::read(&path("problems/ur10-ipa")).unwrap();
+    let origins = joint_origins(&problem, &Arm::nominal(&problem), Yaml::UniversalRobots).unwrap();
+    let half = std::f64::consts::FRAC_PI_2;
+    let expected = [
+        ([0.0, 0.0, 0.1273], 0.0),
+        ([0.0; 3], half),
+        ([-0.612, 0.0, 0.0], 0.0),
+        ([-0.5723, 0.0, 0.163_941], 0.0),
+        ([0.0, -0.1157, 0.0], half),
+        ([0.0, 0.0922, 0.0], -half),
+    ];
+    for (origin, (xyz, roll)) in origins.iter().zip(expected) {
+        let off = (origin.xyz - Vector3::from(xyz)).norm() + (origin.rpy - Vector3::new(roll, 0.0, 0.0)).norm();
+        assert!(off < 1e-9, "{origin:?}");
+    }
+    let text = yaml(&origins, Yaml::UniversalRobots);
+    assert!(
+        text.contains("kinematics:\n  shoulder:\n    x: 0.0\n    y: 0.0\n    z: 0.1273\n")
+            && text.ends_with("  hash: \"\"\n"),
+        "{text}"
+    );
+    let odd = robot("odd.urdf");
+    let other = problem_of(&Chain::new(&odd, None, Some("tool")).unwrap());
+    let error = joint_origins(&other, &Arm::nominal(&other), Yaml::UniversalRobots).unwrap_err().to_string();
+    assert!(error.contains("not an arm of Universal Robots' form: it has 5 moving joints, not 6"), "{error}");
+}

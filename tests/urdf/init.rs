@@ -1,0 +1,139 @@
+//! Problems from URDF.
+
+use flexcal::problem::{JointKind, Mimic};
+use flexcal::urdf::{Chain, describe};
+use nalgebra::{DVector, Vector3};
+
+use super::{apart, problem_of, robot, tips};
+
+/// q of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link `tool` in `world`: pinocchio 3, π/2 for
+/// 1.5708.
+const STORED: [([f64; 4], [[f64; 3]; 3]); 6] = [
+    (
+        [0.009, 1.802, -1.423, 1.795],
+        [
+            [0.2017871955709, -0.781804088926, 1.0471085635423],
+            [-0.4388998397467, -0.4172382679114, 0.7957883879906],
+            [-0.1395538366066, -0.8432495708066, -0.5190904430086],
+        ],
+    ),
+    (
+        [-0.151, -0.307, 1.311, -0.363],
+        [
+            [0.0513355444123, 0.1085124096279, 0.0856282268359],
+            [0.969087949395, 0.0820941873284, -0.2326565940269],
+            [-0.1059110140058, -0.7132750926067, -0.6928358386943],
+        ],
+    ),
+    (
+        [0.04, -1.89, 1.014, 0.153],
+        [
+            [0.1337027887222, -0.7574290191265, 0.2783657988285],
+            [0.6731455138749, 0.6027179465367, 0.4284929335155],
+            [-0.2237630201342, -0.3862605584796, 0.894836796172],
+        ],
+    ),
+    (
+        [-0.136, 1.154, -0.787, -0.186],
+        [
+            [0.1686320916898, -0.2207626516267, 1.5812628365141],
+            [0.8845605063745, 0.3219395477283, 0.3375020565433],
+            [-0.1752832964762, -0.4411089066728, 0.880169698655],
+        ],
+    ),
+    (
+        [-0.293, -0.388, -1.186, -0.951],
+        [
+            [0.0715502296943, 0.5550428897441, 0.8185820885096],
+            [0.7383004245782, 0.4011642933934, 0.5421989420626],
+            [-0.5176533411678, 0.8523646367232, 0.0742263055896],
+        ],
+    ),
+    (
+        [0.2, -0.878, -0.059, 1.923],
+        [
+            [-0.3471388082945, 0.3094184960346, -0.040506954864],
+            [-0.4118773277534, -0.8575515390813, 0.3081597389376],
+            [-0.3483428765785, -0.1643183452031, -0.9228524918787],
+        ],
+    ),
+];
+
+/// Places of centres of mass in the first of these configurations, from the same.
+const MASSES: [(&str, f64, [f64; 3]); 3] = [
+    ("camera", 0.4, [0.1094887249301, -0.708911820063, 1.1047579046006]),
+    ("upper", 3.25, [0.0636153491049, -0.2344837820206, 0.8978169531132]),
+    ("carriage", 5.5, [0.0930016666093, -0.2, 0.4001599886669]),
+];
+
+#[test]
+fn a_chain_with_everything_is_as_another_program_has_it() {
+    let robot = robot("odd.urdf");
+    let chain = Chain::new(&robot, None, Some("tool")).unwrap();
+    let problem = problem_of(&chain);
+    let kinds: Vec<(&str, JointKind)> = problem.joints.iter().map(|joint| (joint.name.as_str(), joint.kind)).collect();
+    use JointKind::{Fixed, Prismatic, Revolute};
+    let expected = [
+        ("mounting", Fixed),
+        ("rail", Prismatic),
+        ("shoulder", Revolute),
+        ("elbow", Revolute),
+        ("level", Revolute),
+        ("wrist", Revolute),
+        ("tool", Fixed),
+    ];
+    assert_eq!(kinds, expected);
+    assert_eq!(problem.joints[4].mimic, Some(Mimic { joint: 2, ratio: -0.5 }));
+    assert!((problem.joints[2].limits.1 - 2.5).abs() < 1e-8 && problem.joints[1].limits.0 == -0.4);
+    assert_eq!(problem.joints[3].limits, (f64::NEG_INFINITY, f64::INFINITY), "continuous");
+    let all = |[rail, shoulder, elbow, wrist]: [f64; 4]| vec![0.0, rail, shoulder, elbow, 0.0, wrist, 0.0];
+    let configurations: Vec<Vec<f64>> = STORED.iter().map(|(q, _)| all(*q)).collect();
+    let stored: Vec<[Vector3<f64>; 3]> = STORED.iter().map(|(_, frame)| frame.map(Vector3::from)).collect();
+    let free = super::common::made::model_of(
+        &problem,
+        &flexcal::measurement::Dataset::poses(&configurations).measurements().unwrap(),
+    );
+    let nominal = DVector::zeros(free.parameters.len());
+    let off = apart(&tips(&problem, &configurations, &nominal), &stored);
+    assert!(off < 1e-9, "{off:e}");
+
+    // Masses: the arm cut off behind the joint that carries one, with the target there.
+    assert_eq!(
+        problem.joints.iter().flat_map(|joint| &joint.bodies).count(),
+        4,
+        "fore is the fourth; the base carries itself"
+    );
+    for (name, mass, at) in MASSES {
+        let carrier =
+            problem.joints.iter().position(|joint| joint.bodies.iter().any(|body| body.name == name)).unwrap();
+        let body = problem.joints[carrier].bodies.iter().find(|body| body.name == name).unwrap();
+        let mut cut = problem.clone();
+        cut.parameters.clear();
+        cut.joints.truncate(carrier + 1);
+        let frames = tips(&cut, &[all(STORED[0].0)[..=carrier].to_vec()], &DVector::zeros(0));
+        let [origin, x, z] = frames[0];
+        let place = origin + x * body.position.x + z.cross(&x) * body.position.y + z * body.position.z;
+        assert!((place - Vector3::from(at)).norm() < 1e-9 && body.mass == mass, "{name}: {place}");
+    }
+}
+
+#[test]
+fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
+    let robot = robot("odd.urdf");
+    let description = describe(&Chain::new(&robot, Some("base"), Some("tool")).unwrap()).unwrap();
+    assert!(description.notes.iter().any(|note| note.starts_with("1.5708 [rad] taken")), "{:?}", description.notes);
+    let text = description.text;
+    let held = |name: &str| text.contains(&format!("\"{name}\" = {{ fixed = true }}"));
+    assert!(held("joint*.beta") && text.contains("base = \"base\""), "{text}");
+    let problem = flexcal::problem::Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();
+    let q = vec![vec![0.0; problem.joints.len()]];
+    let model =
+        super::common::made::model_of(&problem, &flexcal::measurement::Dataset::poses(&q).measurements().unwrap());
+    // Six of the base, three of the target, four between turning axes, one slide whose place does not matter.
+    assert!(model.parameters.len() < 35, "{}", model.parameters.len());
+    let chain = |base, tip| Chain::new(&robot, base, tip).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(chain(None, None).contains("tool (5 moving joints), camera (4 moving joints)"), "{}", chain(None, None));
+    assert!(chain(None, Some("tol")).contains("(did you mean tool?)"));
+    assert!(chain(Some("hand"), Some("camera")).contains("is not below link \"hand\"; above it are plate, fore"));
+    assert!(chain(Some("world"), Some("base")).contains("no joint moves"));
+}

@@ -1,0 +1,49 @@
+//! Arms from URDF, and back; the forms in which a problem may have joints besides.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod bad;
+#[path = "../common/mod.rs"]
+mod common;
+mod export;
+mod forms;
+mod init;
+mod public;
+
+use std::path::Path;
+
+use common::made::model_of;
+use flexcal::identify::Placement;
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+use flexcal::urdf::{Chain, Robot, describe};
+use nalgebra::{DVector, Vector3};
+
+/// A URDF of `tests/urdf`, as text and read.
+pub fn robot(name: &str) -> Robot {
+    Robot::read(&common::arms::path("tests/urdf").join(name)).unwrap()
+}
+
+/// The problem of a chain.
+pub fn problem_of(chain: &Chain) -> Problem {
+    Problem::parse(&describe(chain).unwrap().text, Path::new("problem.toml")).unwrap()
+}
+
+/// Origin, x and z axis of the last frame at configurations of all joints, with the parameters at `x`.
+pub fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) -> Vec<[Vector3<f64>; 3]> {
+    let rows = Dataset::poses(configurations).measurements().unwrap();
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let at = |target: Vector3<f64>| {
+        let mut own = problem.clone();
+        own.tool.target = target;
+        model_of(&own, &rows).predict(Placement::of(&rows).poses(&rows, &all, 1.0), x)
+    };
+    let [origin, x, z] = [Vector3::zeros(), Vector3::x(), Vector3::z()].map(at);
+    (0..rows.len()).map(|k| [origin[k], x[k] - origin[k], z[k] - origin[k]]).collect()
+}
+
+/// The largest difference of some frames.
+pub fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
+    assert_eq!(one.len(), other.len());
+    one.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
