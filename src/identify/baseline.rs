@@ -9,7 +9,7 @@ use super::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
 use crate::measurement::{Dataset, Measurements};
 use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
-use crate::problem::{PoseView, Problem};
+use crate::problem::{Joint, PoseView, Problem};
 
 /// What the paper's closed forms and its iteration make of the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,11 +51,12 @@ impl Baseline {
 /// Every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow: its closed forms corrected and
 /// as printed, the stiffness known, from positions, or from load differences; and once with elasticity ignored, the first.
 ///
-/// None where the procedure does not apply: it knows base and target, so that there are no sessions or targets, and it
-/// needs as many equations as it has geometric parameters. Without elasticity there is the rigid one alone.
+/// None where the procedure does not apply: it knows base and target, so that there are no sessions or targets, it knows no
+/// joints placed by xyz and rpy and none that follow others, and it needs as many equations as it has geometric parameters. Without elasticity there is the rigid one alone.
 pub(super) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
-    if measurements.session.names.len() > 1 || measurements.target.is_some() {
+    let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
+    if measurements.session.names.len() > 1 || measurements.target.is_some() || problem.joints.iter().any(beyond) {
         return Vec::new();
     }
     let rigid = (Form::Corrected, StiffnessStage::Rigid);

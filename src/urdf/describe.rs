@@ -1,5 +1,6 @@
 //! A chain as the text of a problem.
 
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -16,8 +17,8 @@ use crate::problem::quoted::quoted;
 use crate::problem::read::BARRED_IN_NAMES;
 use crate::spatial::Frame;
 
-/// Smaller numbers than this are rounding \[rad\] or \[m\].
-const ROUNDING: f64 = 1e-12;
+/// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well \[rad\] or \[m\].
+const ROUNDING: f64 = 1e-11;
 /// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop \[mm\].
 const SIGMA_MM: f64 = 0.05;
 /// Most characters of a problem's name that come from a robot's.
@@ -159,9 +160,9 @@ fn limit_number(value: f64) -> String {
 }
 
 fn degrees(angle: f64) -> String {
-    let turns = (angle / std::f64::consts::TAU).round();
-    let within = angle - turns * std::f64::consts::TAU;
-    number(within.to_degrees())
+    let within = angle - (angle / TAU).round() * TAU;
+    let right = (within / FRAC_PI_2).round();
+    number(if (within - right * FRAC_PI_2).abs() < ROUNDING { right * 90.0 } else { within.to_degrees() })
 }
 
 fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use flexcal::error::{InputError, is_hidden};
 use flexcal::identify::{Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
+use flexcal::mechanics::Arm;
 use flexcal::model::Model;
 use flexcal::monte_carlo::Study;
 use flexcal::problem::Problem;
 use flexcal::simulate::{Truth, simulate};
+use flexcal::urdf::{Chain, Robot, describe, export};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -21,8 +23,8 @@ const SHORT: u64 = 100;
 
 /// A reader, by the name of its folder in the corpus.
 type Target = (&'static str, fn(&[u8], &Bench) -> Result<(), InputError>);
-const TARGETS: [Target; 5] =
-    [("problem", problem), ("table", table), ("truth", truth), ("study", study), ("targets", targets)];
+const TARGETS: [Target; 6] =
+    [("problem", problem), ("table", table), ("truth", truth), ("study", study), ("targets", targets), ("urdf", urdf)];
 
 /// A folder to put files in, and an arm for what is read against one.
 struct Bench {
@@ -74,6 +76,13 @@ fn targets(text: &[u8], bench: &Bench) -> Result<(), InputError> {
     let problem =
         Problem { data: flexcal::problem::Data { held_out: None, ..bench.arm.data.clone() }, ..bench.arm.clone() };
     Measurements::read(&[bench.file("targets.csv", text)], &problem).map(|_| ())
+}
+
+fn urdf(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+    let robot = Robot::read(&bench.file("arm.urdf", text))?;
+    let chain = Chain::new(&robot, None, None).or_else(|_| Chain::new(&robot, None, Some("tool")))?;
+    let problem = Problem::parse(&describe(&chain)?.text, Path::new("problem.toml"))?;
+    export(&chain, &problem, &Arm::nominal(&problem)).map(|_| ())
 }
 
 /// The files that a reader begins with.

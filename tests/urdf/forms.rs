@@ -27,7 +27,7 @@ fn standard_tables_are_read_in_their_order() {
     let text = "name = 'standard'\ndh = 'standard'\n[[joint]]\nalpha_deg = 90\na_m = 0.1\nd_m = 0.4\ntheta_deg = 10\n[[joint.body]]\n\
                 mass_kg = 2\ncom_m = [0.1, 0.2, 0.3]\n[[joint]]\na_m = 0.5\n[[joint]]\nkind = 'prismatic'\nalpha_deg = -30\na_m = 0.2\n";
     let problem = parse(text);
-    let q = [0.3, -0.8, 0.15];
+    let q: [f64; 3] = [0.3, -0.8, 0.15];
     let row = |theta: f64, d, a, alpha| {
         turn(Vector3::z(), theta) * shift(0.0, 0.0, d) * shift(a, 0.0, 0.0) * turn(Vector3::x(), alpha)
     };

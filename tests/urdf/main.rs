@@ -13,9 +13,10 @@ mod public;
 use std::path::Path;
 
 use common::made::model_of;
-use flexcal::identify::Placement;
-use flexcal::measurement::Dataset;
+use flexcal::identify::{Options, Placement, identify};
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
+use flexcal::simulate::{Truth, simulate};
 use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 
@@ -46,4 +47,23 @@ pub fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) ->
 pub fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
     assert_eq!(one.len(), other.len());
     one.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+/// Every arm of `problems` with a truth of its own is simulated and identified.
+#[test]
+fn the_gallery_runs() {
+    for arm in ["panda", "ur10-urdf", "scara", "gantry"] {
+        let problem = Problem::read(&common::arms::path("problems").join(arm)).unwrap();
+        let truth = Truth::read(&common::arms::path("problems").join(arm), &problem).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("measurements.csv");
+        std::fs::write(&file, simulate(&problem, &truth, 80, 1).unwrap().csv()).unwrap();
+        let rows = Measurements::read(&[file], &problem).unwrap().0;
+        let data = Dataset::of(&problem, rows).unwrap();
+        let fit = identify(&problem, &data, &Options::default()).unwrap();
+        assert!(fit.is_trusted(), "{arm}");
+        assert!(fit.fitted.held_out.mean.norm < 0.6 * fit.registered.held_out.mean.norm, "{arm}");
+        let all = fit.estimates.iter().filter(|own| own.std_error.is_none()).count();
+        assert_eq!(all, 0, "{arm}: what is free is told apart");
+    }
 }
