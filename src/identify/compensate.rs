@@ -109,13 +109,16 @@ pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -
 /// taken at the command found so far, until it settles.
 ///
 /// # Errors
-/// The limits of a joint exclude each other.
+/// The limits of a joint exclude each other, or a joint follows another one.
 pub fn compensate(
     problem: &Problem,
     model: &Model,
     x: &DVector<f64>,
     targets: &Measurements,
 ) -> Result<Vec<Command>, StageError> {
+    if let Some(index) = problem.joints.iter().position(|joint| joint.mimic.is_some()) {
+        return Err(StageError::Follower { joint: index + 1 });
+    }
     let placement = Placement::of(targets);
     let arm = model.commanded(problem, x);
     let rows: Vec<usize> = (0..targets.len()).collect();

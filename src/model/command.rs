@@ -3,8 +3,9 @@
 use nalgebra::DVector;
 
 use super::Model;
+use crate::mechanics::Arm;
 use crate::model::parameter::{Driver, JointField, Parameter, Slot};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Joint, JointKind, Problem};
 
 impl Model {
     /// The arm with parameters `x`, whose free parameters are now the corrections to its moving joints' commands.
@@ -13,28 +14,7 @@ impl Model {
     #[must_use]
     pub fn commanded(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
-        let parameters = problem
-            .joints
-            .iter()
-            .zip(&arm.joints)
-            .enumerate()
-            .filter_map(|(joint, (declared, own))| {
-                let (field, nominal) = match declared.commanded() {
-                    JointKind::Revolute => (JointField::Theta, own.theta),
-                    JointKind::Prismatic => (JointField::D, own.d),
-                    JointKind::Fixed => return None,
-                };
-                Some(Parameter {
-                    name: format!("q{}", joint + 1),
-                    slot: Slot::Joint { joint, field },
-                    driver: Driver::Constant,
-                    nominal,
-                    sigma: None,
-                    lower: f64::NEG_INFINITY,
-                    upper: f64::INFINITY,
-                })
-            })
-            .collect();
+        let parameters = commands(problem, &arm, Joint::commanded);
         Self {
             nominal: arm,
             driven: self.commands(x.as_slice()).into_driven(),
@@ -45,6 +25,11 @@ impl Model {
             parameters,
             constraints: Vec::new(),
         }
+    }
+
+    /// The same corrections of the joints that follow others, of a commanded model.
+    pub(super) fn followers(&self, problem: &Problem) -> Vec<Parameter> {
+        commands(problem, &self.nominal, |joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed })
     }
 
     /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not know.
@@ -72,4 +57,26 @@ impl Model {
         };
         self.parameters.iter().filter_map(joint).collect()
     }
+}
+
+/// Corrections to the coordinates of joints, each of the kind that `of` says.
+fn commands(problem: &Problem, arm: &Arm<f64>, of: fn(&Joint) -> JointKind) -> Vec<Parameter> {
+    let joints = problem.joints.iter().zip(&arm.joints).enumerate();
+    let corrected = joints.filter_map(|(joint, (declared, own))| {
+        let (field, nominal) = match of(declared) {
+            JointKind::Revolute => (JointField::Theta, own.theta),
+            JointKind::Prismatic => (JointField::D, own.d),
+            JointKind::Fixed => return None,
+        };
+        Some(Parameter {
+            name: format!("q{}", joint + 1),
+            slot: Slot::Joint { joint, field },
+            driver: Driver::Constant,
+            nominal,
+            sigma: None,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+        })
+    });
+    corrected.collect()
 }

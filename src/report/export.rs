@@ -13,6 +13,10 @@ use crate::model::parameter::Slot;
 use crate::problem::Problem;
 use crate::urdf::MovedOrigin;
 
+/// What to do about a geometry that lacks what stood beside it.
+const ALONE: &str = "A controller that knows geometry alone does better with one that was fitted alone: identify the problem without its \
+                     effects (and with --strategy rigid where joints or links give way), and export that.";
+
 /// Errors on held-out poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExportErrors {
@@ -108,6 +112,9 @@ pub fn export_text(exported: &Exported) -> String {
             errors::mean_and_rms(whole),
             errors::mean_and_rms(rigid)
         )));
+        if rigid.mean.norm > 1.1 * whole.mean.norm {
+            blocks.push(Block::Note(ALONE.to_owned()));
+        }
     }
     let left_out = left_out(exported);
     if !left_out.is_empty() {
