@@ -3,18 +3,13 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-<<<<<<< HEAD
 use clap::{Args, ValueEnum};
 use flexcal::identify::SavedEstimate;
-=======
-use clap::Args;
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::{identify, report};
 
-use super::estimate::Estimates;
 use super::input::Common;
 use super::outcome::Outcome;
 use super::{diagnostic, output};
@@ -41,7 +36,6 @@ pub struct Arguments {
     frame: Frame,
 }
 
-<<<<<<< HEAD
 /// Where targets are seen from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Frame {
@@ -52,9 +46,6 @@ enum Frame {
 }
 
 /// No targets.
-=======
-/// No table of targets.
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 #[derive(Debug, thiserror::Error)]
 #[error("no targets; name them with --data")]
 struct NoTargets;
@@ -62,11 +53,7 @@ struct NoTargets;
 /// Finds commands, writes `commands.csv`, and says what they reach.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-<<<<<<< HEAD
     if common.data().is_empty() {
-=======
-    if common.data.is_empty() {
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
         return Err(NoTargets.into());
     }
     let mut problem = Problem::read(common.problem())?;
@@ -79,7 +66,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::print_warnings(&warnings);
     }
     let placement = identify::Placement::of(&targets);
-<<<<<<< HEAD
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let estimate = SavedEstimate::read(&arguments.estimate)?;
     let model = estimate.model(model);
@@ -100,16 +86,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
     };
     let commands = identify::compensate(&problem, &model, &x, &sought)?;
-=======
-    let estimates = Estimates::read(&arguments.estimate, &problem)?;
-    let model = estimates.model(Model::new(&problem, &placement.bases, &placement.targets)?);
-    let trusted = estimates.trusted;
-    if !trusted && !common.quiet {
-        diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
-    }
-    let x = estimates.vector(&problem, &model)?;
-    let commands = identify::compensate(&problem, &model, &x, &targets)?;
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
     results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
     if common.json {
         output::print_json(&report::commands_json(&problem, &commands))?;

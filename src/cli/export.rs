@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::identify::{ErrorSummary, Placement};
+use flexcal::identify::{ErrorSummary, Placement, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::nalgebra::Vector3;
@@ -12,7 +12,6 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
 use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
 
-use super::estimate::Estimates;
 use super::outcome::Outcome;
 use super::output::Results;
 use super::{diagnostic, output};
@@ -63,7 +62,7 @@ enum Format {
 /// Writes the identified geometry, and says what it leaves out.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
-    let estimates = Estimates::read(&arguments.estimate, &problem)?;
+    let estimates = SavedEstimate::read(&arguments.estimate)?;
     let model = estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
     let x = estimates.vector(&problem, &model)?;
     let arm = model.arm(|k| x.get(k).copied().unwrap_or(0.0));
@@ -109,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn errors(
     problem: &Problem,
     files: &[PathBuf],
-    estimates: &Estimates,
+    estimates: &SavedEstimate,
     quiet: bool,
 ) -> Result<ExportErrors, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read(files, problem)?;

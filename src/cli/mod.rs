@@ -5,7 +5,6 @@ mod compare;
 mod compensate;
 mod completions;
 mod diagnostic;
-mod estimate;
 mod export;
 mod identify;
 mod init;

@@ -6,11 +6,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::near::{instead, meant, question};
-<<<<<<< HEAD
 use super::shortened;
-=======
 use super::urdf::UrdfMistake;
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 
 /// What is wrong with the input.
 ///

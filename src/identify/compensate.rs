@@ -72,7 +72,7 @@ pub fn waypoints(
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = placement.poses(rows, &all, 1.0);
     let mut targets = rows.clone();
-    if problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed).count() >= POSE {
+    if problem.joints.iter().filter(|joint| joint.commanded() != JointKind::Fixed).count() >= POSE {
         let turns = model.orientations(&poses, nominal.as_slice());
         targets.orientations = Some(turns.into_iter().map(UnitQuaternion::from_scaled_axis).collect());
     } else {

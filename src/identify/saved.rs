@@ -157,6 +157,18 @@ impl SavedEstimate {
         Ok(())
     }
 
+    /// Words in brackets behind `base` or `tool`, in the order of the file; one that is empty where there are none.
+    pub fn words(&self, of: &str) -> Vec<String> {
+        let mut words: Vec<String> = Vec::new();
+        for entry in &self.parameters {
+            let bracket = entry.name.strip_prefix(of).and_then(|rest| rest.strip_prefix('[')?.split_once(']'));
+            if let Some((word, _)) = bracket.filter(|(word, _)| !words.iter().any(|known| known == word)) {
+                words.push(word.to_owned());
+            }
+        }
+        if words.is_empty() { vec![String::new()] } else { words }
+    }
+
     /// Estimated value of a parameter \[SI\].
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)

@@ -5,13 +5,8 @@ use std::convert::identity;
 
 use super::mapped::Names;
 use super::table::Table;
-<<<<<<< HEAD
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
-use crate::problem::{HeldOut, JointKind, JointSource, Problem};
-=======
-use crate::error::{InputError, InputErrorKind, Warning, WarningKind, nearest, one_typo};
-use crate::problem::{HeldOut, Joint, JointKind, Problem};
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
+use crate::problem::{HeldOut, Joint, JointKind, JointSource, Problem};
 use crate::quantity::Unit;
 
 /// What a column stands for; joints and axes count from 0.
@@ -203,19 +198,12 @@ impl Columns {
             JointSource::Read => (Role::Reading, "_read"),
         };
         for (index, joint) in problem.joints.iter().enumerate() {
-<<<<<<< HEAD
-            if let Some(unit) = unit_of(joint.kind)
+            if let Some(unit) = unit_of(joint.commanded())
                 && !self.has(source(index))
             {
-                return missing(&format!("q{}{suffix}", numbering.number(index)), unit);
-=======
-            if let Some(unit) = unit_of(joint.commanded())
-                && !self.has(Role::Joint(index))
-            {
-                let number = format!("q{}", numbering.number(index));
-                let named = Some(joint.name.as_str()).filter(|name| !name.contains(' '));
+                let number = format!("q{}{suffix}", numbering.number(index));
+                let named = Some(joint.name.as_str()).filter(|name| suffix.is_empty() && !name.contains(' '));
                 return missing(&[&[number.as_str()], named.as_slice()].concat(), unit);
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
             }
         }
         // One coordinate alone is no position.
@@ -370,7 +358,6 @@ impl Numbering {
     }
 }
 
-<<<<<<< HEAD
 /// What the name of the file may stand for: a word.
 fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
@@ -382,7 +369,6 @@ fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 /// Conversion of a time without a unit: a date, which needs none.
 pub(super) const DATE: fn(f64) -> f64 = |_| f64::NAN;
 
-=======
 /// What the name of a column means that is the name of a joint, with a unit: `shoulder_pan_joint_rad`. Names that two joints
 /// have, and those of other columns, mean no joint.
 fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
@@ -412,7 +398,6 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
     }
 }
 
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 /// Whether a column that was meant would be missed: a pose's name and orientations decide nothing.
 fn counts(meant: &str) -> bool {
     let base = split_unit(meant).0;

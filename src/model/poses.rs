@@ -142,7 +142,6 @@ impl Model {
         measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
     }
 
-<<<<<<< HEAD
     /// Rotation vectors from the predicted to the measured orientations of poses, measuring frame \[rad\], as
     /// [`PoseResiduals::orientation_errors`].
     pub fn orientation_residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
@@ -172,7 +171,8 @@ impl Model {
         };
         let all = poses.iter().zip(self.frames(poses, x)).map(orientation);
         all.map(|turn| turn.unwrap_or(Vector3::from_element(f64::NAN))).collect()
-=======
+    }
+
     /// Positions of poses as the geometry alone has them at the full parameter vector `x`, measuring frame \[m\]: nothing gives way,
     /// and no effect acts.
     pub fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
@@ -184,7 +184,6 @@ impl Model {
             bases[pose.base].point(&tip.point(&targets[pose.target]))
         };
         poses.iter().map(position).collect()
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
     }
 
     /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.

@@ -17,14 +17,9 @@ impl Problem {
     /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
     /// (`5.00000000000e-1`):
     /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
-<<<<<<< HEAD
     ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector;
-    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
-=======
-    ///   and rotation of the base; mass of the payload;
     /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it is placed by xyz and rpy `placed` and these; where
     ///   it follows another `mimic`, its number and the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
     ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
     ///   and with a hoist `hoist`, force, hook and direction;
     /// - for each effect, in the order of the alphabet, a new line with its declaration as in a problem file;

@@ -40,14 +40,10 @@ pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use export::{ExportErrors, Exported, export_json, export_text};
 pub use figures::{Cause, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure};
-<<<<<<< HEAD
 pub use identify::{
     estimate_json, estimate_text, identification_report, joint_sources_text, lacks_something, why_not_trusted,
 };
-=======
-pub use identify::{estimate_json, estimate_text, identification_report, why_not_trusted};
 pub use init::{init_json, init_text};
->>>>>>> e425c04 (Arms from URDF and back, fixed joints by xyz and rpy, standard DH, joints that follow others, columns by joint names)
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
 pub use predict::{errors_json, prediction_text, predictions_csv, residuals_csv};

@@ -82,7 +82,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
 
 /// How the section `[poses]` may be written for these joints.
 fn example(joints: &[Joint]) -> String {
-    let range = |(number, joint): (usize, &Joint)| match joint.kind {
+    let range = |(number, joint): (usize, &Joint)| match joint.commanded() {
         JointKind::Revolute => Some(format!("q{number}_deg = [-90, 90]")),
         JointKind::Prismatic => Some(format!("q{number}_mm = [0, 500]")),
         JointKind::Fixed => None,

@@ -44,7 +44,7 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut poses = Vec::with_capacity(count);
     for configuration in &configurations {
         let (setup, measured) = (PoseView::of(configuration), Vector3::zeros());
-        poses.push(Pose { setup, base: 0, target: 0, measured, sigma: 1.0 });
+        poses.push(Pose { setup, base: 0, target: 0, measured, sigma: 1.0, orientation: None });
     }
     let zero = DVector::zeros(count);
     let columns = jacobian(&PoseResiduals::new(&model, poses, (0..count).collect(), zero.clone()), &zero);

@@ -24,7 +24,11 @@ fn mistakes_are_named_with_their_place() {
     let deep = format!("{}{}", "<robot>".repeat(100_000), "</robot>".repeat(100_000));
     let cases: Vec<(&str, String, &str)> = vec![
         ("empty", String::new(), "not valid XML"),
-        ("cut", "<robot name=\"r\">\n<link name=\"a\">".to_owned(), "not valid XML: the root node was opened but never closed"),
+        (
+            "cut",
+            "<robot name=\"r\">\n<link name=\"a\">".to_owned(),
+            "not valid XML: the root node was opened but never closed",
+        ),
         ("other", "<sdf/>".to_owned(), ":1: not a URDF: its outermost element is <sdf>"),
         ("bomb", bomb.to_owned(), "document type declaration"),
         ("deep", deep, "there are no links"),
