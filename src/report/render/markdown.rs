@@ -26,7 +26,12 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
             Block::Ranking(points) => {
                 points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
             }
-            Block::Table(own) => table(&mut text, own),
+            Block::Table(own) => {
+                table(&mut text, own);
+                if !own.notes.is_empty() {
+                    let _ = writeln!(text, "{}\n", escaped(&own.notes.join("\n")));
+                }
+            }
             Block::Headline(_) | Block::Figures(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
         }
     }
