@@ -130,7 +130,7 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
         };
         let step = before.seen(step).seen(&own.inverse());
         let target = from.seen(&moved(&step, joint, -stage.addend)).seen(&stage.axis.inverse());
-        let passed = through(chain, &fixed);
+        let passed = patches.through(&fixed);
         patches.place(index, &passed.inverse().seen(&target));
         from = stage.axis;
         fixed.clear();
@@ -139,7 +139,8 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
     let last = gauges.last().copied().unwrap_or_default();
     let target = from.seen(&last.seen(&steps.end));
     if let Some((&first, others)) = fixed.split_first() {
-        patches.place(first, &target.seen(&through(chain, others).inverse()));
+        let behind = patches.through(others);
+        patches.place(first, &target.seen(&behind.inverse()));
     } else {
         let off = difference(&Frame::identity(), &target);
         if off.0 > NOTHING || off.1 > NOTHING {
@@ -162,12 +163,6 @@ fn check_names(chain: &Chain, problem: &Problem) -> Result<(), InputError> {
     Err(chain.robot.error(UrdfMistake::OtherJoints { base, tip, found, expected }))
 }
 
-/// The frame behind some fixed joints, as they are written.
-fn through(chain: &Chain, joints: &[usize]) -> Frame<f64> {
-    let origins = joints.iter().filter_map(|&index| chain.robot.joints.get(index));
-    origins.fold(Frame::identity(), |frame, joint| frame.seen(&as_written(&joint.origin)))
-}
-
 fn as_written(origin: &Origin) -> Frame<f64> {
     Frame::placed(&origin.xyz, &origin.written)
 }
@@ -180,6 +175,18 @@ struct Patches<'a> {
 }
 
 impl Patches<'_> {
+    /// The frame behind some fixed joints, whose rounded angles are written out.
+    fn through(&mut self, joints: &[usize]) -> Frame<f64> {
+        let mut frame = Frame::identity();
+        for &index in joints {
+            let Some(joint) = self.chain.robot.joints.get(index) else { continue };
+            let origin = joint.origin.frame();
+            self.place(index, &origin);
+            frame = frame.seen(&origin);
+        }
+        frame
+    }
+
     /// Gives a joint another origin, unless that is the one it has.
     fn place(&mut self, index: usize, frame: &Frame<f64>) {
         let Some(joint) = self.chain.robot.joints.get(index) else { return };

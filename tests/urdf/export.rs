@@ -59,12 +59,12 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     assert_eq!(without_origins(&text), without_origins(&exported.text));
     assert!(exported.text.contains("<!-- the comment stays -->") && exported.text.contains("    <origin xyz=\""));
     let names: Vec<&str> = exported.moved.iter().map(|origin| origin.joint.as_str()).collect();
-    assert_eq!(names, ["rail", "shoulder", "elbow", "level", "wrist", "flange"]);
+    assert_eq!(names, ["stand", "rail", "shoulder", "elbow", "level", "wrist", "flange"]);
 
     // Nothing identified: nothing moves but what was rounded in the file.
     let same = export(&chain, &problem, &Arm::nominal(&problem)).unwrap();
     let rounded: Vec<&str> = same.moved.iter().map(|origin| origin.joint.as_str()).collect();
-    assert!(rounded.iter().all(|name| ["rail", "flange"].contains(name)), "{rounded:?}");
+    assert!(rounded.iter().all(|name| ["stand", "flange"].contains(name)), "{rounded:?}");
     assert!(same.moved.iter().all(|origin| origin.distance < 3e-6 && origin.angle < 4e-6), "{:?}", same.moved);
     let mut other = problem.clone();
     other.joints[3].a += 1e-3;

@@ -25,7 +25,7 @@ ARMS = [
     ("ur_description/urdf/ur5_robot.urdf", "ee_link", None),
     ("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector", None),
     ("xarm_description/urdf/xarm7.urdf", None, None),
-    ("z1_description/urdf/z1.urdf", "link06", None),
+    ("z1_description/urdf/z1.urdf", "gripperStator", None),
     ("so_arm_description/urdf/so101.urdf", "gripper_frame_link", None),
     ("baxter_description/urdf/baxter.urdf", "left_gripper", "base"),
     ("tiago_description/robots/tiago.urdf", "wrist_ft_tool_link", "base_link"),
