@@ -1,5 +1,7 @@
 //! Data sets from plain arrays.
 
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
 mod common;
 
 use common::arms::path;

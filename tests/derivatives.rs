@@ -118,10 +118,7 @@ fn every_parameter_of_an_arm_with_placements() {
             (problem.joints.len(), problem.joints.iter().position(|joint| joint.mimic.is_some()).unwrap());
         rows.configurations.chunks_exact_mut(n).for_each(|row| row[follower] = 0.0);
         let names: Vec<String> = model_of(&problem, &rows).parameters.into_iter().map(|own| own.name).collect();
-        assert!(
-            names.contains(&format!("joint{}.pitch", n)) && !names.contains(&format!("joint{}.alpha", n)),
-            "{names:?}"
-        );
+        assert!(names.contains(&format!("joint{n}.pitch")) && !names.contains(&format!("joint{n}.alpha")), "{names:?}");
         check(&problem.name, &problem, &rows, silent, silent);
     }
 }

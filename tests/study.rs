@@ -1,7 +1,7 @@
 //! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that mean what they say; and
 //! bad input.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test that fails may panic; figures are shown")]
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 #[path = "study/misprints.rs"]
 mod misprints;

@@ -207,16 +207,14 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
     };
     let ends = (0..robot.links.len()).filter(|&link| !is_parent(link));
     let mut leaves: Vec<(usize, usize)> = ends.filter_map(|link| Some((depth(link)?, link))).collect();
-    match *leaves.as_slice() {
-        [(_, leaf)] => Ok(leaf),
-        _ => {
-            leaves.sort_by_key(|&(moving, link)| (usize::MAX - moving, link));
-            let named = |(moving, link): &(usize, usize)| {
-                let plural = if *moving == 1 { "" } else { "s" };
-                Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
-            };
-            let base = robot.links.get(base).map_or(String::new(), |own| own.name.clone());
-            Err(robot.error(UrdfMistake::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
-        }
+    if let [(_, leaf)] = *leaves.as_slice() {
+        return Ok(leaf);
     }
+    leaves.sort_by_key(|&(moving, link)| (usize::MAX - moving, link));
+    let named = |(moving, link): &(usize, usize)| {
+        let plural = if *moving == 1 { "" } else { "s" };
+        Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
+    };
+    let base = robot.links.get(base).map_or(String::new(), |own| own.name.clone());
+    Err(robot.error(UrdfMistake::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
 }

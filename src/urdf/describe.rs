@@ -278,8 +278,10 @@ fn right_angles(chain: &Chain) -> Option<String> {
     let mut joints = Vec::new();
     for joint in origins {
         let pairs = joint.origin.written.iter().zip(joint.origin.meant.iter());
-        let rounded: Vec<f64> =
-            pairs.filter(|(written, meant)| written != meant).map(|(written, _)| written.abs()).collect();
+        let rounded: Vec<f64> = pairs
+            .filter(|(written, meant)| written.to_bits() != meant.to_bits())
+            .map(|(written, _)| written.abs())
+            .collect();
         if !rounded.is_empty() {
             joints.push(joint.name.as_str());
         }

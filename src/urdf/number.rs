@@ -31,7 +31,7 @@ pub(super) fn meant_angle(written: &str) -> Option<f64> {
     let last = 10_f64.powi(-(places as i32));
     let cut = meant.abs() - value.abs();
     let rounded = cut.abs() <= 0.500_001 * last || (0.0..last).contains(&cut);
-    (meant != 0.0 && rounded && meant != value).then_some(meant)
+    (meant != 0.0 && rounded && meant.to_bits() != value.to_bits()).then_some(meant)
 }
 
 #[cfg(test)]

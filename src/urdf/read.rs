@@ -11,6 +11,9 @@ use crate::error::{InputError, InputErrorKind, Location, UrdfMistake, is_hidden,
 use crate::problem::item::Document;
 use crate::spatial::Frame;
 
+/// Numbers, and where they stand.
+type Placed<const N: usize> = ([f64; N], Range<usize>);
+
 /// A robot as its URDF says.
 pub struct Robot {
     pub(super) source: Document,
@@ -176,13 +179,11 @@ impl Reader<'_> {
     }
 
     fn attribute<'n>(&self, node: Node<'n, '_>, name: &'static str) -> Result<&'n str, InputError> {
-        match node.attribute(name) {
-            Some(value) => Ok(value),
-            None => {
-                let element = shortened(node.tag_name().name(), 40);
-                self.fail(node, UrdfMistake::NoAttribute { element, attribute: name })
-            }
+        if let Some(value) = node.attribute(name) {
+            return Ok(value);
         }
+        let element = shortened(node.tag_name().name(), 40);
+        self.fail(node, UrdfMistake::NoAttribute { element, attribute: name })
     }
 
     fn name(&self, node: Node<'_, '_>) -> Result<String, InputError> {
@@ -192,11 +193,7 @@ impl Reader<'_> {
     }
 
     /// N numbers of an attribute, and where they stand; `None` where it is not there.
-    fn numbers<const N: usize>(
-        &self,
-        node: Node<'_, '_>,
-        attribute: &str,
-    ) -> Result<Option<([f64; N], Range<usize>)>, InputError> {
+    fn numbers<const N: usize>(&self, node: Node<'_, '_>, attribute: &str) -> Result<Option<Placed<N>>, InputError> {
         let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
         let span = found.range_value();
         match numbers(found.value()) {

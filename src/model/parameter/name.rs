@@ -218,10 +218,19 @@ impl Slot {
     pub fn unit(self) -> Unit {
         match self {
             Self::Joint { field, .. } => match field {
-                JointField::Alpha | JointField::Theta | JointField::Beta | JointField::Play => Unit::Angle,
-                JointField::Roll | JointField::Pitch | JointField::Yaw => Unit::Angle,
-                JointField::A | JointField::D | JointField::SlidingPlay => Unit::Length,
-                JointField::X | JointField::Y | JointField::Z => Unit::Length,
+                JointField::Alpha
+                | JointField::Theta
+                | JointField::Beta
+                | JointField::Play
+                | JointField::Roll
+                | JointField::Pitch
+                | JointField::Yaw => Unit::Angle,
+                JointField::A
+                | JointField::D
+                | JointField::SlidingPlay
+                | JointField::X
+                | JointField::Y
+                | JointField::Z => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
                 JointField::Cubic => Unit::CubicCompliance,
