@@ -1,6 +1,10 @@
 //! Arms from URDF, and back; the forms in which a problem may have joints besides.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::unreadable_literal,
+    reason = "a test that fails may panic; numbers stand as they were computed"
+)]
 
 mod bad;
 #[path = "../common/mod.rs"]
@@ -21,17 +25,17 @@ use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 
 /// A URDF of `tests/urdf`, as text and read.
-pub fn robot(name: &str) -> Robot {
+pub(crate) fn robot(name: &str) -> Robot {
     Robot::read(&common::arms::path("tests/urdf").join(name)).unwrap()
 }
 
 /// The problem of a chain.
-pub fn problem_of(chain: &Chain) -> Problem {
+pub(crate) fn problem_of(chain: &Chain) -> Problem {
     Problem::parse(&describe(chain).unwrap().text, Path::new("problem.toml")).unwrap()
 }
 
 /// Origin, x and z axis of the last frame at configurations of all joints, with the parameters at `x`.
-pub fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) -> Vec<[Vector3<f64>; 3]> {
+pub(crate) fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) -> Vec<[Vector3<f64>; 3]> {
     let rows = Dataset::poses(configurations).measurements().unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
     let at = |target: Vector3<f64>| {
@@ -44,7 +48,7 @@ pub fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) ->
 }
 
 /// The largest difference of some frames.
-pub fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
+pub(crate) fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
     assert_eq!(one.len(), other.len());
     one.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
