@@ -107,7 +107,9 @@ const PLACED: &str = "[[joint]]\nkind = \"fixed\"\nxyz_m = [0.1, -0.2, 0.3]\nrpy
 
 #[test]
 fn every_parameter_of_an_arm_with_placements() {
-    let odd = parse(&format!("{ODD}{PLACED}"));
+    let rules = ["x", "y", "z"].map(|own| format!("'joint*.{own}' = {{ sigma_mm = 30.0 }}\n")).concat()
+        + &["roll", "pitch", "yaw"].map(|own| format!("'joint*.{own}' = {{ sigma_deg = 1.0 }}\n")).concat();
+    let odd = parse(&format!("{ODD}{rules}{PLACED}"));
     let everything = "[parameters]\n\"*\" = { sigma_deg = 1.0, sigma_mm = 30.0 }\n";
     let rigid = parse(&format!(
         "name = 'placed'\n[[joint]]\nalpha_deg = 20\nd_m = 0.4\n{PLACED}[tool]\ntarget_m = [0.1, 0.2, 0.3]\n{everything}"

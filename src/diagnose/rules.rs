@@ -169,7 +169,7 @@ impl SelectionRules {
         few: 0.1,
         crowd: 16,
         covered: 0.95,
-        weighed_poses: 1500,
+        weighed_poses: 240,
         unknown_law: 0.25,
         sure: 0.95,
         stated: 0.9,

@@ -7,7 +7,7 @@ use crate::spatial::Frame;
 /// Sine of the angle below which axes count as parallel \[1\].
 const PARALLEL: f64 = 0.1;
 /// Shorter distances than this have no direction \[m\].
-const NO_DISTANCE: f64 = 1e-9;
+const NO_DISTANCE: f64 = 1e-12;
 
 /// Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d): the first two move along the axis before, the last two along the axis behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -96,12 +96,12 @@ mod tests {
         assert!(weight_is_unknown(&problem));
         let (first, second) = (0.3_f64, 0.4_f64);
         let configuration = [first, second, 0.0];
-        // About joint 2, level, the origin of frame 3 hangs half a metre out, along the link's direction.
+        // About joint 2, which lies level, the origin of frame 3 hangs half a metre out along the link.
         let moments = moments(&problem, 1, std::iter::once(&configuration[..]));
         assert_eq!(moments.shape(), (1, 8));
         let g = problem.gravity.norm();
         assert!(moments[(0, 0)].abs() < 1e-12);
-        assert!((moments[(0, 4)].abs() - 0.5 * g * second.cos()).abs() < 1e-9, "{moments}");
+        assert!((moments[(0, 4)].abs() - 0.5 * g * (first + second).cos()).abs() < 1e-9, "{moments}");
         let heavy = format!("{text}[[joint.body]]\nmass_kg = 1\n");
         assert!(!weight_is_unknown(&Problem::parse(&heavy, Path::new("problem.toml")).unwrap()));
     }
