@@ -1,5 +1,7 @@
 //! Arguments, progress and printing; nothing else in flexcal prints.
 
+#![allow(rustdoc::invalid_html_tags, reason = "<name> in a help text is for the terminal")]
+
 mod check;
 mod compare;
 mod compensate;
