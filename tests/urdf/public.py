@@ -79,7 +79,7 @@ def compare(joints, ends, model):
             own = model.joints[model.getJointId(joint["name"])]
             at[own.idx_q : own.idx_q + own.nq] = q[k] if own.nq == 1 else [math.cos(q[k]), math.sin(q[k])]
         pin.framesForwardKinematics(model, data, at)
-        base, end = (data.oMf[model.getFrameId(ends[name])] for name in ("base", "tip"))
+        base, end = (data.oMf[model.getFrameId(ends[name], pin.FrameType.BODY)] for name in ("base", "tip"))
         off = (base.inverse() * end).inverse() * tip(joints, q)
         worst = np.maximum(worst, [np.linalg.norm(off.translation), np.linalg.norm(pin.log3(off.rotation))])
     return worst
