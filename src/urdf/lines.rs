@@ -64,7 +64,9 @@ fn parallel(frame: &Frame<f64>) -> Step {
         let (theta_before, sign) = near_zero(foot.y.atan2(foot.x));
         let along = foot * (sign / distance);
         (step.theta_before, step.a) = (theta_before, sign * distance);
-        step.beta = (-along.z).atan2(along.x.hypot(along.y));
+        // The normal is across the axis behind; its own z is lost to rounding where it is short.
+        let rise = -(along.x * z.x + along.y * z.y) / z.z;
+        step.beta = (-rise).atan2(along.x.hypot(along.y));
     } else {
         step.beta = (z.x / z.z).atan();
     }
