@@ -45,7 +45,7 @@ impl PoseRanges {
             }
         }
         let joints = problem.joints.iter().map(|joint| joint.limits).collect();
-        Ok(Self { joints, payloads: Vec::new(), hoist: None, temperature: None, approach: false })
+        Ok(Self { joints, ..Self::default() })
     }
 
     /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by

@@ -1,11 +1,13 @@
 //! What is known of every pose and a residual may depend on.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::model::parameter::Quantity;
+use crate::problem::Problem;
 
 /// What is known of every pose and a residual may depend on; joints are counted from 0. Its `Display` is the name in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Covariate {
     /// q of a joint \[rad\] or, where it slides, \[m\].
@@ -26,11 +28,13 @@ pub enum Covariate {
     Load,
     /// Measured position.
     Position,
+    /// One of the problem's own covariates, by the name of its column, in its unit.
+    Own(Arc<str>),
 }
 
 impl Covariate {
     /// Of a quantity; without measured times the order of the rows stands for them.
-    pub fn of(quantity: Quantity, time_measured: bool) -> Self {
+    pub fn of(quantity: Quantity, problem: &Problem, time_measured: bool) -> Self {
         match quantity {
             Quantity::Command(joint) => Self::Command(joint),
             Quantity::Temperature => Self::Temperature,
@@ -38,7 +42,13 @@ impl Covariate {
             Quantity::Hoist => Self::Hoist,
             Quantity::Elapsed if time_measured => Self::Time,
             Quantity::Elapsed => Self::Row,
+            Quantity::Covariate(which) => Self::own(which, problem),
         }
+    }
+
+    /// The problem's own covariate of that number, from 0.
+    pub fn own(which: usize, problem: &Problem) -> Self {
+        Self::Own(problem.data.covariates.get(which).map_or("", |own| &own.name).into())
     }
 }
 
@@ -54,6 +64,7 @@ impl fmt::Display for Covariate {
             Self::Approach(joint) => write!(f, "approach{}", joint + 1),
             Self::Load => f.write_str("load"),
             Self::Position => f.write_str("position"),
+            Self::Own(name) => f.write_str(name),
         }
     }
 }

@@ -99,9 +99,16 @@ impl<'a> Data<'a> {
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
             payload: payload.map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
             ranges: (0..n).map(column).collect(),
+            covariates: self.own_covariates().map(varies).collect(),
             times: self.shift_times(),
             gravity: problem.gravity,
         }
+    }
+
+    /// The problem's own covariates, one value per identification row.
+    fn own_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
+        let count = self.rows().first().map_or(0, |&row| self.measurements.covariates_of(row).len());
+        (0..count).map(|which| self.rows().iter().map(|&row| self.measurements.covariates_of(row)[which]).collect())
     }
 
     /// Times half way between poses that leave enough of them on either side, thinned evenly.
@@ -134,6 +141,9 @@ impl<'a> Data<'a> {
                 covariates.push(CovariateValues { covariate, values: self.pick(column) });
             }
         }
+        let own = self.own_covariates().enumerate();
+        covariates
+            .extend(own.map(|(which, values)| CovariateValues { covariate: Covariate::own(which, problem), values }));
         covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
         if let Some(approach) = &measurements.approach {
             let n = measurements.joints;
@@ -156,6 +166,7 @@ fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     if let Some(approach) = &measurements.approach {
         key.extend(bits(&approach[row * n..(row + 1) * n]));
     }
+    key.extend(bits(measurements.covariates_of(row)));
     key.push(measurements.session.of_row[row] as u64);
     key.extend(measurements.target.as_ref().map(|target| target.of_row[row] as u64));
     key

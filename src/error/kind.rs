@@ -124,6 +124,12 @@ pub enum InputErrorKind {
     UnknownLink { link: String, links: Vec<String> },
     #[error("a joint is coupled to another one; for joint {joint} alone write gear-ratio")]
     CoupledToItself { joint: usize },
+    #[error("\"{name}\" cannot name a covariate: it is one of flexcal's own columns, or holds one of [ ] , * ?")]
+    NoCovariateName { name: String },
+    #[error("no covariate is called \"{name}\"; [data.covariates] {}", list("has", known, "has none"))]
+    UnknownCovariate { name: String, known: Vec<String> },
+    #[error("write joint = … or base = true, one of them")]
+    NotOnePlace,
     #[error("no order; write at least one, as in [1]")]
     NoOrders,
     #[error("order {order} stands twice")]

@@ -9,7 +9,7 @@ use super::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
 use crate::measurement::{Dataset, Measurements};
 use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
-use crate::problem::{Joint, PoseView, Problem};
+use crate::problem::{Joint, Problem};
 
 /// What the paper's closed forms and its iteration make of the data.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,18 +70,8 @@ pub(super) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
 
 /// Some rows as the procedure takes them.
 fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
-    let value = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
-    rows.iter()
-        .map(|&row| Measured {
-            setup: PoseView {
-                configuration: data.configuration(row),
-                payload: value(&data.payload, row),
-                hoist: value(&data.hoist, row),
-                ..PoseView::default()
-            },
-            position: data.positions[row],
-        })
-        .collect()
+    let first = data.first_time();
+    rows.iter().map(|&row| Measured { setup: data.setup(row, first), position: data.positions[row] }).collect()
 }
 
 fn baseline(problem: &Problem, data: &Dataset, form: Form, stage: StiffnessStage) -> Option<Baseline> {

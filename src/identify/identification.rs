@@ -175,8 +175,11 @@ fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> R
             return Err(error(InputErrorKind::NoPositionSigma));
         }
     }
-    let columns =
-        Columns { temperature: measurements.temperature.is_some(), approach: measurements.approach.is_some() };
+    let columns = Columns {
+        temperature: measurements.temperature.is_some(),
+        approach: measurements.approach.is_some(),
+        covariates: measurements.covariates.len() == problem.data.covariates.len() * measurements.len(),
+    };
     for EffectDeclaration { effect, location } in &problem.effects {
         if let Some(write) = effect.missing_column(problem, columns) {
             return Err(location.clone().error(InputErrorKind::NeedsColumn { write }).into());

@@ -5,7 +5,6 @@ use nalgebra::{DVector, UnitQuaternion, Vector3};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
 use crate::model::{Model, Pose, SeenOrientation};
-use crate::problem::PoseView;
 use crate::problem::Problem;
 
 /// Scale of a coordinate's error where no σ is declared and none estimated yet \[m\].
@@ -55,19 +54,10 @@ impl Placement {
     /// Rows as poses; `sigma` \[m\] is that of rows without one of their own.
     pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
         let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
-        let n = measurements.joints;
-        let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+        let first = measurements.first_time();
         rows.iter()
             .map(|&row| Pose {
-                setup: PoseView {
-                    configuration: measurements.configuration(row),
-                    payload: at(&measurements.payload, row),
-                    hoist: at(&measurements.hoist, row),
-                    temperature: at(&measurements.temperature, row),
-                    time: measurements.time[row],
-                    elapsed: measurements.time[row] - first,
-                    approach: measurements.approach.as_ref().map(|all| &all[row * n..(row + 1) * n]),
-                },
+                setup: measurements.setup(row, first),
                 base: self.base_of_row[row],
                 target: self.target_of_row[row],
                 measured: measurements.positions[row],

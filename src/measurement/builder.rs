@@ -72,6 +72,7 @@ pub struct DatasetBuilder {
     temperature: Option<Vec<f64>>,
     time: Option<Vec<f64>>,
     approach: Option<Vec<Vec<f64>>>,
+    covariates: Vec<Vec<f64>>,
     session: Option<Labels>,
     target: Option<Labels>,
     held_out: Vec<usize>,
@@ -96,6 +97,7 @@ impl Dataset {
             temperature: None,
             time: None,
             approach: None,
+            covariates: Vec::new(),
             session: None,
             target: None,
             held_out: Vec::new(),
@@ -160,6 +162,13 @@ impl DatasetBuilder {
         self
     }
 
+    /// The problem's own covariates, shape = (rows)(covariates), in the order of its `[data.covariates]` and in their units.
+    #[must_use]
+    pub fn covariates<C: AsRef<[f64]>>(mut self, covariates: impl IntoIterator<Item = C>) -> Self {
+        self.covariates = rows_of(covariates);
+        self
+    }
+
     /// Session of each row: rows of one session share a base.
     #[must_use]
     pub fn session<W: AsRef<str>>(mut self, session: impl IntoIterator<Item = W>) -> Self {
@@ -201,6 +210,7 @@ impl DatasetBuilder {
     /// The first array that does not fit.
     pub fn measurements(self) -> Result<Measurements, DatasetError> {
         let rows = self.configurations.len();
+        let covariates = covariates(&self.covariates, rows)?;
         let joints = self.configurations.first().map_or(0, Vec::len);
         let flat = |column, values: &[Vec<f64>]| {
             length(column, values.len(), rows)?;
@@ -256,11 +266,26 @@ impl DatasetBuilder {
             time_measured: time.is_some(),
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
             approach: self.approach.map(|approach| directions(flat("approach", &approach)?, joints)).transpose()?,
+            covariates,
             session: words("session", self.session)?.unwrap_or_else(unnamed),
             target: words("target", self.target)?,
             ..Measurements::default()
         })
     }
+}
+
+/// The covariates of all rows, so many of each.
+fn covariates(all: &[Vec<f64>], rows: usize) -> Result<Vec<f64>, DatasetError> {
+    let (column, rule) = ("covariates", "not as long as the first");
+    let Some(first) = all.first() else { return Ok(Vec::new()) };
+    length(column, all.len(), rows)?;
+    for (row, values) in all.iter().enumerate() {
+        finite(column, row, values)?;
+        if values.len() != first.len() {
+            return Err(DatasetError::OutOfRange { column, row, rule });
+        }
+    }
+    Ok(all.concat())
 }
 
 /// Directions −1, 0 and +1, so many of each row.

@@ -30,6 +30,8 @@ pub(super) enum Role {
     Pose,
     /// Which fixed point a row without an arm measures.
     Nest,
+    /// One of the problem's own covariates.
+    Covariate(usize),
 }
 
 impl Role {
@@ -118,7 +120,8 @@ impl Columns {
         for (place, &(name, rule)) in named.of_place.iter().chain(&file).enumerate() {
             let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
             let error = |kind| location().error(kind);
-            let foreign = named.mapped && rule.is_none();
+            let own = problem.data.covariates.iter().position(|own| own.name == name);
+            let foreign = named.mapped && rule.is_none() && own.is_none();
             if !name.is_empty() && !names.insert(name) && !foreign {
                 return Err(error(InputErrorKind::RepeatedColumn { first: name.to_owned() }));
             }
@@ -126,12 +129,18 @@ impl Columns {
             if is_marked {
                 columns.marked = Some(place);
             }
-            let meaning = match numbering.recognise(name, problem) {
+            let meaning = match (numbering.recognise(name, problem), own) {
+                (Ok(Meaning::Read(..)), Some(own)) => {
+                    let declared = problem.data.covariates.get(own).map(|own| own.location.clone());
+                    let kind = InputErrorKind::NoCovariateName { name: name.to_owned() };
+                    return Err(declared.unwrap_or_else(location).error(kind));
+                }
+                (_, Some(own)) => Ok(Meaning::Read(Role::Covariate(own), identity)),
                 // What another program calls by our name need not be ours.
-                Err(_) if foreign => Meaning::Unknown,
-                Ok(Meaning::Read(role, _)) if foreign && found.contains_key(&role) => Meaning::Unknown,
-                other => other.map_err(error)?,
-            };
+                (Err(_), _) if foreign => Ok(Meaning::Unknown),
+                (Ok(Meaning::Read(role, _)), _) if foreign && found.contains_key(&role) => Ok(Meaning::Unknown),
+                (other, _) => other.map_err(error),
+            }?;
             match meaning {
                 Meaning::Read(role, _) if place == table.header.len() => {
                     columns.file = Some(word_of_row(role).map_err(error)?);
@@ -204,6 +213,15 @@ impl Columns {
                 let number = format!("q{}{suffix}", numbering.number(index));
                 let named = Some(joint.name.as_str()).filter(|name| suffix.is_empty() && !name.contains(' '));
                 return missing(&[&[number.as_str()], named.as_slice()].concat(), unit);
+            }
+        }
+        for (k, own) in problem.data.covariates.iter().enumerate() {
+            let used = || problem.effects.iter().any(|declared| declared.effect.covariate() == Some(own.name.as_str()));
+            if !self.has(Role::Covariate(k)) && (measured || used()) {
+                let write = format!("it, or take it out of [data.covariates] in {}", own.location);
+                return Err(table
+                    .column(&own.name)
+                    .error(InputErrorKind::MissingColumn { write, near: near(&own.name) }));
             }
         }
         // One coordinate alone is no position.

@@ -33,7 +33,7 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
-use crate::problem::PoseConditions;
+use crate::problem::{PoseConditions, PoseView};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
@@ -76,6 +76,8 @@ pub struct Measurements {
     pub time_measured: bool,
     /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints without a column.
     pub approach: Option<Vec<f64>>,
+    /// Values of the problem's own covariates, in their order and units, shape = (rows, covariates); empty where there are none.
+    pub covariates: Vec<f64>,
     /// Number of each pose from the column `pose`, where every row has one and it is a number.
     pub pose: Option<Vec<f64>>,
     /// Session of each row; one unnamed label where there is no column.
@@ -163,17 +165,33 @@ impl Measurements {
 
     /// What was set in a row; time counts from its own first one.
     pub fn conditions(&self, row: usize) -> PoseConditions {
+        self.setup(row, self.first_time()).to_owned()
+    }
+
+    /// Time of the first pose \[s\].
+    pub(crate) fn first_time(&self) -> f64 {
+        self.time.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same to read, where the time of the first pose \[s\] is known.
+    pub(crate) fn setup(&self, row: usize, first: f64) -> PoseView<'_> {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let first = self.time.iter().copied().fold(f64::INFINITY, f64::min);
-        PoseConditions {
-            configuration: self.configuration(row).to_vec(),
+        PoseView {
+            configuration: self.configuration(row),
             payload: at(&self.payload),
             hoist: at(&self.hoist),
             temperature: at(&self.temperature),
             time: self.time[row],
             elapsed: self.time[row] - first,
-            approach: self.approach.as_ref().map(|all| all[row * self.joints..(row + 1) * self.joints].to_vec()),
+            approach: self.approach.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints]),
+            covariates: self.covariates_of(row),
         }
+    }
+
+    /// The problem's own covariates in a row, in their order and units; empty where there are none.
+    pub fn covariates_of(&self, row: usize) -> &[f64] {
+        let n = self.covariates.len() / self.len().max(1);
+        &self.covariates[row * n..(row + 1) * n]
     }
 
     /// Configuration of a row, shape = (joints) \[rad\] or \[m\].
@@ -216,6 +234,7 @@ impl Measurements {
             time: one(&self.time),
             time_measured: self.time_measured,
             approach: self.approach.as_deref().map(each),
+            covariates: rows.iter().flat_map(|&row| self.covariates_of(row)).copied().collect(),
             pose: self.pose.as_deref().map(one),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
@@ -243,6 +262,7 @@ impl Measurements {
         all.temperature = both(&self.temperature, &other.temperature);
         all.time.extend(&other.time);
         all.approach = both(&self.approach, &other.approach);
+        all.covariates.extend(&other.covariates);
         all.pose = both(&self.pose, &other.pose);
         all.session.of_row.extend(&other.session.of_row);
         all

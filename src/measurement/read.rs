@@ -272,6 +272,7 @@ impl Builder {
             time: Vec::new(),
             time_measured: columns.has(Role::Time),
             approach: approach.then(Vec::new),
+            covariates: Vec::new(),
             pose: columns.has(Role::Pose).then(Vec::new),
             session: Labels::default(),
             target: columns.has(Role::Target).then(Labels::default),
@@ -384,6 +385,8 @@ impl Builder {
                 }
                 Role::Orientation(axis) => set(turned.angles.as_mut_slice(), axis, number()?),
                 Role::Quaternion(axis) => set(&mut turned.quaternion, axis, number()?),
+                // In the order of the problem: columns are in that of their roles.
+                Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
                 Role::Target => self.target.push(table.name(column.place)?),

@@ -25,6 +25,8 @@ pub(super) struct Linearised {
     /// Columns of what the measurement does: scale, and shifts by axis and driver.
     scale: Option<usize>,
     shifts: Vec<(usize, Driver, usize)>,
+    /// The same of turns of the bases.
+    turns: Vec<(usize, Driver, usize)>,
     bases: Vec<Base>,
     targets: Vec<Target>,
     inner: Inner,
@@ -39,7 +41,7 @@ impl Linearised {
         let mut bases: Vec<Base> = model.base_poses(x.as_slice()).iter().map(Base::new).collect();
         let places = model.target_positions(x.as_slice()).into_iter().zip(model.target_rotations(x.as_slice()));
         let mut targets: Vec<Target> = places.map(|(position, rotation)| Target::new(position, &rotation)).collect();
-        let (mut scale, mut shifts) = (None, Vec::new());
+        let (mut scale, mut shifts, mut turns) = (None, Vec::new(), Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
             let parameter = &model.parameters[k];
             match parameter.slot {
@@ -47,6 +49,7 @@ impl Linearised {
                 Slot::Target { target, axis } => targets[target].columns[axis] = Some(column),
                 Slot::Scale => scale = Some(column),
                 Slot::Shift { axis } => shifts.push((axis, parameter.driver, column)),
+                Slot::Turn { axis } => turns.push((axis, parameter.driver, column)),
                 Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
             }
         }
@@ -59,7 +62,7 @@ impl Linearised {
         let commands = model.commands(x.as_slice());
         let instrument = model.instrument_at(x.as_slice());
         let probe = Block::zeros(if oriented { turn::PROBE_ROWS } else { 0 }, unknowns.len());
-        Self { commands, instrument, scale, shifts, bases, targets, inner, probe }
+        Self { commands, instrument, scale, shifts, turns, bases, targets, inner, probe }
     }
 
     /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros, six where its orientation
@@ -67,6 +70,11 @@ impl Linearised {
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
+        let turned = self.instrument.turns().then(|| {
+            let columns = self.turns.iter().map(|&(axis, driver, column)| (axis, column, driver.value(&pose.setup)));
+            base.turned_by(&self.instrument.turn(&pose.setup), columns)
+        });
+        let base = turned.as_ref().unwrap_or(base);
         let setup = self.commands.apply(&pose.setup);
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
@@ -77,7 +85,7 @@ impl Linearised {
         };
         let predicted = last.point(&target.position);
         for (axis, &column) in base.columns.iter().take(3).enumerate() {
-            rows.put_if(column, || Vector3::ith(axis, 1.0));
+            rows.put_if(column, || base.along[axis]);
         }
         for (column, derivative) in base.turned(&predicted) {
             rows.put(column, &derivative);

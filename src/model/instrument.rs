@@ -1,17 +1,21 @@
-//! What the measuring instrument makes of a position.
+//! What the measuring instrument makes of a position, and what turns under it.
 
 use nalgebra::Vector3;
 
 use crate::model::parameter::{Driver, Parameter, Slot};
 use crate::problem::PoseView;
+use crate::spatial::Frame;
 
-/// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ.
+/// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ; and turns of all bases by the rotation vector Σ ωᵢ·driverᵢ, about the
+/// measuring frame's origin.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
     /// s.
     pub scale: f64,
     /// Axis, driver and size [m per unit of the driver].
     shifts: Vec<(usize, Driver, f64)>,
+    /// The same of turns [rad per unit of the driver].
+    turns: Vec<(usize, Driver, f64)>,
 }
 
 impl Instrument {
@@ -22,6 +26,7 @@ impl Instrument {
             match parameter.slot {
                 Slot::Scale => instrument.scale += x,
                 Slot::Shift { axis } => instrument.shifts.push((axis, parameter.driver, x)),
+                Slot::Turn { axis } => instrument.turns.push((axis, parameter.driver, x)),
                 _ => {}
             }
         }
@@ -36,6 +41,26 @@ impl Instrument {
             seen[axis] += size * driver.value(setup);
         }
         seen
+    }
+
+    /// Whether bases turn.
+    pub fn turns(&self) -> bool {
+        !self.turns.is_empty()
+    }
+
+    /// By how much bases turn in a pose, a rotation vector, measuring frame \[rad\].
+    pub fn turn(&self, setup: &PoseView) -> Vector3<f64> {
+        let mut turn = Vector3::zeros();
+        for &(axis, driver, size) in &self.turns {
+            turn[axis] += size * driver.value(setup);
+        }
+        turn
+    }
+
+    /// A base in a pose, measuring frame.
+    #[inline]
+    pub fn base(&self, base: &Frame<f64>, setup: &PoseView) -> Frame<f64> {
+        if self.turns() { Frame::from_rotation_vector(Vector3::zeros(), &self.turn(setup)).seen(base) } else { *base }
     }
 
     /// What the command of a joint, counted from 0, changes in the shifts \[m/rad\] or \[m/m\].

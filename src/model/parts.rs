@@ -11,8 +11,13 @@ use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, rotation_axes};
 
 /// A base frame, how its rotation turns with its rotation vector, and the columns of its six coordinates.
+#[derive(Clone)]
 pub(super) struct Base {
     pub frame: Frame<f64>,
+    /// Where the coordinates of its translation move it, measuring frame.
+    pub along: [Vector3<f64>; 3],
+    /// What turns it besides, about the measuring frame's origin: columns, and what they do to a point.
+    turns: Vec<(usize, Frame<f64>)>,
     turning: [Frame<f64>; 3],
     pub columns: [Option<usize>; 6],
 }
@@ -39,16 +44,37 @@ impl Base {
     pub fn new(pose: &BasePose) -> Self {
         Self {
             frame: Frame::from_rotation_vector(pose.translation, &pose.rotation),
+            along: [Vector3::x(), Vector3::y(), Vector3::z()],
+            turns: Vec::new(),
             turning: turning(&pose.rotation),
             columns: [None; 6],
         }
     }
 
+    /// The same turned by a rotation vector \[rad\] about the measuring frame's origin, with columns and what each is multiplied by for
+    /// coordinates of that vector.
+    pub fn turned_by(&self, turn: &Vector3<f64>, columns: impl Iterator<Item = (usize, usize, f64)>) -> Self {
+        let by = Frame::from_rotation_vector(Vector3::zeros(), turn);
+        let (turning, back) = (turning(turn), by.inverse());
+        let column = |(axis, column, factor): (usize, usize, f64)| {
+            let slope = turning[axis].seen(&back);
+            (column, Frame { axes: slope.axes.map(|axis| axis * factor), origin: Vector3::zeros() })
+        };
+        Self {
+            frame: by.seen(&self.frame),
+            along: self.along.map(|axis| by.vector(&axis)),
+            turns: columns.map(column).collect(),
+            turning: self.turning.map(|turning| by.seen(&turning)),
+            columns: self.columns,
+        }
+    }
+
     /// What the rotation of the base does to a point \[m\], measuring frame, by the columns of its coordinates.
     pub fn turned<'b>(&'b self, point: &Vector3<f64>) -> impl Iterator<Item = (usize, Vector3<f64>)> + 'b {
-        let in_arm = self.frame.resolve(&(point - self.frame.origin));
+        let (in_arm, point) = (self.frame.resolve(&(point - self.frame.origin)), *point);
         let columns = self.columns[3..].iter().zip(&self.turning);
-        columns.filter_map(move |(column, turning)| Some(((*column)?, turning.vector(&in_arm))))
+        let own = columns.filter_map(move |(column, turning)| Some(((*column)?, turning.vector(&in_arm))));
+        own.chain(self.turns.iter().map(move |(column, slope)| (*column, slope.vector(&point))))
     }
 }
 

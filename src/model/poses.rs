@@ -114,9 +114,10 @@ impl<'a> PoseResiduals<'a> {
             let lost = Vector3::from_element(f64::NAN);
             let seen = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
                 Ok(()) => {
-                    let position = bases[pose.base].point(&rest.frame.point(&targets[pose.target]));
+                    let base = instrument.base(&bases[pose.base], &pose.setup);
+                    let position = base.point(&rest.frame.point(&targets[pose.target]));
                     let turn = pose.orientation.map(|own| {
-                        let axes = turned[pose.target].map(|axis| bases[pose.base].vector(&rest.frame.vector(&axis)));
+                        let axes = turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
                         own.axes.map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
                     });
                     Seen { position: instrument.of(&position, &pose.setup), turn }
@@ -164,9 +165,10 @@ impl Model {
     /// pose has no equilibrium.
     pub fn orientations(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let (bases, turned) = (self.base_frames(x), self.target_rotations(x));
+        let instrument = self.instrument_at(x);
         let still = [Vector3::x(), Vector3::y(), Vector3::z()];
         let orientation = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
-            let last = bases[pose.base].seen(&frame?);
+            let last = instrument.base(&bases[pose.base], &pose.setup).seen(&frame?);
             Some(turn_between(&still, &rotation_axes(&turned[pose.target]).map(|axis| last.vector(&axis))))
         };
         let all = poses.iter().zip(self.frames(poses, x)).map(orientation);

@@ -95,6 +95,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Warming { .. }
         | Driver::Elapsed
         | Driver::Since(_) => true,
+        Driver::Covariate(which) => which < problem.data.covariates.len(),
     };
     driven
         && match parameter.slot {
@@ -105,7 +106,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
             }),
             Slot::Base { base, axis } => base < bases && axis < 6,
             Slot::Target { target, axis } => target < targets && axis < 3,
-            Slot::Shift { axis } => axis < 3,
+            Slot::Shift { axis } | Slot::Turn { axis } => axis < 3,
             Slot::Arm(_) | Slot::Scale => true,
         }
 }
@@ -116,7 +117,7 @@ fn is_declared(slot: Slot) -> bool {
         Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
         Slot::Beam { field, .. } => field.is_rigidity() && field != BeamField::Flexibility,
         Slot::Base { .. } | Slot::Target { .. } => true,
-        Slot::Arm(_) | Slot::Shift { .. } | Slot::Scale => false,
+        Slot::Arm(_) | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale => false,
     }
 }
 
@@ -128,7 +129,7 @@ fn is_drivable(problem: &Problem, slot: Slot) -> bool {
             JointKind::Prismatic => field == JointField::D,
             JointKind::Fixed => false,
         },
-        Slot::Shift { .. } => true,
+        Slot::Shift { .. } | Slot::Turn { .. } => true,
         _ => false,
     }
 }

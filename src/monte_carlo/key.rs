@@ -53,12 +53,15 @@ fn canonical(truth: &Truth) -> String {
         let values: Vec<String> = effect.values().iter().map(|value| format!("{value:e}")).collect();
         let _ = writeln!(text, "effect {cause} {}", values.join(" "));
     }
-    let PoseRanges { joints, payloads, hoist, temperature, approach } = poses;
+    let PoseRanges { joints, payloads, hoist, temperature, approach, covariates } = poses;
     let joints: Vec<String> = joints.iter().copied().map(range).collect();
     let payloads: Vec<String> = payloads.iter().map(|mass| format!("{mass:e}")).collect();
     let [hoist, temperature] = [hoist, temperature].map(|own| own.map_or_else(|| "-".to_owned(), range));
     let sides = if *approach { "sides" } else { "-" };
     let _ = writeln!(text, "poses {}, {}, {hoist}, {temperature}, {sides}", joints.join(" "), payloads.join(" "));
+    for &own in covariates {
+        let _ = writeln!(text, "covariate {}", range(own));
+    }
     let held_out = match held_out {
         HeldOutRows::Share(share) => format!("share {share:e}"),
         HeldOutRows::AllBut(others) => format!("all-but {others}"),

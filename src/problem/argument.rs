@@ -11,6 +11,15 @@ use crate::quantity::Unit;
 /// Most orders of one effect.
 const MOST_ORDERS: usize = 100;
 
+/// Where something of the arm moves with a covariate: a joint, from 1, or the base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mount {
+    /// A joint that takes a command.
+    Joint(usize),
+    /// The base.
+    Base,
+}
+
 /// An argument of an effect as the files write it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -24,9 +33,16 @@ pub enum Argument {
     Name(String),
     /// A time \[s\].
     Time(f64),
+    /// The base, `true`.
+    Base(bool),
 }
 
 impl Argument {
+    /// The key that it stands behind, by that of its field: a place is the base or a joint.
+    pub(super) fn key(&self, field: &'static str) -> &'static str {
+        if matches!(self, Self::Base(_)) { "base" } else { field }
+    }
+
     /// As TOML writes it.
     pub fn toml(&self) -> String {
         match self {
@@ -35,6 +51,7 @@ impl Argument {
                 format!("[{}]", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(", "))
             }
             Self::Name(name) => quoted(name),
+            Self::Base(there) => there.to_string(),
             // A time is a float, whatever its value.
             Self::Time(time) if time.fract() == 0.0 => format!("{time:.1}"),
             Self::Time(time) => time.to_string(),
@@ -47,6 +64,7 @@ impl Argument {
             Self::Joint(joint) => Some(joint.to_string()),
             Self::Name(name) => Some(name.clone()),
             Self::Time(time) => Some(time.to_string()),
+            Self::Base(_) => Some("base".to_owned()),
             Self::Orders(_) => None,
         }
     }
@@ -67,6 +85,15 @@ impl From<&Vec<u32>> for Argument {
 impl From<&String> for Argument {
     fn from(name: &String) -> Self {
         Self::Name(name.clone())
+    }
+}
+
+impl From<&Mount> for Argument {
+    fn from(place: &Mount) -> Self {
+        match *place {
+            Mount::Joint(joint) => Self::Joint(joint),
+            Mount::Base => Self::Base(true),
+        }
     }
 }
 
@@ -123,6 +150,23 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
             return Err(self.section.error(InputErrorKind::CoupledToItself { joint }));
         }
         Ok(joint)
+    }
+
+    /// A joint that takes a command, or else `base = true`.
+    pub fn mount(&mut self, key: &str) -> Result<Mount, InputError> {
+        match self.section.get("base") {
+            Some(item) if !item.boolean()? || self.section.peek(key).is_some() => {
+                Err(item.error(InputErrorKind::NotOnePlace))
+            }
+            Some(_) => Ok(Mount::Base),
+            None => self.moving_joint(key).map(Mount::Joint),
+        }
+    }
+
+    /// The name of a covariate; whether there is one is seen when the data are read.
+    pub fn covariate(&mut self, key: &str) -> Result<String, InputError> {
+        let item = self.section.require(key, &format!("{key} = \"…\", the name of a column in [data.covariates]"))?;
+        Ok(item.text()?.to_owned())
     }
 
     /// The name of a beam.
@@ -193,6 +237,15 @@ impl<'s> Examples<'s> {
     pub fn linked_joint(&self) -> String {
         let long = (1..).zip(self.joints).find(|(_, joint)| joint.a != 0.0);
         long.map_or(self.first(), |(number, _)| number).to_string()
+    }
+
+    pub fn mount(&self) -> String {
+        self.moving_joint()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn covariate(&self) -> String {
+        "\"tilt_deg\"".to_owned()
     }
 
     pub fn beam(&self) -> String {

@@ -21,6 +21,8 @@ pub struct PoseConditions<V = Vec<f64>> {
     pub elapsed: f64,
     /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
     pub approach: Option<V>,
+    /// Values of the problem's own covariates, in their order and units; empty: not known.
+    pub covariates: V,
 }
 
 /// Conditions of a pose whose numbers are kept elsewhere.
@@ -30,6 +32,22 @@ impl<'a> PoseView<'a> {
     /// A configuration, shape = (joints) \[rad\] or \[m\], of which nothing else is known.
     pub fn of(configuration: &'a [f64]) -> Self {
         Self { configuration, ..Self::default() }
+    }
+}
+
+impl PoseView<'_> {
+    /// The same with numbers of its own.
+    pub fn to_owned(&self) -> PoseConditions {
+        PoseConditions {
+            configuration: self.configuration.to_vec(),
+            payload: self.payload,
+            hoist: self.hoist,
+            temperature: self.temperature,
+            time: self.time,
+            elapsed: self.elapsed,
+            approach: self.approach.map(<[f64]>::to_vec),
+            covariates: self.covariates.to_vec(),
+        }
     }
 }
 
@@ -44,6 +62,7 @@ impl PoseConditions {
             time: self.time,
             elapsed: self.elapsed,
             approach: self.approach.as_deref(),
+            covariates: &self.covariates,
         }
     }
 }
@@ -61,6 +80,8 @@ pub struct PoseRanges {
     pub temperature: Option<(f64, f64)>,
     /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
     pub approach: bool,
+    /// Range of each of the problem's own covariates, in its unit; empty: not known.
+    pub covariates: Vec<(f64, f64)>,
 }
 
 impl PoseRanges {

@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::dialect::{self, Dialect};
+use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
 /// Most files of measurements.
 const MOST_FILES: usize = 1000;
+/// Most covariates of one's own: each is looked for at every joint.
+const MOST_COVARIATES: usize = 20;
 
 /// `[data]`.
 #[derive(Debug, Clone)]
@@ -29,11 +32,24 @@ pub struct Data {
     pub fits_orientation: bool,
     /// How the files are written.
     pub dialect: Dialect,
+    /// Further columns that errors of the arm may depend on, in the order of the file.
+    pub covariates: Vec<OwnCovariate>,
     /// Where `files` stands, or `[data]`, for errors.
     pub files_location: Location,
     /// Where `held_out` stands, or `[data]`, for errors.
     pub held_out_location: Location,
     /// Where `[data]` stands, for errors.
+    pub location: Location,
+}
+
+/// A line of `[data.covariates]`: a column of one's own, in its own unit.
+#[derive(Debug, Clone)]
+pub struct OwnCovariate {
+    /// Name of the column.
+    pub name: String,
+    /// What it is, in words.
+    pub meaning: String,
+    /// For errors.
     pub location: Location,
 }
 
@@ -88,6 +104,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
             orientation_sigma: None,
             fits_orientation: false,
             dialect: Dialect::default(),
+            covariates: Vec::new(),
             files_location: location.clone(),
             held_out_location: location.clone(),
             location,
@@ -119,6 +136,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let orientation_sigma =
         section.positive("orientation_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
     let dialect = dialect::read(&mut section)?;
+    let covariates = section.section("covariates")?.map_or(Ok(Vec::new()), |section| covariates(&section))?;
     section.finish()?;
     Ok(Data {
         files,
@@ -129,10 +147,27 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         orientation_sigma,
         fits_orientation: orientation_sigma.is_some(),
         dialect,
+        covariates,
         files_location,
         held_out_location,
         location,
     })
+}
+
+/// `name = "what it is"`, one a line.
+fn covariates(section: &Section<'_, '_>) -> Result<Vec<OwnCovariate>, InputError> {
+    let entries = section.entries();
+    if let Some((_, item)) = entries.first() {
+        item.check_count("covariates", entries.len(), MOST_COVARIATES)?;
+    }
+    let one = |(name, item): (&str, Item<'_, '_>)| {
+        // Names of parameters have it between brackets, behind a comma.
+        if name.trim() != name || name.is_empty() || name.contains(['[', ']', ',', '*', '?', '"']) {
+            return Err(item.error(InputErrorKind::NoCovariateName { name: name.to_owned() }));
+        }
+        Ok(OwnCovariate { name: name.to_owned(), meaning: item.text()?.to_owned(), location: item.location() })
+    };
+    entries.into_iter().map(one).collect()
 }
 
 fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::argument::{Argument, Examples, Reader};
+use super::argument::{Argument, Examples, Mount, Reader};
 use super::{Data, Equilibrium, Joint, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 
@@ -63,7 +63,7 @@ macro_rules! effects {
             pub fn arguments(&self) -> Vec<(&'static str, Argument)> {
                 match self {
                     $(Self::$variant $({ $($field),+ })? => {
-                        vec![$($((key!($field $($key)?), $field.into())),+)?]
+                        vec![$($(keyed(key!($field $($key)?), $field.into())),+)?]
                     })+
                     Self::Custom(own) if own.place.is_empty() => Vec::new(),
                     Self::Custom(own) => vec![("place", Argument::Name(own.place.clone()))],
@@ -134,6 +134,13 @@ effects! {
     TrackerDrift "tracker-drift"
     /// Measured positions are moved by d from a time on.
     StationShift "station-shift" { at_time: f64 = time as "at_time_s" }
+    /// Δθ of a joint, or a small motion of the base, in proportion to one of the problem's own covariates.
+    Covariate "covariate" { joint: Mount = mount, of: String = covariate }
+}
+
+/// An argument with its key.
+fn keyed(field: &'static str, argument: Argument) -> (&'static str, Argument) {
+    (argument.key(field), argument)
 }
 
 /// `name = { key = value }`; without arguments `name = true`.
@@ -170,6 +177,14 @@ impl Effect {
         )
     }
 
+    /// The covariate of one's own that it follows.
+    pub fn covariate(&self) -> Option<&str> {
+        match self {
+            Self::Covariate { of, .. } => Some(of),
+            _ => None,
+        }
+    }
+
     /// Whether it depends on the side from which joints come.
     pub fn has_sides(&self) -> bool {
         matches!(self, Self::Backlash { .. })
@@ -193,7 +208,7 @@ impl Effect {
     }
 
     /// Why it could never act on this arm: the declared model has it already, or has nothing for it to act on.
-    pub(super) fn refusal(&self, statics: Statics, joints: &[Joint], data: &Data) -> Option<InputErrorKind> {
+    pub(crate) fn refusal(&self, statics: Statics, joints: &[Joint], data: &Data) -> Option<InputErrorKind> {
         let hoisted = || joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
         match self {
             Self::LinkBending { joint } if joints.get(joint.wrapping_sub(1)).is_none_or(|own| own.a == 0.0) => {
@@ -203,6 +218,10 @@ impl Effect {
                 Some(InputErrorKind::InEquilibriumAlready)
             }
             Self::HoistForce | Self::HoistDirection if !hoisted() => Some(InputErrorKind::NoHoist),
+            Self::Covariate { of, .. } if !data.covariates.iter().any(|own| own.name == *of) => {
+                let known = data.covariates.iter().map(|own| own.name.clone()).collect();
+                Some(InputErrorKind::UnknownCovariate { name: of.clone(), known })
+            }
             effect if effect.is_thermal() && data.reference_temperature.is_none() => {
                 Some(InputErrorKind::NeedsTemperature { write: "reference_temperature_C in [data]" })
             }

@@ -24,10 +24,10 @@ mod standard;
 
 use nalgebra::Vector3;
 
-pub use argument::Argument;
+pub use argument::{Argument, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
-pub use data::{Data, HeldOut, JointSource};
+pub use data::{Data, HeldOut, JointSource, OwnCovariate};
 pub use dialect::{ColumnOf, ColumnRule, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};

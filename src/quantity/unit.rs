@@ -48,6 +48,10 @@ pub enum Unit {
     LengthPerAngle,
     /// [rad/m]
     AnglePerLength,
+    /// Per unit of a covariate [rad/unit]
+    AnglePerUnit,
+    /// Per unit of a covariate [m/unit]
+    LengthPerUnit,
     /// A small part: rad/rad, m/m
     Ratio,
     /// A number of order 1
@@ -151,6 +155,14 @@ impl Unit {
             }
             Self::LengthPerAngle => row("a length per angle", "m/rad", &[], As(1e3, "mm/rad")),
             Self::AnglePerLength => row("an angle per length", "rad/m", &[], As(DEGREES, "°/m")),
+            Self::AnglePerUnit => {
+                let suffixes = const { &[suffix("deg_per_unit", f64::to_radians), si("rad_per_unit")] };
+                row("an angle per unit of a covariate", "rad/unit", suffixes, As(DEGREES, "°/unit"))
+            }
+            Self::LengthPerUnit => {
+                let suffixes = const { &[si("m_per_unit"), suffix("mm_per_unit", |x| x / 1000.0)] };
+                row("a length per unit of a covariate", "m/unit", suffixes, As(1e3, "mm/unit"))
+            }
             Self::Ratio => row("a ratio", "1", const { &[si("relative")] }, As(1e3, "‰")),
             Self::Number => row("a ratio", "1", const { &[si("relative")] }, Plain),
         }

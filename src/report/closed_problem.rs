@@ -164,6 +164,7 @@ fn arguments(effect: &Effect) -> Value {
             Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
             Argument::Name(name) => Value::from(name),
             Argument::Time(time) => Value::from(time),
+            Argument::Base(there) => Value::from(there),
         };
         (key, value)
     };

@@ -104,7 +104,7 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
         code("problem.closed.toml"),
     )];
     let range = |(covariate, range): &(Covariate, (f64, f64))| {
-        let (factor, unit) = unit(problem, *covariate);
+        let (factor, unit) = unit(problem, covariate);
         format!("{covariate} from {} to {}{unit}", number(range.0 * factor, 2), number(range.1 * factor, 2))
     };
     let ranges: Vec<String> = ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
@@ -119,13 +119,13 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
 }
 
 /// Factor from SI to the unit in which people read a quantity of the poses.
-pub(super) fn unit(problem: &Problem, covariate: Covariate) -> (f64, &'static str) {
+pub(super) fn unit(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
     match covariate {
         Covariate::Temperature => (1.0, " °C"),
         Covariate::Time => (1.0 / 3600.0, " h"),
         Covariate::Payload => (1.0, " kg"),
         Covariate::Hoist => (1.0, " N"),
-        Covariate::Command(joint) if problem.joints[joint].kind == JointKind::Prismatic => (1e3, " mm"),
+        Covariate::Command(joint) if problem.joints[*joint].kind == JointKind::Prismatic => (1e3, " mm"),
         Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
         _ => (1.0, ""),
     }

@@ -2,7 +2,7 @@
 
 use super::Rig;
 use super::effect::{Cause, Shape, TrueEffect};
-use crate::problem::{Effect, PoseConditions};
+use crate::problem::{Effect, Mount, PoseConditions};
 
 impl Rig {
     /// By how much the coordinate of the joint with this number misses its command, without any load \[rad\] or \[m\].
@@ -35,12 +35,21 @@ impl Rig {
                         * conditions.approach.as_ref().and_then(|sides| sides.get(number - 1)).copied().unwrap_or(0.0)
                 }
                 (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),
+                (Effect::Covariate { joint: Mount::Joint(joint), of }, [rate]) if *joint == number => {
+                    rate * self.covariate(of, conditions)
+                }
                 (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => factor * of(*from),
                 _ => 0.0,
             },
             _ => 0.0,
         };
         self.effects.iter().map(part).sum()
+    }
+
+    /// One of the problem's own covariates, in its unit; 0 where nobody knows.
+    pub(super) fn covariate(&self, name: &str, conditions: &PoseConditions) -> f64 {
+        let own = self.arm.data.covariates.iter().zip(&conditions.covariates);
+        own.filter(|(own, _)| own.name == name).map(|(_, value)| *value).sum()
     }
 
     /// T − T₀ [°C].

@@ -53,6 +53,8 @@ pub struct Simulation {
     pub rows: Vec<Row>,
     /// Name of the column that marks held-out rows.
     pub split_column: String,
+    /// Names of the columns of the problem's own covariates, where the poses have them.
+    pub(super) covariates: Vec<String>,
 }
 
 /// Why there are no measurements.
@@ -128,6 +130,7 @@ pub fn simulate_poses(
         row.conditions = PoseConditions {
             temperature: given.temperature.or(drawn.temperature),
             approach: given.approach.clone().or(drawn.approach),
+            covariates: if given.covariates.is_empty() { drawn.covariates } else { given.covariates.clone() },
             time: drawn.time,
             elapsed: drawn.elapsed,
             ..given
@@ -148,6 +151,8 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
         row.position += position;
         row.orientation = row.orientation.map(|noise| noise * orientation);
     }
+    let known = rows.first().is_some_and(|row| !row.conditions.covariates.is_empty());
+    let names = problem.data.covariates.iter().filter(|_| known).map(|own| own.name.clone()).collect();
     let split_column = match &problem.data.held_out {
         Some(HeldOut::Column(name)) => name.clone(),
         _ => "split".to_owned(),
@@ -161,6 +166,7 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
         rig,
         rows,
         split_column,
+        covariates: names,
     })
 }
 
@@ -223,6 +229,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
             let signed = sides.map(|side| if random.random::<bool>() { side } else { -side });
             conditions.approach = Some(signed.collect());
         }
+        conditions.covariates = ranges.covariates.iter().map(|&range| between(&mut random, range)).collect();
         rows.push(Row { conditions, position: Vector3::zeros(), orientation: None, held_out: false });
     }
     rows

@@ -1,6 +1,6 @@
 //! Effects that the rig injects: what the catalogue names, one thing that it does not, and how strong they are.
 
-use crate::problem::{Effect, Joint, JointKind};
+use crate::problem::{Effect, Joint, JointKind, Mount};
 use crate::quantity::Unit;
 
 /// What makes the arm differ from its declared model.
@@ -122,6 +122,13 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
         Effect::StationShift { .. } => xyz(Unit::Length),
+        Effect::Covariate { joint: Mount::Joint(joint), .. } => {
+            named(&[("rate", if slides(joint) { Unit::LengthPerUnit } else { Unit::AnglePerUnit })])
+        }
+        Effect::Covariate { joint: Mount::Base, .. } => {
+            let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::AnglePerUnit));
+            named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
+        }
         // The rig knows the laws of the catalogue alone.
         Effect::Custom(_) => Vec::new(),
     }

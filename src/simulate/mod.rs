@@ -28,7 +28,7 @@ mod truth;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::problem::{Effect, PoseConditions, Problem};
+use crate::problem::{Effect, Mount, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::AtRest;
 
@@ -82,12 +82,26 @@ impl Rig {
     pub fn pose(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
         let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
+        let base = self.mounted(conditions).seen(&base);
         let seen = base.point(&rest.end.point(&self.arm.tool.target));
         let axes = base.seen(&rest.end).axes;
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(self.arm.tool.rotation);
         let finite = seen.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());
         if finite { Ok((self.track(seen, conditions), orientation)) } else { Err(NoRest) }
+    }
+
+    /// Where the floor is, as covariates move it, measuring frame.
+    fn mounted(&self, conditions: &PoseConditions) -> Frame<f64> {
+        let (mut turn, mut moved) = (Vector3::zeros(), Vector3::zeros());
+        for part in self.effects.iter().filter_map(TrueEffect::parts) {
+            if let (Effect::Covariate { joint: Mount::Base, of }, [rx, ry, rz, x, y, z]) = part {
+                let value = self.covariate(of, conditions);
+                turn += Vector3::new(*rx, *ry, *rz) * value;
+                moved += Vector3::new(*x, *y, *z) * value;
+            }
+        }
+        Frame::from_rotation_vector(moved, &turn)
     }
 
     /// What the tracker makes of a position \[m\].

@@ -61,6 +61,7 @@ impl Simulation {
             (true, "time_s"),
         ];
         names.extend(columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
+        names.extend(self.covariates.iter().cloned());
         if set.approach.is_some() {
             names.extend(self.moving().map(|(index, _)| format!("approach{}", index + 1)));
         }
@@ -82,6 +83,7 @@ impl Simulation {
         cells.extend(set.hoist.map(|force| format!("{force:.3}")));
         cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
         cells.push(format!("{:.1}", set.time));
+        cells.extend(set.covariates.iter().map(f64::to_string));
         if let Some(approach) = &set.approach {
             cells.extend(self.moving().map(|(index, _)| approach.get(index).unwrap_or(&0.0).to_string()));
         }

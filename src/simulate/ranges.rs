@@ -4,7 +4,7 @@ use super::truth::HeldOutRows;
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
-use crate::problem::{Joint, JointKind, PoseRanges};
+use crate::problem::{JointKind, PoseRanges, Problem};
 use crate::quantity::Unit;
 
 /// Part of the rows that is held out where the file says nothing.
@@ -15,19 +15,20 @@ const TIME_STEP: f64 = 60.0;
 /// Ranges, the time from one pose to the next \[s\], and which rows are held out.
 pub(super) fn read(
     mut section: Section<'_, '_>,
-    joints: &[Joint],
+    problem: &Problem,
 ) -> Result<(PoseRanges, (f64, f64), HeldOutRows), InputError> {
-    let joints = joints.iter().enumerate();
+    let joints = problem.joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.commanded()));
     let joints = joints.collect::<Result<_, _>>()?;
     let payloads = payloads(&mut section)?;
     let hoist = range(&mut section, "hoist", Unit::Force)?;
     let temperature = range(&mut section, "temperature", Unit::Temperature)?;
     let time_step = time_step(&mut section)?;
+    let covariates = section.section("covariates")?.map_or(Ok(Vec::new()), |own| covariates(own, problem))?;
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
     section.finish()?;
-    Ok((PoseRanges { joints, payloads, hoist, temperature, approach }, time_step, held_out))
+    Ok((PoseRanges { joints, payloads, hoist, temperature, approach, covariates }, time_step, held_out))
 }
 
 fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {
@@ -41,6 +42,15 @@ fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) ->
     );
     let missing = |section: &Section<'_, '_>| section.missing(&base, format!("{} = [from, to]", unit.spelled(&base)));
     range(section, &base, unit)?.ok_or_else(|| missing(section))
+}
+
+/// `name = [from, to]` of each of the problem's own covariates, in its unit.
+fn covariates(mut section: Section<'_, '_>, problem: &Problem) -> Result<Vec<(f64, f64)>, InputError> {
+    let own = problem.data.covariates.iter();
+    let all = own.map(|own| pair(&section.require(&own.name, &format!("{} = [from, to]", own.name))?));
+    let all = all.collect::<Result<_, _>>()?;
+    section.finish()?;
+    Ok(all)
 }
 
 /// `base_unit = [from, to]` \[SI\].

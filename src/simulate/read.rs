@@ -65,7 +65,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     }?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
-    let (poses, time_step, held_out) = ranges::read(section, &problem.joints)?;
+    let (poses, time_step, held_out) = ranges::read(section, problem)?;
     let effects = strengths::read(root, problem, &poses)?;
     Ok(Truth {
         parameters,

@@ -28,6 +28,15 @@ fn one(mut section: Section<'_, '_>, problem: &Problem, poses: &PoseRanges) -> R
     } else {
         Cause::Catalogued(effect(name, &item, &problem.joints)?)
     };
+    if let Cause::Catalogued(effect) = &cause
+        && let Some(kind) = effect.refusal(problem.statics, &problem.joints, &problem.data)
+        && effect.covariate().is_some()
+    {
+        return Err(item.error(kind));
+    }
+    if matches!(&cause, Cause::Catalogued(effect) if effect.covariate().is_some()) && poses.covariates.is_empty() {
+        return Err(item.error(InputErrorKind::NeedsColumn { write: "covariates = { name = [from, to] } in [poses]" }));
+    }
     check_temperature(&cause, &item, problem, poses)?;
     let keys = keys(&cause, &problem.joints);
     let mut values = Vec::with_capacity(keys.len());

@@ -5,7 +5,9 @@ use std::path::Path;
 use flexcal::error::Location;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
-use flexcal::problem::{Effect, EffectDeclaration, Equilibrium, JointKind, PoseConditions, Problem};
+use flexcal::problem::{
+    Effect, EffectDeclaration, Equilibrium, JointKind, Mount, OwnCovariate, PoseConditions, Problem,
+};
 use flexcal::simulate::{Cause, TrueEffect};
 use nalgebra::DVector;
 use rand::RngExt as _;
@@ -27,6 +29,7 @@ pub fn lunar() -> (Problem, Vec<Strong>) {
 pub fn odd() -> (Problem, Vec<Strong>) {
     let mut arm = parse(ODD);
     arm.data.reference_temperature = Some(20.0);
+    arm.data.covariates = covariates(&["tilt_deg", "oil_bar"]);
     let lower = || "lower".to_owned();
     let all = vec![
         (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
@@ -54,8 +57,22 @@ pub fn odd() -> (Problem, Vec<Strong>) {
         (Effect::TrackerScale, vec![5e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+        (Effect::Covariate { joint: Mount::Joint(4), of: "tilt_deg".to_owned() }, vec![2e-5]),
+        (Effect::Covariate { joint: Mount::Joint(3), of: "oil_bar".to_owned() }, vec![3e-6]),
+        (
+            Effect::Covariate { joint: Mount::Base, of: "tilt_deg".to_owned() },
+            vec![2e-3, -1e-3, 3e-3, 1e-4, 2e-4, -3e-4],
+        ),
     ];
     (arm, all)
+}
+
+/// Columns of one's own.
+fn covariates(names: &[&str]) -> Vec<OwnCovariate> {
+    let location = Location::file(Path::new("problem.toml"));
+    let own =
+        |name: &&str| OwnCovariate { name: (*name).to_owned(), meaning: String::new(), location: location.clone() };
+    names.iter().map(own).collect()
 }
 
 /// The arm with an effect declared; that of equilibrium needs the statics without it.
@@ -84,6 +101,7 @@ pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng
     rows.temperature = Some((0..count).map(|_| rng.random_range(10.0..35.0)).collect());
     rows.time = (0..count).map(|k| 60.0 + 90.0 * k as f64).collect();
     rows.time_measured = true;
+    rows.covariates = (0..count * arm.data.covariates.len()).map(|_| rng.random_range(-3.0..9.0)).collect();
     let side = |k: usize, rng: &mut ChaCha8Rng| match arm.joints[k % n].kind {
         JointKind::Fixed => 0.0,
         _ if rng.random() => 1.0,
@@ -95,17 +113,7 @@ pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng
 
 /// What was set in a row, for the rig.
 pub fn conditions(rows: &Measurements, row: usize) -> PoseConditions {
-    let n = rows.joints;
-    let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-    PoseConditions {
-        configuration: rows.configuration(row).to_vec(),
-        payload: at(&rows.payload),
-        hoist: at(&rows.hoist),
-        temperature: at(&rows.temperature),
-        time: rows.time[row],
-        elapsed: rows.time[row] - rows.time[0],
-        approach: rows.approach.as_ref().map(|all| all[row * n..(row + 1) * n].to_vec()),
-    }
+    rows.conditions(row)
 }
 
 /// Numbers of the parameters of effects.

@@ -31,7 +31,7 @@ fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
     for (k, value) in of_effects(model).into_iter().zip(values) {
         let parameter = &model.parameters[k];
         let size = if parameter.nominal == 0.0 { value.abs() } else { 0.1 };
-        step[k] = 3.0 * size.max(1e-3 * parameter.sigma.unwrap());
+        step[k] = 3.0 * size.max(1e-3 * parameter.sigma.unwrap_or(0.0));
     }
     step
 }

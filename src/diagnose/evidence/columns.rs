@@ -181,6 +181,10 @@ impl<'a, 'l> Columns<'a, 'l> {
             };
             all.extend(poses.iter().map(of).collect::<Option<Vec<f64>>>().map(|values| (covariate, values)));
         }
+        for which in 0..self.problem.data.covariates.len() {
+            let own = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
+            all.extend(own.collect::<Option<Vec<f64>>>().map(|values| (Covariate::own(which, self.problem), values)));
+        }
         let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
         all.push((time, poses.iter().map(|pose| pose.setup.elapsed).collect()));
         for (joint, _) in moving {
@@ -214,7 +218,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Smooth functions of one covariate at some columns that belong together.
     fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
         let hypothesis =
-            |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate] };
+            |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate.clone()] };
         // Of two values a function is the effect that the catalogue has.
         if of.levels < 3 {
             return;
@@ -230,7 +234,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             // What settles changes fast at first.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
-            if let Some(warped) = Known::of(of.covariate, logarithm, self.weighed) {
+            if let Some(warped) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
                 self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&warped.scaled, 0.25)));
             }
         }
@@ -240,7 +244,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn surfaces(&mut self, slot: Slot, at: &DVector<f64>, known: &[Known]) {
         for (k, one) in known.iter().enumerate() {
             for other in &known[k + 1..] {
-                if goes_with(one.covariate, other.covariate) {
+                if goes_with(&one.covariate, &other.covariate) {
                     self.surface("surface", slot, &[at], (one, other));
                 }
             }
@@ -248,7 +252,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     fn surface(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], (one, other): (&Known, &Known)) {
-        let mut depends_on = vec![one.covariate, other.covariate];
+        let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
         let hypothesis = Hypothesis { law: Law::Smooth, part: Part::of(slot), slot: Some(slot), depends_on };
         let length = self.rules.surface_length;
@@ -276,7 +280,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 let angle = f64::from(order) * known.values[row];
                 slow[(row, j % k)] * if j < k { angle.sin() } else { angle.cos() }
             });
-            let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate]);
+            let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate.clone()]);
             let hypothesis = Hypothesis { law, part: Part::Joint(joint), slot: Some(slot), depends_on };
             self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || times(&[at], &waves));
         }

@@ -82,7 +82,7 @@ impl Known {
 }
 
 /// Whether a function of these two is looked for.
-pub(super) fn goes_with(one: Covariate, other: Covariate) -> bool {
+pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
     match (one, other) {
         (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),

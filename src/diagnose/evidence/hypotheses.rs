@@ -95,7 +95,7 @@ impl<'a> Hypotheses<'a> {
 
     /// Their ranges where hypotheses were weighed.
     pub fn ranges(&self, hypothesis: &Hypothesis) -> Vec<(Covariate, (f64, f64))> {
-        self.covariates(hypothesis).map(|known| (known.covariate, known.range)).collect()
+        self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
     }
 
     /// For each pose from number `first` on, whether it is within those ranges.
@@ -110,6 +110,6 @@ impl<'a> Hypotheses<'a> {
         let slot = hypothesis.slot.filter(|slot| matches!(slot, Slot::Joint { .. }))?;
         let mut covariates = self.covariates(hypothesis);
         let (only, None) = (covariates.next()?, covariates.next()) else { return None };
-        Some((only.covariate, slot, &only.values, self.linearised.place(slot)?))
+        Some((only.covariate.clone(), slot, &only.values, self.linearised.place(slot)?))
     }
 }

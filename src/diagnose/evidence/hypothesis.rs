@@ -43,7 +43,7 @@ impl Part {
                     Field::Mixing => Self::Arm,
                 }
             }
-            Slot::Base { .. } => Self::Base,
+            Slot::Base { .. } | Slot::Turn { .. } => Self::Base,
             Slot::Target { .. } => Self::Payload,
             Slot::Shift { .. } | Slot::Scale => Self::Measurement,
         }
@@ -100,8 +100,10 @@ impl Hypothesis {
     pub fn of_effect(effect: &Effect, problem: &Problem, approach_known: bool, time_measured: bool) -> Self {
         let terms = effect.terms(problem);
         let part = terms.first().map_or(Part::Arm, |term| Part::of(term.slot));
-        let mut depends_on: Vec<Covariate> =
-            terms.iter().map(|term| covariate(term.slot, term.driver, approach_known, time_measured)).collect();
+        let mut depends_on: Vec<Covariate> = terms
+            .iter()
+            .map(|term| covariate(term.slot, term.driver, problem, (approach_known, time_measured)))
+            .collect();
         depends_on.sort();
         depends_on.dedup();
         Self { law: Law::Effect(effect.clone()), part, slot: None, depends_on }
@@ -122,16 +124,22 @@ impl Hypothesis {
 }
 
 /// What a parameter depends on by what drives it, or by the physics of where it enters.
-fn covariate(slot: Slot, driver: Driver, approach_known: bool, time_measured: bool) -> Covariate {
-    let time = Covariate::of(Quantity::Elapsed, time_measured);
+fn covariate(
+    slot: Slot,
+    driver: Driver,
+    problem: &Problem,
+    (approach_known, time_measured): (bool, bool),
+) -> Covariate {
+    let time = Covariate::of(Quantity::Elapsed, problem, time_measured);
     match driver {
         Driver::Command(joint) | Driver::Travel(joint) | Driver::Sine(joint, _) | Driver::Cosine(joint, _) => {
             Covariate::Command(joint)
         }
         Driver::Warming { .. } => Covariate::Temperature,
         Driver::Elapsed | Driver::Since(_) => time,
+        Driver::Covariate(which) => Covariate::own(which, problem),
         Driver::Spline { of, .. } | Driver::Bump { of, .. } | Driver::Step { of, .. } => {
-            Covariate::of(of, time_measured)
+            Covariate::of(of, problem, time_measured)
         }
         _ => match slot {
             Slot::Joint { joint, field: JointField::Play | JointField::SlidingPlay } if approach_known => {

@@ -116,8 +116,8 @@ impl ResidualTest {
 
     /// The covariate that the test is about: of a test of order, time or row.
     pub fn about(&self) -> Option<Covariate> {
-        match self.test {
-            Test::Dependence { covariate } => Some(covariate),
+        match &self.test {
+            Test::Dependence { covariate } => Some(covariate.clone()),
             Test::Runs { sequence } | Test::LjungBox { sequence } => Some(match sequence {
                 Sequence::Time => Covariate::Time,
                 Sequence::Rows => Covariate::Row,

@@ -63,7 +63,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
     }
     for CovariateValues { covariate, values } in fit.covariates {
         let statistic = Cumulative::of(values, fit.residual.len() / 3, poses);
-        all.push((Test::Dependence { covariate: *covariate }, statistic.map(Statistic::Dependence)));
+        all.push((Test::Dependence { covariate: covariate.clone() }, statistic.map(Statistic::Dependence)));
     }
     all
 }
@@ -73,7 +73,7 @@ fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
     let mut tests =
         vec![Test::ReducedChiSquared, Test::LackOfFit, Test::Runs { sequence }, Test::LjungBox { sequence }];
-    tests.extend(fit.covariates.iter().map(|of| Test::Dependence { covariate: of.covariate }));
+    tests.extend(fit.covariates.iter().map(|of| Test::Dependence { covariate: of.covariate.clone() }));
     tests.extend([Test::Outliers { worst: None }, Test::Normality]);
     tests.into_iter().map(|test| Tried { test, trial: Err(why.clone()) }).collect()
 }

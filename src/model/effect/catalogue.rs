@@ -4,8 +4,8 @@ use super::coverage::{Columns, DataCoverage};
 use super::custom::custom;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::{
-    backlash, base_compliance, deflected_equilibrium, gear_ratio, gravity_direction, hoist_direction, hoist_force,
-    joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance, joint_nonlinear_stiffness,
+    backlash, base_compliance, covariate, deflected_equilibrium, gear_ratio, gravity_direction, hoist_direction,
+    hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance, joint_nonlinear_stiffness,
     joint_thermal_drift, link_bending, link_thermal_bending, link_thermal_expansion, payload_mass, station_shift,
     tracker_drift, tracker_scale, unmodelled_mass,
 };
@@ -13,7 +13,7 @@ use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 21] = [
+pub const FAMILIES: [&Family; 22] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &gear_ratio::FAMILY,
@@ -35,6 +35,7 @@ pub const FAMILIES: [&Family; 21] = [
     &tracker_scale::FAMILY,
     &tracker_drift::FAMILY,
     &station_shift::FAMILY,
+    &covariate::FAMILY,
 ];
 
 /// Every effect of the catalogue that is conceivable on an arm, with the reason why these data cannot show it.

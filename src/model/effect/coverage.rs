@@ -19,6 +19,8 @@ pub struct DataCoverage {
     pub ranges: Vec<(f64, f64)>,
     /// Times between which a station may have moved \[s\], ascending.
     pub times: Vec<f64>,
+    /// For each of the problem's own covariates, whether it is known and changes.
+    pub covariates: Vec<bool>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
 }
@@ -49,6 +51,8 @@ pub struct Columns {
     pub temperature: bool,
     /// Directions of approach.
     pub approach: bool,
+    /// The problem's own covariates.
+    pub covariates: bool,
 }
 
 /// The column that an effect of the temperature needs, where it is not there.

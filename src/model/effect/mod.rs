@@ -12,6 +12,7 @@
 mod backlash;
 mod base_compliance;
 mod catalogue;
+mod covariate;
 mod coverage;
 mod custom;
 mod deflected_equilibrium;

@@ -29,6 +29,8 @@ pub enum Driver {
     Elapsed,
     /// 1 from a time on \[s\], 0 before.
     Since(f64),
+    /// One of the problem's own covariates, counted from 0, in its unit.
+    Covariate(usize),
     /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
     Spline {
         /// The quantity.
@@ -72,6 +74,8 @@ pub enum Quantity {
     Payload,
     /// Hoist force \[N\].
     Hoist,
+    /// One of the problem's own covariates, counted from 0, in its unit.
+    Covariate(usize),
 }
 
 impl Quantity {
@@ -83,6 +87,7 @@ impl Quantity {
             Self::Elapsed => setup.elapsed,
             Self::Payload => setup.payload.unwrap_or(0.0),
             Self::Hoist => setup.hoist.unwrap_or(0.0),
+            Self::Covariate(which) => setup.covariates.get(which).copied().unwrap_or(0.0),
         }
     }
 }
@@ -98,6 +103,7 @@ impl Driver {
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
+            Self::Covariate(which) => Quantity::Covariate(which).value(setup),
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
         }
     }
@@ -140,7 +146,12 @@ impl Driver {
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
                 matches!(of, Quantity::Command(_))
             }
-            Self::Constant | Self::Unit | Self::Warming { .. } | Self::Elapsed | Self::Since(_) => false,
+            Self::Constant
+            | Self::Unit
+            | Self::Warming { .. }
+            | Self::Elapsed
+            | Self::Since(_)
+            | Self::Covariate(_) => false,
         }
     }
 

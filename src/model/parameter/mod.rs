@@ -68,6 +68,8 @@ pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
         (Driver::Warming { .. }, Unit::Angle) => Unit::AnglePerDegree,
         (Driver::Warming { .. }, _) => Unit::LengthPerDegree,
         (Driver::Elapsed, _) => Unit::Speed,
+        (Driver::Covariate(_), Unit::Angle) => Unit::AnglePerUnit,
+        (Driver::Covariate(_), _) => Unit::LengthPerUnit,
         (Driver::Command(_), Unit::Length) => Unit::LengthPerAngle,
         (Driver::Travel(_), Unit::Angle) => Unit::AnglePerLength,
         (Driver::Command(_) | Driver::Travel(_), _) => Unit::Ratio,

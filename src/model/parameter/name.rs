@@ -41,6 +41,11 @@ pub enum Slot {
         /// 0..3.
         axis: usize,
     },
+    /// A turn of every base about an axis of the measuring frame, through that frame's origin; a driver's alone.
+    Turn {
+        /// 0..3.
+        axis: usize,
+    },
     /// A relative error of every measured coordinate.
     Scale,
 }
@@ -256,6 +261,7 @@ impl Slot {
                 ArmField::GravityX | ArmField::GravityY => Unit::Angle,
             },
             Self::Base { axis, .. } | Self::Target { axis, .. } if axis >= 3 => Unit::Angle,
+            Self::Turn { .. } => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
             Self::Scale => Unit::Ratio,
         }
@@ -271,7 +277,7 @@ impl Slot {
                 !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)
             }
             Self::Arm(_) => true,
-            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } | Self::Scale => false,
+            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } | Self::Turn { .. } | Self::Scale => false,
         }
     }
 

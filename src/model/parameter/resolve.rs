@@ -100,7 +100,8 @@ pub fn resolve(
         let none = Quantities::default();
         let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.of_effect) {
             (Some(Freedom::Free { sigma, min, max }), _) => (of_kind(sigma, candidate.unit()), min, max),
-            (None, Some(sigma)) => (Some(sigma), &none, &none),
+            // Of a unit that nobody knows there is no size that is too great.
+            (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
         };
         if candidate.slot.turns_target() && !problem.data.fits_orientation {

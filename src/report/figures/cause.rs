@@ -13,7 +13,7 @@ use super::frame::{
 };
 use crate::diagnose::{Covariate, Unexplained};
 use crate::model::parameter::{EffectParameter, JointField, Slot};
-use crate::problem::{Effect, JointKind, PoseView, Problem};
+use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
 
 /// Steps of a curve.
@@ -200,6 +200,12 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
             let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(t), ..PoseView::of(&[]) }));
             (joint, Quantity::temperature(), rows.temperatures(), lever(joint), law)
         }
+        Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
+            let which = problem.data.covariates.iter().position(|own| own.name == *of)?;
+            let value = |pose: &PoseView| pose.covariates.get(which).copied().unwrap_or_default();
+            let values = rows.poses.iter().map(value).collect();
+            (joint, Quantity::new(of, 1.0), values, lever(joint), Box::new(move |value| first * value))
+        }
         Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
             let across = Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
             let sides = rows.poses.iter().map(|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
@@ -328,6 +334,7 @@ pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
         Covariate::Payload => Quantity::new("payload [kg]", 1.0),
         Covariate::Hoist => Quantity::new("hoist force [N]", 1.0),
         Covariate::Command(joint) => Quantity::command(problem, joint + 1),
+        Covariate::Own(ref name) => Quantity::new(&**name, 1.0),
         _ => return None,
     };
     let most = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
