@@ -136,3 +136,62 @@ fn wrong_maps_are_named() {
         assert!(error.contains(words), "{error}");
     }
 }
+
+/// The arm with two columns of its owner's, and whatever follows `[data.covariates]`.
+fn with_covariates(rest: &str) -> Result<Problem, InputError> {
+    let text =
+        format!("{ARM}[data.covariates]\n'tilt_deg' = 'tilt of the carriage'\n'oil' = 'pressure of the oil'\n{rest}");
+    Problem::parse(&text, Path::new("problem.toml"))
+}
+
+#[test]
+fn covariates_of_ones_own_are_read_in_their_units() {
+    let own = with_covariates("").unwrap();
+    let table = "q1_deg,oil,q2_deg,x_m,y_m,z_m,tilt_deg\n1,100,2,3,4,5,-0.5\n2,101,2,3,4,5,0.25\n";
+    let (rows, warnings) = read(&own, &[("rows.csv", table)]).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!((rows.covariates_of(0), rows.covariates_of(1)), (&[-0.5, 100.0][..], &[0.25, 101.0][..]));
+    assert_eq!(rows.select(&[1]).covariates, [0.25, 101.0]);
+    assert_eq!(rows.conditions(1).covariates, [0.25, 101.0]);
+}
+
+#[test]
+fn wrong_covariates_are_named() {
+    let own = with_covariates("").unwrap();
+    for (table, words) in [
+        ("q1_deg,q2_deg,x_m,y_m,z_m,tilt_deg,oill\n1,2,3,4,5,0,0\n", "rows.csv:1: column oil: missing"),
+        (
+            "q1_deg,q2_deg,x_m,y_m,z_m,tilt_deg,oil\n1,2,3,4,5,0,hot\n",
+            "rows.csv:2: column oil: \"hot\" is not a number",
+        ),
+    ] {
+        let error = read(&own, &[("rows.csv", table)]).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    let poses = tempfile::tempdir().unwrap();
+    fs::write(poses.path().join("poses.csv"), "q1_deg,q2_deg\n1,2\n").unwrap();
+    let files = [poses.path().join("poses.csv")];
+    assert!(Measurements::read_poses(&files, &own).is_ok(), "poses need a covariate only where an effect follows it");
+    let used = with_covariates("[[effect]]\ncovariate = { joint = 2, of = 'oil' }\n").unwrap();
+    let error = Measurements::read_poses(&files, &used).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("poses.csv:1: column oil: missing"), "{error}");
+    for (rest, words) in [
+        ("'a,b' = 'x'\n", "problem.toml:8: data.covariates.\"a,b\": \"a,b\" cannot name a covariate"),
+        (
+            "[[effect]]\ncovariate = { joint = 2, of = 'oile' }\n",
+            "problem.toml:9: effect[1].covariate: no covariate is called \"oile\"",
+        ),
+        ("[[effect]]\ncovariate = { joint = 2, base = true, of = 'oil' }\n", "write joint = … or base = true"),
+        ("[[effect]]\ncovariate = { base = false, of = 'oil' }\n", "write joint = … or base = true"),
+        ("[[effect]]\ncovariate = { of = 'oil' }\n", "effect[1].covariate.joint: missing"),
+        ("[[effect]]\ncovariate = { joint = 2 }\n", "effect[1].covariate.of: missing"),
+    ] {
+        let error = with_covariates(rest).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    let taken =
+        Problem::parse(&format!("{ARM}[data.covariates]\n'time_s' = 'x'\n"), Path::new("problem.toml")).unwrap();
+    let error =
+        read(&taken, &[("rows.csv", "q1_deg,q2_deg,x_m,y_m,z_m,time_s\n1,2,3,4,5,6\n")]).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("problem.toml:6: data.covariates.time_s: \"time_s\" cannot name"), "{error}");
+}

@@ -24,7 +24,7 @@ pub(super) const FAMILY: Family = Family {
         all.collect()
     },
     describe: |effect| match effect {
-        Effect::Covariate { joint: Mount::Joint(joint), of } => format!("joint {joint} turns or slides with {of}"),
+        Effect::Covariate { joint: Mount::Joint(joint), of } => format!("zero of joint {joint} moves with {of}"),
         Effect::Covariate { joint: Mount::Base, of } => format!("the base moves with {of}"),
         _ => String::new(),
     },
