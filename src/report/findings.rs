@@ -9,7 +9,7 @@ object! {
     /// One test; `bounds`: where chance keeps the statistic.
     Entry(check: &ResidualTest) {
         check: &'static str = check.name(),
-        about: Option<String> = check.about().map(named),
+        about: Option<String> = check.about().as_ref().map(named),
         structure: bool = check.is_structure(),
         failed: bool = check.failed(),
         statistic: Option<f64> = check.outcome.as_ref().ok().map(|outcome| outcome.statistic),
@@ -20,8 +20,8 @@ object! {
 }
 
 /// What a test is about: the order of the rows in the plural.
-fn named(covariate: Covariate) -> String {
-    if covariate == Covariate::Row { "rows".to_owned() } else { covariate.to_string() }
+fn named(covariate: &Covariate) -> String {
+    if *covariate == Covariate::Row { "rows".to_owned() } else { covariate.to_string() }
 }
 
 /// Every test.

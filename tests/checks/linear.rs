@@ -92,8 +92,8 @@ impl Linear {
         }
     }
 
-    pub fn covariate(&self, of: Covariate) -> &[f64] {
-        &self.covariates.iter().find(|known| known.covariate == of).unwrap().values
+    pub fn covariate(&self, of: &Covariate) -> &[f64] {
+        &self.covariates.iter().find(|known| known.covariate == *of).unwrap().values
     }
 
     /// Adds a displacement as a function of the pose.
@@ -156,7 +156,7 @@ pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
     let mut linear = Linear::new(poses, unknowns, None, 4000 + seed);
     linear.sigma_is_declared = false;
     let mut data = linear.noise();
-    let covariate = linear.covariate(Covariate::Command(1)).to_vec();
+    let covariate = linear.covariate(&Covariate::Command(1)).to_vec();
     Linear::displace(&mut data, |pose| size * (2.0 * covariate[pose]).sin() * Vector3::new(1.0, 0.5, -1.0));
     let residual = linear.leaves(data);
     linear.check(&residual)
