@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from ._problem import Problem
 from ._progress import Progress
-from ._results import Check, ClosedLoop, Identification, Plan, Trace
+from ._results import Check, ClosedLoop, Export, Identification, Plan, Trace
 from .errors import FlexcalWarning, InputError
 
 __all__ = [
     "Check",
     "ClosedLoop",
+    "Export",
     "FlexcalWarning",
     "Identification",
     "InputError",

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._tables import configurations, warn
+from ._tables import configurations, Shape, warn
 
 Array = npt.NDArray[np.float64]
 
@@ -46,9 +46,9 @@ class Forward:
         InputError
             A mistake in the poses; a session or target of which nothing is known.
         """
-        poses, single = self._poses(q, columns)
+        poses, shape = self._poses(q, columns)
         positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
-        return positions[0] if single else positions
+        return positions[0] if shape.single else positions
 
     def jacobian(self, q: Any, **columns: Any) -> Array:
         """Derivatives of the positions by the configuration, measuring frame [m/rad], of joints that slide [m/m].
@@ -58,18 +58,18 @@ class Forward:
 
         Returns
         -------
-        Shape (poses, 3, joints), or (3, joints) for one configuration; joints that move, or all if ``q`` has all of them (0 at
-        fixed ones); NaN where the arm has no equilibrium.
+        Shape (poses, 3, joints), or (3, joints) for one configuration; joints that move, or all if ``q`` is an array
+        with all of them (0 at fixed ones); NaN where the arm has no equilibrium.
         """
-        poses, single = self._poses(q, columns)
+        poses, shape = self._poses(q, columns)
         units = self._reader.units
         whole = np.frombuffer(self._forward.jacobian(poses), dtype=np.float64).reshape(-1, 3, len(units))
-        if np.shape(q)[-1:] != (len(units),):
+        if not shape.every_joint:
             whole = whole[:, :, [k for k, unit in enumerate(units) if unit is not None]]
-        return whole[0] if single else whole
+        return whole[0] if shape.single else whole
 
-    def _poses(self, q: Any, columns: dict[str, Any]) -> tuple[_core.Poses, bool]:
-        source, single = configurations(q, self._reader.units, columns)
+    def _poses(self, q: Any, columns: dict[str, Any]) -> tuple[_core.Poses, Shape]:
+        source, shape = configurations(q, self._reader.units, columns)
         poses = self._reader.poses(source)
         warn(poses.warnings, stacklevel=3)
-        return poses, single
+        return poses, shape

@@ -11,9 +11,12 @@ from ._progress import Told, told
 from ._results import Check, ClosedLoop, Identification, Plan, Trace
 from ._tables import Data, Path, source, warn
 
-Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only"]
+Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
 Solver: TypeAlias = Literal["auto", "levenberg-marquardt", "gauss-newton", "pseudo-inverse", "bounded"]
 Criterion: TypeAlias = Literal["S", "A", "D", "E"]
+
+TEXT = "<text>"
+"""What messages call a problem in memory."""
 
 
 class Problem(Forward):
@@ -35,11 +38,44 @@ class Problem(Forward):
 
     def __init__(self, problem: str | os.PathLike[str]) -> None:
         if isinstance(problem, str) and "\n" in problem:
-            self._core = _core.Problem.parse(problem, "<text>")
+            self._hold(_core.Problem.parse(problem, TEXT))
         else:
-            self._core = _core.Problem.read(problem)
-        self._forward = self._core
-        self._reader = self._core
+            self._hold(_core.Problem.read(problem))
+
+    @classmethod
+    def from_urdf(cls, path: Path, base: str | None = None, tip: str | None = None) -> Problem:
+        """The chain between two links of a URDF, as ``flexcal init`` writes it (docs/urdf.md).
+
+        ``[parameters]`` frees what measured positions tell apart; ``position_sigma_mm`` is a guess that only your instrument can
+        mend: ``Problem(problem.text.replace(…))``. Joints keep their names, and columns of data may go by them.
+
+        Parameters
+        ----------
+        path
+            The URDF; a xacro has to be expanded first.
+        base
+            Link from which the chain goes; the root, if it is not named.
+        tip
+            Link at its end; the only leaf, if it is not named.
+
+        Raises
+        ------
+        InputError
+            The first mistake in the URDF, with its line; a link that it lacks; several leaves to choose from.
+        """
+        problem = cls.__new__(cls)
+        problem._hold(_core.Problem.from_urdf(path, base, tip, TEXT))
+        return problem
+
+    def _hold(self, core: _core.Problem) -> None:
+        self._core = core
+        self._forward = core
+        self._reader = core
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know of a problem that was made from a URDF (angles that were taken as right ones …)."""
+        return self._core.notes
 
     @property
     def name(self) -> str:

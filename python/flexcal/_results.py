@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pathlib
+import tempfile
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +13,7 @@ import numpy.typing as npt
 
 from . import _html
 from ._forward import Forward
-from ._tables import table, warn
+from ._tables import Path, table, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,8 +81,8 @@ class _Fit(_Result):
         """What the fit leaves, a row for each row of the data, in their order.
 
         Columns: ``file``, ``line`` and what else names the row (``pose``, ``session``, ``target``); ``predicted_x_mm`` …;
-        ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; ``whitened``: its length over 1 σ of a coordinate;
-        ``outlier``; ``held_out``.
+        ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; where orientation is fitted ``predicted_rx_deg`` … and
+        ``residual_rx_deg`` … [°]; ``whitened``: length of all that is left over 1 σ of each part; ``outlier``; ``held_out``.
         """
         return _residuals(self._fit.residuals())
 
@@ -143,6 +145,16 @@ class Identification(_Fit, Forward):
         self._problem = problem
         self._forward = core
         self._reader = problem._core
+
+    def export_urdf(self, urdf: Path) -> Export:
+        """The URDF that the problem came from, with the origins of its chain as they were identified.
+
+        Raises
+        ------
+        InputError
+            It is the URDF of another arm, or its chain ends where no origin could hold what was identified.
+        """
+        return Export(self._fit.export_urdf(urdf))
 
     def _repr_html_(self) -> str:
         return _html.identification(self)
@@ -232,6 +244,51 @@ class Trace(_Result):
 
     def _repr_html_(self) -> str:
         return _html.trace(self)
+
+
+class Export(_Result):
+    """A URDF with the origins of its chain moved, every other byte as it was."""
+
+    def __init__(self, core: _core.Export) -> None:
+        self._core = core
+
+    @property
+    def text(self) -> str:
+        """The whole file."""
+        return str(self._core.text)
+
+    def write(self, file: Path) -> None:
+        """Writes it: whole, or not at all."""
+        file = pathlib.Path(file)
+        with tempfile.TemporaryDirectory(dir=file.parent) as folder:
+            whole = pathlib.Path(folder) / file.name
+            whole.write_bytes(self.text.encode())
+            whole.replace(file)
+
+    @cached_property
+    def origins(self) -> pd.DataFrame:
+        """The origins that have moved, by their joints: ``x_m`` …, ``roll_rad`` … as written, ``moved_mm``, ``turned_deg``."""
+        import pandas as pd
+
+        names = ["x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad", "moved_mm", "turned_deg"]
+        entries = self._document["origins"]
+        rows = [[*own["xyz_m"], *own["rpy_rad"], own["moved_mm"], own["turned_deg"]] for own in entries]
+        return pd.DataFrame(rows, columns=names, index=pd.Index([own["joint"] for own in entries], name="joint"))
+
+    @cached_property
+    def errors(self) -> pd.DataFrame:
+        """Errors on the held-out rows [mm]: of the ``whole`` model, and of the ``rigid`` geometry that the file holds."""
+        import pandas as pd
+
+        return pd.DataFrame([_error(arm, own) for arm, own in self._document["held_out"].items()]).set_index("arm")
+
+    @property
+    def not_held(self) -> list[str]:
+        """What a URDF cannot hold of the model: stiffnesses, effects, base and target."""
+        return list(self._document["not_held"])
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
 
 
 class Check(_Result):
@@ -326,10 +383,12 @@ def _errors(document: dict[str, Any]) -> pd.DataFrame:
     rows = []
     for stage, parts in stages.items():
         for part in ("identification", "held_out"):
-            own = parts[part]
-            rows.append((stage, part, own["n"], *(own[of]["norm"] for of in ("mean_mm", "rms_mm", "max_mm"))))
-    names = ["arm", "rows", "n", "mean_mm", "rms_mm", "max_mm"]
-    return pd.DataFrame(rows, columns=names).set_index(["arm", "rows"])
+            rows.append(_error(stage, parts[part]) | {"rows": part})
+    return pd.DataFrame(rows).set_index(["arm", "rows"])
+
+
+def _error(arm: str, own: dict[str, Any]) -> dict[str, Any]:
+    return {"arm": arm, "n": own["n"]} | {of: own[of]["norm"] for of in ("mean_mm", "rms_mm", "max_mm")}
 
 
 def _effects(entries: list[dict[str, Any]]) -> pd.DataFrame:

@@ -7,7 +7,7 @@ import io
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -43,15 +43,24 @@ def source(data: Data) -> Source:
     return "data", columns
 
 
-def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, Any]) -> tuple[Source, bool]:
-    """Configurations with further columns as a table, and whether it is one configuration alone.
+class Shape(NamedTuple):
+    """How configurations were given."""
+
+    single: bool
+    """One configuration alone, not a row of them."""
+    every_joint: bool
+    """An array with a column for every joint, fixed ones as well."""
+
+
+def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, Any]) -> tuple[Source, Shape]:
+    """Configurations with further columns as a table, and how they were given.
 
     ``units`` holds for each joint the unit of its command, None at fixed joints. A value of ``columns`` may be one for all rows.
     """
     if isinstance(q, (str, os.PathLike, Mapping)) or hasattr(q, "columns") or hasattr(q, "column_names"):
         if columns:
             raise TypeError("columns go into the table of poses itself")
-        return source(q), False
+        return source(q), Shape(single=False, every_joint=False)
     values = np.asarray(q, dtype=np.float64)
     single = values.ndim == 1
     values = np.atleast_2d(values)
@@ -60,14 +69,15 @@ def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, An
         shape = " × ".join(str(size) for size in np.shape(q))
         message = f"q: shape {shape}; an array of shape (poses, joints) has {len(moving)} columns here"
         raise InputError(message, key="q")
-    if values.shape[1] == len(units):
+    every_joint = values.shape[1] == len(units)
+    if every_joint:
         values = values[:, [k for k, unit in enumerate(units) if unit is not None]]
     # Without their numbers joints go by their order among those that move.
     table: dict[str, Any] = {f"q{k + 1}_{unit}": values[:, k] for k, unit in enumerate(moving)}
     for name, value in columns.items():
         one_each = np.ndim(value) > 0
         table[name] = value if one_each else np.full(len(values), value)
-    return source(table), single
+    return source(table), Shape(single, every_joint)
 
 
 def table(text: str) -> pd.DataFrame:

@@ -94,7 +94,7 @@ fn ranges(problem: &Declared, truth: Option<&Path>) -> Result<PoseRanges, Design
 /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
 fn known_ranges(problem: &Declared, truth: Option<&Path>) -> Result<Option<PoseRanges>, DesignError> {
     match ranges(problem, truth) {
-        Err(DesignError::NoRange { .. }) => Ok(None),
+        Err(DesignError::NoRange(_)) => Ok(None),
         other => other.map(Some),
     }
 }
@@ -141,7 +141,7 @@ pub fn check(
     truth: Option<PathBuf>,
     seed: u64,
 ) -> PyResult<Check> {
-    let declared = Arc::clone(&problem.problem);
+    let declared = Arc::clone(&problem.declared);
     let (measured, candidates) = (rows(measured), rows(candidates));
     let check = supervised(py, None, move |_| {
         let truth = truth.as_deref();
@@ -151,7 +151,7 @@ pub fn check(
         };
         design::check(&declared, &judged?, seed)
     })?;
-    Ok(Check { problem: Arc::clone(&problem.problem), check: check.map_err(|error| raised(&error))? })
+    Ok(Check { problem: Arc::clone(&problem.declared), check: check.map_err(|error| raised(&error))? })
 }
 
 /// Chooses the poses that identify best, or that tell two effects apart.
@@ -171,11 +171,11 @@ pub fn plan(
     let criterion = criterion_of(criterion)?;
     let (given, candidates) = (rows(given), rows(candidates));
     let pair = separate.map(|(one, other)| {
-        let effect = |text: &str| problem.problem.effect(text, Path::new("separate"));
-        Pair::new(&problem.problem, [effect(&one)?, effect(&other)?])
+        let effect = |text: &str| problem.declared.effect(text, Path::new("separate"));
+        Pair::new(&problem.declared, [effect(&one)?, effect(&other)?])
     });
     let pair = pair.transpose().map_err(|error| raised(&error))?;
-    let problem = pair.as_ref().map_or_else(|| Arc::clone(&problem.problem), |pair| Arc::new(pair.declared.clone()));
+    let problem = pair.as_ref().map_or_else(|| Arc::clone(&problem.declared), |pair| Arc::new(pair.declared.clone()));
     let declared = Arc::clone(&problem);
     let chosen = criterion.clone();
     let found = supervised(py, None, move |sink| {

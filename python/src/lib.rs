@@ -8,7 +8,9 @@ mod design;
 mod error;
 mod outcome;
 mod problem;
+mod residuals;
 mod supervise;
+mod urdf;
 
 use std::ffi::OsString;
 
@@ -27,6 +29,8 @@ mod _core {
     use super::outcome::{ClosedLoop, Identification, Trace};
     #[pymodule_export]
     use super::problem::Problem;
+    #[pymodule_export]
+    use super::urdf::Export;
 }
 
 /// Runs the command line: the program's name and its arguments; the exit status.

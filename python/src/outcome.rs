@@ -1,18 +1,21 @@
 //! What came of identifications, loops and traces.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexcal::identify::{self, Residual};
-use flexcal::measurement::{Dataset, Labels};
+use flexcal::identify;
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData, Report};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::array::{Array, derivatives, integers, numbers, points};
+use crate::array::{Array, derivatives, numbers, points};
 use crate::data::Poses;
 use crate::error::raised;
+use crate::residuals;
+use crate::urdf::Export;
 
 /// Markdown, page, and name and SVG text of each figure.
 type Pages = (String, String, Vec<(String, String)>);
@@ -91,14 +94,18 @@ impl Identification {
     /// Columns of the residual table.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = py.detach(|| self.found.residuals(&self.problem, &self.data));
-        let residuals = found.map_err(|error| raised(&error))?;
-        table(py, &self.data, &residuals)
+        residuals::table(py, &self.data, &found.map_err(|error| raised(&error))?)
     }
 
     /// Positions of the identified arm, shape = (poses, 3), measuring frame [m].
     fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
         let found = py.detach(|| self.found.predict(&self.problem, &poses.rows));
         Ok(points(py, &found.map_err(|error| raised(&error))?))
+    }
+
+    /// The URDF that the problem came from, with the origins that were identified.
+    fn export_urdf(&self, py: Python<'_>, urdf: PathBuf) -> PyResult<Export> {
+        py.detach(|| Export::new(&urdf, &self.problem, &self.data, &self.found)).map_err(|error| raised(&error))
     }
 
     /// ∂p/∂q of the identified arm, shape = (poses, 3, joints).
@@ -170,36 +177,4 @@ impl Trace {
 
 fn pages(report: Report) -> Pages {
     (report.markdown, report.html, report.figures)
-}
-
-/// The residual table, column by column: numbers, or codes and words.
-fn table<'py>(py: Python<'py>, data: &Dataset, residuals: &[Residual]) -> PyResult<Bound<'py, PyDict>> {
-    let rows = &data.measurements;
-    let columns = PyDict::new(py);
-    let words = |of_row: &mut dyn Iterator<Item = usize>, names: Vec<String>| (integers(py, of_row), names);
-    let labels = |labels: &Labels| words(&mut labels.of_row.iter().copied(), labels.names.clone());
-    let files = rows.files.iter().map(|file| file.display().to_string()).collect();
-    columns.set_item("file", words(&mut rows.origin.iter().map(|&(file, _)| file as usize), files))?;
-    columns.set_item("line", integers(py, rows.origin.iter().map(|&(_, line)| line as usize)))?;
-    if let Some(pose) = &rows.pose {
-        columns.set_item("pose", numbers(py, pose.iter().copied()))?;
-    }
-    if rows.session.names.iter().any(|name| !name.is_empty()) {
-        columns.set_item("session", labels(&rows.session))?;
-    }
-    if let Some(target) = &rows.target {
-        columns.set_item("target", labels(target))?;
-    }
-    let put = |name: &str, of: &dyn Fn(&Residual) -> f64| columns.set_item(name, numbers(py, residuals.iter().map(of)));
-    let measured = |own: &Residual| rows.positions.get(own.row).copied().unwrap_or_default();
-    put("predicted_x_mm", &|own| 1e3 * (measured(own) - own.position).x)?;
-    put("predicted_y_mm", &|own| 1e3 * (measured(own) - own.position).y)?;
-    put("predicted_z_mm", &|own| 1e3 * (measured(own) - own.position).z)?;
-    put("residual_x_mm", &|own| 1e3 * own.position.x)?;
-    put("residual_y_mm", &|own| 1e3 * own.position.y)?;
-    put("residual_z_mm", &|own| 1e3 * own.position.z)?;
-    put("whitened", &|own| own.whitened.norm())?;
-    columns.set_item("outlier", integers(py, residuals.iter().map(|own| usize::from(own.outlier))))?;
-    columns.set_item("held_out", integers(py, residuals.iter().map(|own| usize::from(own.held_out))))?;
-    Ok(columns)
 }

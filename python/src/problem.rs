@@ -8,6 +8,7 @@ use flexcal::identify::{self, Options, Placement, SolverChoice, Strategy};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
+use flexcal::urdf::{Chain, Description, Robot, describe};
 use pyo3::prelude::*;
 
 use crate::array::{Array, derivatives, points};
@@ -19,8 +20,11 @@ use crate::supervise::supervised;
 /// An arm, what is free of it, and where its measurements are.
 #[pyclass(frozen, module = "flexcal._core")]
 pub struct Problem {
-    pub problem: Arc<flexcal::problem::Problem>,
+    pub declared: Arc<flexcal::problem::Problem>,
     text: Arc<str>,
+    /// What to know of a problem that was made from a URDF.
+    #[pyo3(get)]
+    notes: Vec<String>,
 }
 
 #[pymethods]
@@ -29,26 +33,34 @@ impl Problem {
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
         let (problem, text) = flexcal::problem::Problem::read_with_text(&path).map_err(|error| raised(&error))?;
-        Ok(Self { problem: Arc::new(problem), text })
+        Ok(Self { declared: Arc::new(problem), text, notes: Vec::new() })
     }
 
     /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
     #[staticmethod]
     fn parse(text: &str, file: PathBuf) -> PyResult<Self> {
         let problem = flexcal::problem::Problem::parse(text, &file).map_err(|error| raised(&error))?;
-        Ok(Self { problem: Arc::new(problem), text: Arc::from(text) })
+        Ok(Self { declared: Arc::new(problem), text: Arc::from(text), notes: Vec::new() })
+    }
+
+    /// The chain between two links of a URDF; `file` names the problem in messages, and data files are looked for beside it.
+    #[staticmethod]
+    fn from_urdf(urdf: PathBuf, base: Option<&str>, tip: Option<&str>, file: PathBuf) -> PyResult<Self> {
+        let described = Robot::read(&urdf).and_then(|robot| describe(&Chain::new(&robot, base, tip)?));
+        let Description { text, notes, .. } = described.map_err(|error| raised(&error))?;
+        Ok(Self { notes, ..Self::parse(&text, file)? })
     }
 
     /// Its name.
     #[getter]
     fn name(&self) -> &str {
-        &self.problem.name
+        &self.declared.name
     }
 
     /// One line for people.
     #[getter]
     fn title(&self) -> &str {
-        &self.problem.title
+        &self.declared.title
     }
 
     /// The problem file.
@@ -60,7 +72,7 @@ impl Problem {
     /// Measurement files that it names.
     #[getter]
     fn files(&self) -> Vec<PathBuf> {
-        self.problem.data.files.clone()
+        self.declared.data.files.clone()
     }
 
     /// Unit of each joint's command, from the base outwards; None at fixed joints.
@@ -71,19 +83,19 @@ impl Problem {
             JointKind::Prismatic => Some("m"),
             JointKind::Fixed => None,
         };
-        self.problem.joints.iter().map(unit).collect()
+        self.declared.joints.iter().map(unit).collect()
     }
 
     /// Reads measurements.
     fn data(&self, py: Python<'_>, source: Source) -> PyResult<Data> {
         let input = source.owned()?;
-        py.detach(|| Data::read(input, &self.problem)).map_err(|error| raised(&error))
+        py.detach(|| Data::read(input, &self.declared)).map_err(|error| raised(&error))
     }
 
     /// Reads poses, measured or not.
     fn poses(&self, py: Python<'_>, source: Source) -> PyResult<Poses> {
         let input = source.owned()?;
-        py.detach(|| Poses::read(input, &self.problem)).map_err(|error| raised(&error))
+        py.detach(|| Poses::read(input, &self.declared)).map_err(|error| raised(&error))
     }
 
     /// Fits the free parameters.
@@ -97,7 +109,7 @@ impl Problem {
     ) -> PyResult<Identification> {
         let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
         let solver = word("solver", solver, &SolverChoice::CHOICES, SolverChoice::as_str)?;
-        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let found = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| {
@@ -111,7 +123,7 @@ impl Problem {
 
     /// Finds the effects that the problem lacks.
     fn close(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<ClosedLoop> {
-        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let closure = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| diagnose::close(&problem, &data, &Options::default().with_progress(sink))
@@ -122,7 +134,7 @@ impl Problem {
 
     /// Ranks the effects that the residual points to.
     fn trace(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<Trace> {
-        let (problem, data) = (Arc::clone(&self.problem), Arc::clone(&data.data));
+        let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let trace = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
@@ -135,7 +147,7 @@ impl Problem {
     fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
         let found = py.detach(|| {
             let placement = Placement::of(&poses.rows);
-            let model = Model::new(&self.problem, &placement.bases, &placement.targets)?;
+            let model = Model::new(&self.declared, &placement.bases, &placement.targets)?;
             let rows: Vec<usize> = (0..poses.rows.len()).collect();
             let x = DVector::zeros(model.parameters.len());
             Ok(model.predict(placement.poses(&poses.rows, &rows, 1.0), &x))
@@ -145,7 +157,7 @@ impl Problem {
 
     /// ∂p/∂q of the nominal arm, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| identify::jacobian(&self.problem, None, &poses.rows));
+        let found = py.detach(|| identify::jacobian(&self.declared, None, &poses.rows));
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }

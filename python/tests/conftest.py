@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import flexcal
+import numpy as np
 import pandas as pd
 import pytest
 from flexcal._tables import table
@@ -23,11 +24,11 @@ Command = Callable[..., Any]
 
 @pytest.fixture(scope="session")
 def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
-    """Runs the command line of the package; the exit status, what it prints, and the folder of its results."""
+    """Runs the command line of the package, its results in a folder or in a file of one; what became of it, and the folder."""
 
-    def run(*arguments: object) -> tuple[subprocess.CompletedProcess[str], Path]:
+    def run(*arguments: object, file: str = "") -> tuple[subprocess.CompletedProcess[str], Path]:
         out = tmp_path_factory.mktemp("out")
-        words = [sys.executable, "-m", "flexcal", *map(str, arguments), "--out", str(out)]
+        words = [sys.executable, "-m", "flexcal", *map(str, arguments), "--out", str(out / file)]
         return subprocess.run(words, capture_output=True, text=True, check=False), out
 
     return run
@@ -51,6 +52,19 @@ def closed(lunar: flexcal.Problem) -> flexcal.ClosedLoop:
 def exact(file: Path) -> pd.DataFrame:
     """A table to the last bit, as the pandas before 3.1 reads it on request alone."""
     return table(file.read_text())
+
+
+def assert_written(residuals: pd.DataFrame, file: Path) -> None:
+    """Residuals are those of a residuals.csv, as far as that has decimals."""
+    written = exact(file)
+    assert list(residuals) == list(written)
+    decimals = {"line": 0, "pose": 15, "mm": 6, "deg": 7, "whitened": 4}
+    for name in map(str, written):
+        count = decimals.get(name.rpartition("_")[2])
+        if count is None:
+            assert [str(word).lower() for word in residuals[name]] == written[name].tolist(), name
+        else:
+            np.testing.assert_allclose(residuals[name], written[name], rtol=0, atol=0.501 * 10.0**-count, err_msg=name)
 
 
 def timeless(text: str) -> Any:

@@ -83,7 +83,7 @@ def test_arguments(lunar: flexcal.Problem, tmp_path: Path) -> None:
     assert caught.value.file == str(tmp_path / "none.csv")
     with pytest.raises(flexcal.InputError, match="min_deg") as caught:
         flexcal.Problem(ROOT / "tests" / "golden").plan(10)
-    assert caught.value.key == "joint[1]" and caught.value.file is not None
+    assert caught.value.key == "joint[1].min_deg" and caught.value.file is not None
     with pytest.raises(TypeError, match="not int"):
         lunar.identify(7)
     again = pickle.loads(pickle.dumps(caught.value))

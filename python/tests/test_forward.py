@@ -79,6 +79,39 @@ def test_jacobian_is_the_derivative_of_predict(which: str, lunar: flexcal.Proble
     np.testing.assert_array_equal(arms[1].jacobian(q[0]), arms[1].jacobian(q)[0])
 
 
+def test_tables_of_configurations() -> None:
+    """Shapes of tables are not those of arrays: a table with as many columns as joints is none of all joints."""
+    problem = flexcal.Problem(FOLLOWING)
+    q = np.random.default_rng(5).uniform(-1.0, 1.0, (6, 3))
+    expected = problem.jacobian(q, time_s=0.0)
+    columns = {"q1_rad": q[:, 0], "q2_m": q[:, 1], "q3_rad": q[:, 2], "time_s": np.zeros(6)}
+    for table in (columns, pd.DataFrame(columns)):
+        np.testing.assert_array_equal(problem.jacobian(table), expected)
+    np.testing.assert_array_equal(problem.predict(q[0]), problem.predict(q)[0])
+
+
+def test_covariates_of_ones_own() -> None:
+    effect = "[[effect]]\ncovariate = { joint = 4, of = 'tilt_deg' }\n[data.covariates]\n'tilt_deg' = 'tilt of the carriage'\n"
+    head, mark, tail = FOLLOWING.partition("[parameters]")
+    plain = flexcal.Problem(FOLLOWING)
+    problem = flexcal.Problem(head + effect.split("[data")[0] + mark + tail + "[data" + effect.split("[data")[1])
+    random = np.random.default_rng(6)
+    q, tilt = random.uniform(-2.0, 2.0, (60, 3)), random.uniform(-2.0, 2.0, 60)
+    # Joint 4 is the third that moves.
+    moved = plain.predict(q + np.outer(tilt, [0.0, 0.0, 2e-3]))
+    data = {"q1_rad": q[:, 0], "q2_m": q[:, 1], "q3_rad": q[:, 2], "tilt_deg": tilt, "xyz_m": moved}
+    for table in (data, pd.DataFrame({**data, "xyz_m": 0.0, **dict(zip(["x_m", "y_m", "z_m"], moved.T))}).drop(columns="xyz_m")):
+        result = problem.identify(table)
+        found = result.parameters.filter(like="covariate", axis=0)
+        np.testing.assert_allclose(found["estimate"], 2e-3, rtol=1e-3)
+        np.testing.assert_allclose(result.predict(q, tilt_deg=tilt), moved, atol=1e-7)
+    assert abs(result.predict(q[0], tilt_deg=1.0) - result.predict(q[0], tilt_deg=0.0)).max() > 1e-4
+    for wrong, words in ((q, "column tilt_deg: missing"), ({**data, "tilt_deg": tilt[:-1]}, "59 values for 60 rows")):
+        with pytest.raises(flexcal.InputError, match=words) as caught:
+            result.predict(wrong)
+        assert caught.value.key == "column tilt_deg"
+
+
 def test_shapes_that_fit_no_arm(lunar: flexcal.Problem) -> None:
     with pytest.raises(flexcal.InputError, match="shape 2 × 3") as caught:
         lunar.predict(np.zeros((2, 3)))

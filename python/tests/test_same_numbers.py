@@ -8,10 +8,10 @@ import flexcal
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import Command, exact, LUNAR, ROOT, timeless, UR10_DATA
+from conftest import assert_written, Command, exact, LUNAR, ROOT, timeless, UR10_DATA
 
 
-@pytest.mark.parametrize("strategy", ["joint", "geometry-only"])
+@pytest.mark.parametrize("strategy", ["joint", "geometry-only", "rigid"])
 def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> None:
     run, out = command("identify", LUNAR, "--strategy", strategy)
     result = lunar.identify(strategy=strategy)  # type: ignore[arg-type]
@@ -19,6 +19,7 @@ def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> No
     assert timeless(result.to_json()) == timeless((out / "estimate.json").read_text())
     assert result.summary().splitlines()[4:] == run.stdout.splitlines()[4 : len(result.summary().splitlines())]
     assert result.html == (out / "report.html").read_text()
+    assert_written(result.residuals, out / "residuals.csv")
 
 
 def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoop, command: Command) -> None:
@@ -26,6 +27,7 @@ def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoo
     run, out = command("loop", LUNAR)
     assert timeless(closed.to_json()) == timeless((out / "loop.json").read_text())
     assert run.stdout.startswith(closed.summary())
+    assert_written(closed.residuals, out / "residuals.csv")
     assert sorted(closed.figures) == sorted(file.stem for file in (out / "figures").iterdir())
     run, out = command("trace", LUNAR)
     assert timeless(lunar.trace().to_json()) == timeless((out / "trace.json").read_text())
@@ -40,6 +42,23 @@ def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoo
     run, out = command("plan", LUNAR, "--poses", 5, "--candidates", out / "plan.csv", "--data", LUNAR / "measurements.csv")
     again = lunar.plan(5, LUNAR / "measurements.csv", candidates=plan.poses)
     assert again.to_json() == (out / "plan.json").read_text()
+
+
+def test_orientation(lunar: flexcal.Problem, command: Command, tmp_path: Path) -> None:
+    oriented = lunar.text.replace("position_sigma_mm", "orientation_sigma_deg = 0.02\nposition_sigma_mm")
+    oriented = oriented.replace('"tool.*" = {', '"tool.*" = { sigma_deg = 2.0,')
+    (tmp_path / "problem.toml").write_text(oriented)
+    truth = ROOT / "tests" / "cases" / "truth.toml"
+    run, made = command("simulate", tmp_path, "--truth", truth, "--poses", 30, "--seed", 2)
+    assert run.returncode == 0, run.stderr
+    run, out = command("identify", tmp_path, "--data", made / "measurements.csv")
+    problem = flexcal.Problem(oriented)
+    result = problem.identify(made / "measurements.csv")
+    assert {"predicted_rx_deg", "residual_rz_deg"} <= set(result.residuals)
+    assert_written(result.residuals, out / "residuals.csv")
+    # The fit fitted turns as well: their share of the length is no more than theirs.
+    turns = np.linalg.norm(result.residuals.filter(regex="^residual_r"), axis=1) / 0.02
+    assert (result.residuals["whitened"] > turns).all() and turns.max() > 1.0
 
 
 def test_tables_in_memory(lunar: flexcal.Problem, identified: flexcal.Identification) -> None:

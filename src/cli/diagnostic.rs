@@ -5,8 +5,8 @@ use std::io::Write as _;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
-use flexcal::error::{InputError, InputErrorKind, Location, Warning, one_line, veiled};
-use flexcal::identify::{Identification, IdentifyError};
+use flexcal::error::{InputError, InputErrorKind, Location, Warning, mistake, one_line, veiled, with_causes};
+use flexcal::identify::Identification;
 use flexcal::report;
 
 use super::outcome::Outcome;
@@ -16,36 +16,20 @@ const WIDTH: usize = 1000;
 
 /// Prints an error to standard error.
 pub fn print(error: &(dyn Error + 'static)) {
-    let input = error
-        .downcast_ref::<InputError>()
-        .or(match error.downcast_ref::<IdentifyError>() {
-            Some(IdentifyError::Input(input)) => Some(input),
-            _ => None,
-        })
-        .or(match error.downcast_ref::<DesignError>() {
-            Some(DesignError::Input(input)) => Some(input),
-            _ => None,
-        });
-    if let Some(input) = input {
-        show(Level::ERROR, &with_arguments(input), Some(&input.location));
-    } else {
-        let flagged = error.downcast_ref().and_then(by_arguments);
-        show(Level::ERROR, &flagged.unwrap_or_else(|| with_causes(error)), None);
-    }
+    let mistake = mistake(error);
+    let flagged = error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
+    show(Level::ERROR, &flagged.unwrap_or_else(|| with_causes(error)), mistake.map(|input| &*input.location));
 }
 
-/// A mistake in the input, and the argument that avoids it, where there is one.
-fn with_arguments(error: &InputError) -> String {
-    match *error.kind {
-        InputErrorKind::NoDataFiles => format!("{error} or with --data"),
-        _ => error.to_string(),
-    }
+/// A mistake in the input that an argument avoids.
+fn with_argument(error: &InputError) -> Option<String> {
+    matches!(*error.kind, InputErrorKind::NoDataFiles).then(|| format!("{error} or with --data"))
 }
 
 /// An error of a design in terms of the arguments that bring it about, where it is about one.
 fn by_arguments(error: &DesignError) -> Option<String> {
     match error {
-        DesignError::NoRange { .. } => Some(format!(
+        DesignError::NoRange(_) => Some(format!(
             "{error}, or name a TRUTH.toml with --truth whose [poses] say where to draw, or a table of poses with --candidates"
         )),
         DesignError::TooFewCandidates { poses, candidates } => {
@@ -99,18 +83,4 @@ fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
     let text = Renderer::styled().term_width(WIDTH).render(&[group]);
     // A closed standard error leaves nobody to tell.
     let _ = writeln!(anstream::stderr(), "{text}");
-}
-
-fn with_causes(error: &(dyn Error + 'static)) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(next) = cause {
-        let next_text = next.to_string();
-        if !text.contains(&next_text) {
-            text.push_str(": ");
-            text.push_str(&next_text);
-        }
-        cause = next.source();
-    }
-    text
 }

@@ -4,10 +4,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::identify::{ErrorSummary, Placement, SavedEstimate};
+use flexcal::identify::{Placement, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
-use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
 use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
@@ -69,9 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {
             let robot = Robot::read(file)?;
-            let ends = problem.urdf.as_ref();
-            let chain = Chain::new(&robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))?;
-            let export = export(&chain, &problem, &arm)?;
+            let export = export(&Chain::of(&robot, &problem)?, &problem, &arm)?;
             let name = file.file_name().unwrap_or_default().to_owned();
             (export.text, Some(export.moved), PathBuf::from(name))
         }
@@ -92,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let at_hand = !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
     let errors = if at_hand { Some(errors(&problem, files, &estimates, arguments.quiet)?) } else { None };
     results.write(&[(&name, &text)])?;
-    let exported = Exported { problem: &problem, model: &model, file: &path, moved: moved.as_deref(), errors };
+    let exported = Exported { problem: &problem, model: &model, file: Some(&path), moved: moved.as_deref(), errors };
     if arguments.json {
         output::print_json(&report::export_json(&exported))?;
     } else if !arguments.quiet {
@@ -115,14 +112,9 @@ fn errors(
     if !quiet {
         diagnostic::print_warnings(&warnings);
     }
-    let Dataset { measurements, split } = Dataset::of(problem, rows)?;
-    let placement = Placement::of(&measurements);
+    let data = Dataset::of(problem, rows)?;
+    let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;
-    let poses = placement.poses(&measurements, &split.held_out, 1.0);
-    let geometric = model.geometric_positions(&poses, x.as_slice());
-    let off: Vec<Vector3<f64>> =
-        poses.iter().zip(geometric).map(|(pose, predicted)| pose.measured - predicted).collect();
-    let whole = placement.position_errors(&model, &x, &measurements, &split.held_out);
-    Ok(ExportErrors { whole: ErrorSummary::of(&whole), rigid: ErrorSummary::of(&off) })
+    Ok(ExportErrors::of(&model, &x, &data))
 }

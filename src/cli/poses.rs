@@ -59,7 +59,7 @@ impl Source {
     /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
     pub fn known_ranges(&self, problem: &Problem) -> Result<Option<PoseRanges>, DesignError> {
         match self.all_ranges(problem) {
-            Err(DesignError::NoRange { .. }) => Ok(None),
+            Err(DesignError::NoRange(_)) => Ok(None),
             other => other.map(Some),
         }
     }

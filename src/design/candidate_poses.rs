@@ -37,10 +37,9 @@ impl PoseRanges {
     /// A moving joint has no limits.
     pub fn of(problem: &Problem) -> Result<Self, DesignError> {
         for joint in problem.joints.iter().filter(|joint| joint.commanded() != JointKind::Fixed) {
-            let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };
             for (end, limit) in [("min", joint.limits.0), ("max", joint.limits.1)] {
                 if !limit.is_finite() {
-                    return Err(DesignError::NoRange { location: Box::new(joint.location.clone()), end, unit });
+                    return Err(DesignError::no_range(joint, end));
                 }
             }
         }

@@ -1,8 +1,7 @@
 //! What keeps a design from being made.
 
-use std::path::PathBuf;
-
-use crate::error::{InputError, Location};
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::problem::{Joint, JointKind, Problem};
 
 /// How to free the geometry of an arm.
 const FREE: &str = "write [parameters] with lines such as \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \
@@ -13,33 +12,11 @@ const FREE: &str = "write [parameters] with lines such as \"joint*.alpha\" = { s
 #[non_exhaustive]
 pub enum DesignError {
     /// Problem and poses do not fit each other.
-    #[error(transparent)]
+    #[error("{0}")]
     Input(#[from] InputError),
     /// A joint may go anywhere.
-    #[error("{location}.{end}_{unit}: missing; write min_{unit} and max_{unit} of every moving joint")]
-    NoRange {
-        /// The joint in the problem file.
-        location: Box<Location>,
-        /// Which end has no limit: `min` or `max`.
-        end: &'static str,
-        /// Suffix of its unit.
-        unit: &'static str,
-    },
-    /// Nothing says how exact positions will be.
-    #[error(
-        "{}: data.position_sigma_mm: missing; write the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)",
-        file.display()
-    )]
-    NoSigma {
-        /// The problem file.
-        file: PathBuf,
-    },
-    /// No parameter is free.
-    #[error("{}: parameters: no parameter is free, so there is nothing to identify; {FREE}", file.display())]
-    NothingFree {
-        /// The problem file.
-        file: PathBuf,
-    },
+    #[error("{0}")]
+    NoRange(#[source] InputError),
     /// No pose was asked for, or a table has none.
     #[error("no pose to plan or to judge")]
     NoPoses,
@@ -72,4 +49,28 @@ pub enum DesignError {
     /// The nominal arm does not come to rest anywhere.
     #[error("the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses")]
     NoEquilibrium,
+}
+
+impl DesignError {
+    /// A joint without a limit at `end`, `min` or `max`.
+    pub(super) fn no_range(joint: &Joint, end: &str) -> Self {
+        let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };
+        let key = format!("{}.{end}_{unit}", joint.location.key.as_deref().unwrap_or("joint"));
+        let write = format!("min_{unit} and max_{unit} of every moving joint");
+        let location = joint.location.clone().with_key(key);
+        Self::NoRange(location.error(InputErrorKind::MissingKey { write, near: None }))
+    }
+
+    /// Nothing says how exact positions will be.
+    pub(super) fn no_sigma(problem: &Problem) -> Self {
+        let write = "the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)".to_owned();
+        let location = problem.data.location.clone().with_key("data.position_sigma_mm");
+        location.error(InputErrorKind::MissingKey { write, near: None }).into()
+    }
+
+    /// No parameter is free.
+    pub(super) fn nothing_free(problem: &Problem) -> Self {
+        let location = Location::file(&problem.data.location.file).with_key("parameters");
+        location.error(InputErrorKind::NothingFree { write: FREE }).into()
+    }
 }

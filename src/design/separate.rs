@@ -56,7 +56,7 @@ impl Pair {
         let columns: Vec<usize> =
             parameters.filter(|(_, parameter)| names.contains(&parameter.name)).map(|(k, _)| k).collect();
         if columns.is_empty() {
-            return Err(DesignError::NothingFree { file: self.declared.data.location.file.clone() });
+            return Err(DesignError::nothing_free(&self.declared));
         }
         Ok(Criterion::Each(columns))
     }

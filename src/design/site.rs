@@ -30,7 +30,6 @@ impl<'a> Site<'a> {
     /// # Errors
     /// Rules of `[parameters]` do not fit the arm, no parameter is free, or σ is not known.
     pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
-        let file = || problem.data.location.file.clone();
         let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
         let add = |all: &mut Vec<String>, word: &String| {
             if !all.contains(word) {
@@ -44,12 +43,12 @@ impl<'a> Site<'a> {
                 add(&mut targets, &placement.targets[placement.target_of(row)]);
             }
             if problem.data.position_sigma.is_none() && table.sigma.is_none() {
-                return Err(DesignError::NoSigma { file: file() });
+                return Err(DesignError::no_sigma(problem));
             }
         }
         let model = Model::new(problem, &bases, &targets)?;
         if model.parameters.is_empty() {
-            return Err(DesignError::NothingFree { file: file() });
+            return Err(DesignError::nothing_free(problem));
         }
         Ok(Self { model, problem, bases, targets })
     }

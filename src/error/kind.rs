@@ -198,6 +198,8 @@ pub enum InputErrorKind {
     MixedKinds { other: String },
     #[error("{parameter} takes {write}")]
     LimitOfAnotherKind { parameter: String, write: &'static str },
+    #[error("no parameter is free, so there is nothing to identify; {write}")]
+    NothingFree { write: &'static str },
     #[error("none of its parameters is free; free one in [parameters], or leave the constraint out")]
     NothingConstrained,
 

@@ -1,5 +1,6 @@
 //! Mistakes in the input, each with the place where it stands.
 
+mod causes;
 mod kind;
 mod near;
 mod plain;
@@ -10,6 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use causes::{mistake, with_causes};
 pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::{nearest, one_typo};
 pub use plain::{is_hidden, one_line, veiled, visible};

@@ -47,7 +47,7 @@ pub struct ErrorsBySession {
 #[non_exhaustive]
 pub enum PredictError {
     /// Problem and rows do not fit each other.
-    #[error(transparent)]
+    #[error("{0}")]
     Input(#[from] InputError),
     /// The estimate is not of this problem, or lacks what the rows need.
     #[error(transparent)]

@@ -100,7 +100,7 @@ pub enum IdentifyError {
     #[error("no pose to identify from")]
     NoPoses,
     /// Problem and data do not fit each other.
-    #[error(transparent)]
+    #[error("{0}")]
     Input(#[from] InputError),
     /// A fit could not be set up.
     #[error(transparent)]

@@ -33,6 +33,13 @@ pub struct Residual {
     pub outlier: bool,
 }
 
+impl Residual {
+    /// Length of everything that is left of the row over 1 σ of each part \[1\].
+    pub fn length(&self) -> f64 {
+        self.whitened.norm().hypot(self.whitened_orientation.map_or(0.0, |turn| turn.norm()))
+    }
+}
+
 impl Identification {
     /// Positions of the identified arm in the poses of `rows`, measuring frame \[m\]; NaN where it has no equilibrium.
     ///

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
+use nalgebra::DVector;
+
 use super::document::{Block, Table};
 use super::errors;
 use super::json::{Summary, object, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
-use crate::identify::ErrorSummary;
+use crate::identify::{ErrorSummary, Placement};
+use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::parameter::Slot;
 use crate::problem::Problem;
@@ -26,6 +29,19 @@ pub struct ExportErrors {
     pub rigid: ErrorSummary,
 }
 
+impl ExportErrors {
+    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of the model's parameters.
+    pub fn of(model: &Model, x: &DVector<f64>, data: &Dataset) -> Self {
+        let Dataset { measurements, split } = data;
+        let placement = Placement::of(measurements);
+        let poses = placement.poses(measurements, &split.held_out, 1.0);
+        let geometric = model.geometric_positions(&poses, x.as_slice());
+        let rigid: Vec<_> = poses.iter().zip(geometric).map(|(pose, predicted)| pose.measured - predicted).collect();
+        let whole = placement.position_errors(model, x, measurements, &split.held_out);
+        Self { whole: ErrorSummary::of(&whole), rigid: ErrorSummary::of(&rigid) }
+    }
+}
+
 /// What was written.
 #[derive(Debug, Clone, Copy)]
 pub struct Exported<'a> {
@@ -33,8 +49,8 @@ pub struct Exported<'a> {
     pub problem: &'a Problem,
     /// Its model.
     pub model: &'a Model,
-    /// The file.
-    pub file: &'a Path,
+    /// The file, where one was written.
+    pub file: Option<&'a Path>,
     /// The origins that have moved, in a URDF.
     pub moved: Option<&'a [MovedOrigin]>,
     /// Errors, where measurements are at hand.
@@ -59,7 +75,7 @@ object! {
 object! {
     Document<'a>(exported: &Exported<'a>) {
         problem: &'a str = &exported.problem.name,
-        file: String = exported.file.display().to_string(),
+        file: Option<String> = exported.file.map(|file| file.display().to_string()),
         origins: Option<Vec<Moved<'a>>> = exported.moved.map(|moved| moved.iter().map(Moved::of).collect()),
         held_out: Option<HeldOut> = exported.errors.as_ref().map(HeldOut::of),
         not_held: Vec<String> = left_out(exported),
@@ -120,6 +136,6 @@ pub fn export_text(exported: &Exported) -> String {
     if !left_out.is_empty() {
         blocks.push(Block::Lines("The file cannot hold".to_owned(), left_out));
     }
-    blocks.push(Block::lines(format!("Written to {}", exported.file.display())));
+    blocks.extend(exported.file.map(|file| Block::lines(format!("Written to {}", file.display()))));
     text(&blocks)
 }

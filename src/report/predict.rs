@@ -72,8 +72,7 @@ pub fn residuals_csv(rows: &Measurements, residuals: &[Residual]) -> String {
         }
         cells.extend(residual.position.iter().map(|x| fixed(x * 1e3, 6)));
         cells.extend(residual.orientation.into_iter().flat_map(degrees));
-        let turned = residual.whitened_orientation.map_or(0.0, |whitened| whitened.norm());
-        cells.push(fixed(residual.whitened.norm().hypot(turned), 4));
+        cells.push(fixed(residual.length(), 4));
         cells.extend([residual.outlier, residual.held_out].map(|word| word.to_string()));
         cells
     };

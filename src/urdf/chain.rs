@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::read::{Joint, Kind, Robot};
 use crate::error::{InputError, UrdfMistake};
+use crate::problem::Problem;
 use crate::spatial::Frame;
 
 /// Most joints of a chain: as many as a problem may have, with a fixed one at each end.
@@ -72,6 +73,15 @@ impl<'a> Chain<'a> {
             return Err(robot.error(UrdfMistake::NothingMoves { base: name(base), tip: name(tip) }));
         }
         Ok(chain)
+    }
+
+    /// The chain that a problem was made from, between the ends that it names.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of(robot: &'a Robot, problem: &Problem) -> Result<Self, InputError> {
+        let ends = problem.urdf.as_ref();
+        Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 
     /// Finds the stages.

@@ -1,0 +1,79 @@
+"""From a URDF to a calibrated one, as the command line does it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import flexcal
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import Command, ROOT
+
+ODD = ROOT / "tests" / "urdf" / "odd.urdf"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "base", "tip", "words"),
+    [
+        (ODD, None, "tool", None),
+        (ROOT / "tests" / "corpus" / "urdf" / "plain.urdf", "base", None, None),
+        (ODD, None, None, "several links end the tree"),
+        (ODD, "nowhere", "tool", 'no link is called "nowhere"'),
+        (ODD, "hand", "base", 'link "base" is not below link "hand"'),
+        ("none.urdf", None, None, "no such file"),
+        ("<robot name='broken'>\n<link/>\n</robot>", None, None, "no attribute name"),
+    ],
+)
+def test_from_urdf(
+    urdf: Path | str, base: str | None, tip: str | None, words: str | None, command: Command, tmp_path: Path
+) -> None:
+    if isinstance(urdf, str) and urdf.startswith("<"):
+        text, urdf = urdf, tmp_path / "broken.urdf"
+        urdf.write_text(text)
+    ends = [word for name, link in (("--base", base), ("--tip", tip)) if link for word in (name, link)]
+    run, out = command("init", urdf, *ends)
+    if words is None:
+        problem = flexcal.Problem.from_urdf(urdf, base, tip)
+        assert problem.text == (out / "problem.toml").read_text()
+        assert problem.notes and all(f"note: {note}\n" in run.stdout for note in problem.notes)
+        return
+    with pytest.raises(flexcal.InputError, match=words) as caught:
+        flexcal.Problem.from_urdf(urdf, base, tip)
+    assert run.returncode == 2 and str(caught.value) in run.stderr
+    assert (caught.value.file, caught.value.line) == (str(urdf), 2 if "broken" in str(urdf) else None)
+
+
+def test_export_urdf(command: Command, tmp_path: Path) -> None:
+    problem = flexcal.Problem.from_urdf(ODD, tip="tool")
+    random = np.random.default_rng(5)
+    q = pd.DataFrame(random.uniform(-1.0, 1.0, (60, 4)), columns=["rail_m", "shoulder_rad", "elbow_rad", "wrist_rad"])
+    q["rail_m"] *= 0.4
+    shift = 1e-3 * np.sin(3.0 * q["elbow_rad"].to_numpy())[:, None] + random.normal(0.0, 5e-5, (60, 3))
+    measured = q.assign(**dict(zip(["x_m", "y_m", "z_m"], (problem.predict(q) + shift).T, strict=True)))
+    result = problem.identify(measured)
+    exported = result.export_urdf(ODD)
+    # The same by the command line, to the byte.
+    (tmp_path / "problem.toml").write_text(problem.text)
+    measured.to_csv(tmp_path / "measurements.csv", index=False)
+    _, out = command("identify", tmp_path)
+    estimate = ["--estimate", out / "estimate.json"]
+    run, out = command("export", tmp_path, *estimate, "--urdf", ODD, "--json", file="calibrated.urdf")
+    assert exported.text == (out / "calibrated.urdf").read_text()
+    assert exported.to_dict() == json.loads(run.stdout) | {"file": None}
+    run, _ = command("export", tmp_path, *estimate, "--urdf", ODD, file="calibrated.urdf")
+    assert run.stdout.startswith(exported.summary())
+    exported.write(tmp_path / "written.urdf")
+    assert (tmp_path / "written.urdf").read_bytes() == exported.text.encode()
+    assert set(exported.origins.index) >= {"shoulder", "elbow", "wrist", "flange"} and exported.origins["moved_mm"].min() >= 0.0
+    assert exported.errors["n"].tolist() == 2 * [int(result.residuals["held_out"].sum())]
+    assert exported.errors["mean_mm"]["whole"] == pytest.approx(result.errors["mean_mm"]["identified", "held_out"])
+    assert any("base and target" in what for what in exported.not_held)
+    # The URDF of another arm is refused.
+    other = tmp_path / "other.urdf"
+    other.write_text(ODD.read_text().replace("0.45 0 0.02", "0.55 0 0.02"))
+    with pytest.raises(flexcal.InputError, match="is not that of the URDF") as caught:
+        result.export_urdf(other)
+    run, _ = command("export", tmp_path, *estimate, "--urdf", other)
+    assert run.returncode == 2 and str(caught.value) in run.stderr and caught.value.file == str(other)
