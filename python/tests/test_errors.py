@@ -84,6 +84,13 @@ def test_arguments(lunar: flexcal.Problem, tmp_path: Path) -> None:
     with pytest.raises(flexcal.InputError, match="min_deg") as caught:
         flexcal.Problem(ROOT / "tests" / "golden").plan(10)
     assert caught.value.key == "joint[1].min_deg" and caught.value.file is not None
+    truth = ROOT / "tests" / "cases" / "truth.toml"
+    before, free = TEXT[: TEXT.index("[parameters]")], TEXT[TEXT.index("[parameters]") :]
+    silent = "\n".join(line for line in TEXT.splitlines() if not line.startswith("position_sigma_mm"))
+    for text, key in ((silent, "data.position_sigma_mm"), (before + free[free.index("[data]") :], "parameters")):
+        with pytest.raises(flexcal.InputError, match="missing|nothing to identify") as caught:
+            flexcal.Problem(text).check(poses=5, truth=truth)
+        assert (caught.value.file, caught.value.key) == ("<text>", key)
     with pytest.raises(TypeError, match="not int"):
         lunar.identify(7)
     again = pickle.loads(pickle.dumps(caught.value))
