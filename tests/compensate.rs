@@ -192,3 +192,27 @@ fn words_with_a_comma_stay_one_cell() {
         assert_eq!(words, ["bench \"A\", east"; 3], "{text}");
     }
 }
+
+#[test]
+fn errors_of_the_instrument_are_no_errors_of_the_arm() {
+    let text = fs::read_to_string(case("problem.toml")).unwrap();
+    let text = text + "\n[[effect]]\ntracker-scale = true\n\n[[effect]]\ntracker-drift = true\n";
+    let problem = Problem::parse(&text, &case("problem.toml")).unwrap();
+    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[3, 40]);
+    let model = model(&problem, &rows);
+    let mut x = nalgebra::DVector::zeros(model.parameters.len());
+    let seen = |name: &str| model.parameters.iter().position(|parameter| parameter.name == name).unwrap();
+    x[seen("joint2.theta")] = 2e-3;
+    let arm = x.clone();
+    (x[seen("tracker-scale.error")], x[seen("tracker-drift.z")]) = (1e-3, 1e-6);
+    let mut reached = rows.clone();
+    for command in compensate(&problem, &model, &x, &rows).unwrap() {
+        assert!(command.is_reached());
+        let n = rows.joints;
+        reached.configurations[command.row * n..(command.row + 1) * n].copy_from_slice(&command.configuration);
+    }
+    let placement = Placement::of(&rows);
+    for (target, there) in rows.positions.iter().zip(model.predict(placement.poses(&reached, &[0, 1], 1.0), &arm)) {
+        assert!((target - there).norm() < 1e-8, "{} m off", (target - there).norm());
+    }
+}

@@ -195,3 +195,43 @@ fn wrong_covariates_are_named() {
         read(&taken, &[("rows.csv", "q1_deg,q2_deg,x_m,y_m,z_m,time_s\n1,2,3,4,5,6\n")]).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("problem.toml:6: data.covariates.time_s: \"time_s\" cannot name"), "{error}");
 }
+
+#[test]
+fn fixed_points_are_read_like_shots_of_the_arm() {
+    let header = "q1_deg,q2_deg,x_m,y_m,z_m,nest,sigma_mm,session\n";
+    let body = "1,2,3,4,5,,0.1,A\n,,1,2,3,N1,0.2,A\n,,0,0,0,N1,0.2,A\n";
+    let map = format!("{ARM}[data.format]\nmissing = '0,0,0'\n");
+    let (rows, warnings) =
+        read(&Problem::parse(&map, Path::new("problem.toml")).unwrap(), &[("A.csv", &(header.to_owned() + body))])
+            .unwrap();
+    let [nest] = rows.nests.as_slice() else { panic!("{:?}", rows.nests) };
+    assert_eq!((nest.session.as_str(), nest.sigma), ("A", Some(0.2e-3)));
+    assert!(
+        warnings.iter().any(|warning| warning.to_string().contains("nothing was measured in 1 row")),
+        "{warnings:?}"
+    );
+
+    // The name of the file stands for the session of fixed points too.
+    let named = format!("{ARM}[data.columns]\n'#file' = 'session'\n");
+    let table = "q1_deg,q2_deg,x_m,y_m,z_m,nest\n1,2,3,4,5,\n,,1,2,3,N1\n";
+    let files = [("A.csv", table), ("B.csv", table)];
+    let (rows, _) = read(&Problem::parse(&named, Path::new("problem.toml")).unwrap(), &files).unwrap();
+    assert_eq!(rows.nests.iter().map(|nest| nest.session.as_str()).collect::<Vec<_>>(), ["A", "B"]);
+
+    let plain = Problem::parse(ARM, Path::new("problem.toml")).unwrap();
+    let alone = read(&plain, &[("nests.csv", "q1_deg,q2_deg,x_m,y_m,z_m,nest\n,,1,2,3,N1\n")]).map(|_| ()).unwrap_err();
+    assert!(alone.to_string().contains("nests.csv: every row names a fixed point"), "{alone}");
+}
+
+#[test]
+fn names_of_poses_are_kept_as_they_are() {
+    let plain = Problem::parse(ARM, Path::new("problem.toml")).unwrap();
+    let table = |names: [&str; 3]| {
+        let rows = names.map(|name| format!("1,2,3,4,5,{name}\n")).concat();
+        read(&plain, &[("rows.csv", &("q1_deg,q2_deg,x_m,y_m,z_m,pose\n".to_owned() + &rows))]).unwrap().0
+    };
+    assert_eq!(table(["1", "2", "2"]).pose, Some(vec![1.0, 2.0, 2.0]));
+    let named = table(["1", "P2", "P2"]);
+    let names = named.pose_names.unwrap();
+    assert_eq!((named.pose, names.names, names.of_row), (None, vec!["1".to_owned(), "P2".to_owned()], vec![0, 1, 1]));
+}

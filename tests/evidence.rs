@@ -167,6 +167,7 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
             let position = Vector3::new(1.0, 2.0, 0.5) + drift * moves * time;
             let (name, session) = ("floor".to_owned(), String::new());
             data.measurements.nests.push(NestReading {
+                sigma: None,
                 origin: (0, 2),
                 name,
                 position,

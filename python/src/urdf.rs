@@ -43,7 +43,7 @@ impl Export {
         let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let arm = model.arm(|k| found.x.get(k).copied().unwrap_or(0.0));
         let moved = export(&chain, problem, &arm)?;
-        let errors = Some(ExportErrors::of(&model, &found.x, data));
+        let errors = Some(ExportErrors::of(&model, &found.x, data, None));
         let exported = Exported { problem, model: &model, file: None, moved: Some(&moved.moved), errors };
         let (json, summary) = (report::export_json(&exported), report::export_text(&exported));
         Ok(Self { text: moved.text, json, summary })

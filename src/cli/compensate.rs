@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use flexcal::error::InputErrorKind;
 use flexcal::identify::SavedEstimate;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
@@ -57,6 +58,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Err(NoTargets.into());
     }
     let mut problem = Problem::read(common.problem())?;
+    if let Some(own) = problem.joints.iter().find(|joint| joint.mimic.is_some()) {
+        return Err(own.location.clone().error(InputErrorKind::FollowerInTheWay).into());
+    }
     // Targets are not split: every row is one.
     problem.data.held_out = None;
     let results =
@@ -77,7 +81,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (targets, sought) = match (targets.position_measured, arguments.frame) {
         (false, _) => {
             let waypoints = identify::waypoints(&problem, &model, &x, &targets)?;
-            (waypoints.clone(), waypoints)
+            let shown = match arguments.frame {
+                Frame::Measuring => waypoints.clone(),
+                Frame::Base => identify::seen_in_base(&model, &x, &waypoints),
+            };
+            (shown, waypoints)
         }
         (true, Frame::Measuring) => (targets.clone(), targets),
         (true, Frame::Base) => {

@@ -87,6 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = Results::claim("export", folder, inputs, &[&name], (arguments.force, arguments.quiet))?;
     // Measurements that the problem names need not be at hand any more.
     let at_hand = !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
+    if let Some(absent) = files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !arguments.quiet) {
+        diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
+    }
     let errors = if at_hand { Some(errors(&problem, files, &estimates, arguments.quiet)?) } else { None };
     results.write(&[(&name, &text)])?;
     let exported = Exported { problem: &problem, model: &model, file: Some(&path), moved: moved.as_deref(), errors };
@@ -116,5 +119,5 @@ fn errors(
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;
-    Ok(ExportErrors::of(&model, &x, &data))
+    Ok(ExportErrors::of(&model, &x, &data, Some(estimates)))
 }

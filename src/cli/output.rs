@@ -96,7 +96,7 @@ impl Results {
     fn keep(&self, texts: &[(&str, &str)], is_older: impl Fn(&str) -> bool) -> Result<(), WriteError> {
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
-        let others = self.others(&record);
+        let others = self.others(&record, texts);
         let older: Vec<String> = record.names().filter(|name| is_older(name)).map(str::to_owned).collect();
         let older: Vec<_> = older.iter().filter(|name| record.writer(&self.folder, name).is_some()).collect();
         let mut ready = Vec::with_capacity(texts.len());
@@ -119,16 +119,21 @@ impl Results {
         }
         record.settle(|name| older.iter().any(|older| *older == name));
         self.write_record(&record)?;
-        if let (Some(other), false) = (others, self.quiet) {
-            diagnostic::warn(&format!("the report of {other} in the same folder is replaced; --out keeps both"));
+        if let (Some((name, other)), false) = (others, self.quiet) {
+            let what = if name == REPORT[0] { "the report" } else { &name };
+            diagnostic::warn(&format!("{what} of {other} in the same folder is replaced; --out keeps both"));
         }
         Ok(())
     }
 
-    /// The other command that wrote the report that is there.
-    fn others(&self, record: &Record) -> Option<String> {
-        let writer = REPORT.iter().find_map(|name| record.writer(&self.folder, name))?;
-        (writer != self.command).then(|| writer.to_owned())
+    /// The first of these files that is there and another command's, a report before all others, with that command.
+    fn others(&self, record: &Record, texts: &[(&str, &str)]) -> Option<(String, String)> {
+        let other = |&(name, _): &(&str, &str)| {
+            let writer = record.writer(&self.folder, name).filter(|writer| *writer != self.command)?;
+            Some((name.to_owned(), writer.to_owned()))
+        };
+        let report = texts.iter().find(|(name, _)| *name == REPORT[0]);
+        report.and_then(other).or_else(|| texts.iter().find_map(other))
     }
 
     fn record(&self) -> Result<Record, WriteError> {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use flexcal::identify::{self, SavedEstimate};
 use flexcal::measurement::{Measurements, Split};
-use flexcal::problem::Problem;
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::report;
 
 use super::input::Common;
@@ -33,11 +33,14 @@ pub struct Arguments {
     estimate: Option<PathBuf>,
 }
 
+/// What it may write.
+const RESULTS: [&str; 3] = ["predictions.csv", "residuals.csv", "errors.json"];
+
 /// Predicts, writes what was predicted and what measurements leave of it, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
-    let results = common.results("predict", &problem, arguments.estimate.as_slice(), &["predictions.csv"])?;
+    let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
     let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
@@ -47,8 +50,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted && !common.quiet {
         diagnostic::warn("the estimate is not to be trusted, and so are the predictions not");
     }
-    // Rows that nobody divided are predicted all the same.
-    let split = Split::new(&problem, &rows).ok();
+    // Rows that nobody divided are predicted all the same; chance divides those that were fitted, no others.
+    let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
+    let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
     let prediction = identify::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
     let mut texts = vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
     texts.extend(prediction.residuals.as_ref().map(|all| ("residuals.csv", report::residuals_csv(&rows, all))));

@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Print nothing but errors
-    #[arg(long, conflicts_with = "json")]
+    #[arg(long)]
     quiet: bool,
 }
 
@@ -90,7 +90,7 @@ fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<PoseConditio
     if !arguments.quiet {
         diagnostic::print_warnings(&warnings);
     }
-    Ok((0..rows.len()).map(|row| rows.conditions(row)).collect())
+    Ok(rows.all_conditions())
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {

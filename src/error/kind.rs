@@ -128,6 +128,12 @@ pub enum InputErrorKind {
     NoCovariateName { name: String },
     #[error("no covariate is called \"{name}\"; [data.covariates] {}", list("has", known, "has none"))]
     UnknownCovariate { name: String, known: Vec<String> },
+    #[error(
+        "the joint follows another one, and commands that reach targets are sought for arms of which every joint takes its own"
+    )]
+    FollowerInTheWay,
+    #[error("every row names a fixed point in the column nest; none is of the arm")]
+    NestsAlone,
     #[error("write joint = … or base = true, one of them")]
     NotOnePlace,
     #[error("no order; write at least one, as in [1]")]

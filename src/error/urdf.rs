@@ -47,6 +47,8 @@ pub enum UrdfMistake {
     TwoParents { link: String, first: String, second: String },
     #[error("the joints form a loop through link \"{link}\"; a URDF is a tree")]
     Loop { link: String },
+    #[error("makes no problem: {key}: {why}")]
+    AsProblem { key: String, why: String },
     #[error("there are no links")]
     NoLinks,
     #[error("several links have no parent: {}; choose one with --base", roots.join(", "))]

@@ -17,6 +17,9 @@ use crate::model::parameter::Slot;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 
+/// Part of a parameter in a combination that rows leave open, beyond rounding.
+const OPEN: f64 = 1e-6;
+
 /// What an arm makes of some rows.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -52,6 +55,12 @@ pub enum PredictError {
     /// The estimate is not of this problem, or lacks what the rows need.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
+    /// Rows of a new session or tool leave open where it is.
+    #[error("{name} is not in the estimate, and its rows do not determine it; measure more poses there")]
+    Open {
+        /// The parameter.
+        name: String,
+    },
     /// Bases and tools of new sessions could not be placed.
     #[error(transparent)]
     Stage(#[from] StageError),
@@ -105,10 +114,8 @@ pub fn predict(
     let all: Vec<usize> = (0..rows.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(UNKNOWN_SIGMA), turn));
-    if let Some(first) = estimate.and_then(|estimate| estimate.first_time) {
-        for pose in &mut poses {
-            pose.setup.elapsed = pose.setup.time - first;
-        }
+    if let Some(estimate) = estimate {
+        estimate.count_time_in(&mut poses);
     }
     if !missing.is_empty() && rows.position_measured {
         if let Some(k) = too_few(&model, &poses, &missing) {
@@ -156,7 +163,7 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
 }
 
 /// The full parameter vector `x` with the bases and tools `missing` from it fitted to the poses that use them.
-fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) -> Result<DVector<f64>, StageError> {
+fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) -> Result<DVector<f64>, PredictError> {
     let own: Vec<Pose> = poses.iter().filter(|pose| missing.iter().any(|&k| uses(model, pose, k))).copied().collect();
     let of_base = |k: usize| matches!(model.parameters[k].slot, Slot::Base { .. });
     let new_base = |pose: &&Pose| missing.iter().any(|&k| of_base(k) && uses(model, pose, k));
@@ -174,7 +181,13 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         counts_fixed: true,
         progress: None,
     };
-    Ok(stage.run(&x)?.x)
+    let placed = stage.run(&x)?.x;
+    let open = stage.gauge(&placed, &vec![false; missing.len()], &[]).rows;
+    let open = missing.iter().enumerate().find(|(column, _)| open.column(*column).iter().any(|part| part.abs() > OPEN));
+    match open {
+        Some((_, &k)) => Err(PredictError::Open { name: model.parameters[k].name.clone() }),
+        None => Ok(placed),
+    }
 }
 
 /// Residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it is not known, and from those of

@@ -101,8 +101,25 @@ pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -
     seen
 }
 
+/// The inverse: positions and orientations in the measuring frame, as seen from the arm's base.
+pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
+    let (placement, bases) = (Placement::of(targets), model.base_frames(x.as_slice()));
+    let base = |row: usize| &bases[placement.base_of(row)];
+    let mut seen = targets.clone();
+    for (row, position) in seen.positions.iter_mut().enumerate() {
+        *position = base(row).resolve(&(*position - base(row).origin));
+    }
+    for (row, orientation) in seen.orientations.iter_mut().flatten().enumerate() {
+        let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&base(row).axes));
+        *orientation = UnitQuaternion::from(turn).inverse() * *orientation;
+    }
+    seen
+}
+
 /// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the
 /// row's position, and to its orientation where it has one, within the joint limits of `problem`.
+///
+/// What effects do to the measurement (an instrument that drifts or has a scale) is left out: targets are where the arm shall be.
 ///
 /// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q − seed‖²: Newton's method by dual
 /// numbers, with redundancy resolved towards the seed. Where effects follow the command (a transmission ratio, harmonics), they are
@@ -120,7 +137,7 @@ pub fn compensate(
         return Err(StageError::Follower { joint: index + 1 });
     }
     let placement = Placement::of(targets);
-    let arm = model.commanded(problem, x);
+    let arm = model.commanded(problem, x).true_to_position();
     let rows: Vec<usize> = (0..targets.len()).collect();
     let unknowns: Vec<usize> = (0..arm.parameters.len()).collect();
     let moving = arm.moving_joints();

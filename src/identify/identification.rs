@@ -236,7 +236,8 @@ pub fn identify_model(
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
-    let mut estimates: Vec<Estimate> = model.parameters.iter().map(Estimate::unfitted).collect();
+    let mut estimates: Vec<Estimate> =
+        model.parameters.iter().map(|own| Estimate::unfitted(own, measurements.time_measured)).collect();
     let mut covariance = Collected::new(estimates.len());
     enter((&mut estimates, &mut covariance), &fitting.whole(), &end, &statistics);
     let mut not_converged = (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));

@@ -38,7 +38,7 @@ pub use applied::{ErrorsBySession, PredictError, Prediction, predict};
 pub use baseline::Baseline;
 pub use cautions::Caution;
 pub use compare::{Before, CompareOptions, Comparison, compare};
-pub use compensate::{Command, compensate, seen_from_base, waypoints};
+pub use compensate::{Command, compensate, seen_from_base, seen_in_base, waypoints};
 pub use covariance::{Correlations, Covariance};
 pub use errors::{AxisValues, ErrorSummary, Errors, OrientationErrors};
 pub use identification::{IdentifyError, Options, identify, identify_model};

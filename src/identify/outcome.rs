@@ -160,10 +160,14 @@ impl Identification {
 
 impl Estimate {
     /// A parameter that no stage has varied.
-    pub(super) fn unfitted(parameter: &Parameter) -> Self {
+    pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
+        let unit = match parameter.unit() {
+            Unit::Speed if !time_measured => Unit::LengthPerRow,
+            unit => unit,
+        };
         Self {
             name: parameter.name.clone(),
-            unit: parameter.unit(),
+            unit,
             nominal: parameter.nominal,
             estimate: parameter.nominal,
             std_error: None,

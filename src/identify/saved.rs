@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::Strategy;
 use crate::files::at_most;
-use crate::model::Model;
+use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::GREATEST;
 
@@ -126,6 +126,15 @@ impl SavedEstimate {
     #[must_use]
     pub fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
+    }
+
+    /// Lets the time of poses count from where it counted in the identification.
+    pub fn count_time_in(&self, poses: &mut [Pose]) {
+        if let Some(first) = self.first_time {
+            for pose in poses {
+                pose.setup.elapsed = pose.setup.time - first;
+            }
+        }
     }
 
     /// Whether it is of `problem`, of which `model` is one: bases and tools of sessions that the model lacks are left alone.

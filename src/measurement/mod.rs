@@ -11,6 +11,7 @@ mod dialect;
 #[deny(clippy::indexing_slicing)]
 mod duplicates;
 #[deny(clippy::indexing_slicing)]
+mod labels;
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
@@ -80,6 +81,8 @@ pub struct Measurements {
     pub covariates: Vec<f64>,
     /// Number of each pose from the column `pose`, where every row has one and it is a number.
     pub pose: Option<Vec<f64>>,
+    /// Name of each pose from that column, where every row has one and not all are numbers.
+    pub pose_names: Option<Labels>,
     /// Session of each row; one unnamed label where there is no column.
     pub session: Labels,
     /// Target of each row; `None` where there is no column.
@@ -107,6 +110,8 @@ pub struct NestReading {
     pub after: usize,
     /// Session, empty where there is no column for it.
     pub session: String,
+    /// 1 σ of each coordinate, where there is a column for it \[m\].
+    pub sigma: Option<f64>,
 }
 
 /// A column of a joint's commands as a table has it.
@@ -166,6 +171,12 @@ impl Measurements {
     /// What was set in a row; time counts from its own first one.
     pub fn conditions(&self, row: usize) -> PoseConditions {
         self.setup(row, self.first_time()).to_owned()
+    }
+
+    /// The same of every row.
+    pub fn all_conditions(&self) -> Vec<PoseConditions> {
+        let first = self.first_time();
+        (0..self.len()).map(|row| self.setup(row, first).to_owned()).collect()
     }
 
     /// Time of the first pose \[s\].
@@ -236,6 +247,7 @@ impl Measurements {
             approach: self.approach.as_deref().map(each),
             covariates: rows.iter().flat_map(|&row| self.covariates_of(row)).copied().collect(),
             pose: self.pose.as_deref().map(one),
+            pose_names: self.pose_names.as_ref().map(words),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
             marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
@@ -265,6 +277,13 @@ impl Measurements {
         all.covariates.extend(&other.covariates);
         all.pose = both(&self.pose, &other.pose);
         all.session.of_row.extend(&other.session.of_row);
+        if let (Some(own), Some(other)) = (&mut all.target, &other.target) {
+            own.of_row.extend(&other.of_row);
+        }
+        if let (Some(own), Some(other)) = (&mut all.marked_held_out, &other.marked_held_out) {
+            own.extend(other);
+        }
+        all.nests.extend(other.nests.iter().cloned());
         all
     }
 }

@@ -1,11 +1,11 @@
 //! From CSV files to [`Measurements`].
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
 use super::columns::{Column, Columns, Role};
+use super::labels::{LabelsBuilder, PoseNames};
 use super::limits::Commands;
 use super::orientation::Cells;
 use super::table::{Table, shortened};
@@ -100,10 +100,10 @@ impl<'a> Tables<'a> {
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.seen(), LeftOut::default());
         loop {
-            if let Some(name) = columns.nest(&table) {
-                rows.push_nest(index, name, &table, &columns)?;
-            } else if dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns)) {
+            if dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns)) {
                 left_out.count(&table);
+            } else if let Some(name) = columns.nest(&table) {
+                rows.push_nest(index, name, &table, &columns)?;
             } else {
                 rows.push(index, &table, &columns)?;
             }
@@ -124,6 +124,10 @@ impl<'a> Tables<'a> {
         match builder {
             Some(builder) => {
                 let (mut measurements, columns) = builder.finish();
+                if measurements.is_empty() {
+                    let file = measurements.files.first().cloned().unwrap_or_default();
+                    return Err(Location::file(&file).error(InputErrorKind::NestsAlone));
+                }
                 if measured {
                     warnings.extend(measurements.beyond_limits(problem, &commands(&columns)));
                 }
@@ -217,30 +221,12 @@ fn missing(file: &Path, problem: &Problem) -> InputError {
     }
 }
 
-/// Words of a column as they come.
-#[derive(Default)]
-struct LabelsBuilder {
-    labels: Labels,
-    places: HashMap<String, usize>,
-}
-
-impl LabelsBuilder {
-    fn push(&mut self, word: &str) {
-        let place = self.places.get(word).copied().unwrap_or_else(|| {
-            let place = self.labels.names.len();
-            self.labels.names.push(word.to_owned());
-            self.places.insert(word.to_owned(), place);
-            place
-        });
-        self.labels.of_row.push(place);
-    }
-}
-
 /// Measurements that grow row by row.
 struct Builder {
     measurements: Measurements,
     session: LabelsBuilder,
     target: LabelsBuilder,
+    poses: PoseNames,
     /// Whether readings are the configurations.
     uses: bool,
     /// What rx, ry and rz are.
@@ -273,19 +259,22 @@ impl Builder {
             time_measured: columns.has(Role::Time),
             approach: approach.then(Vec::new),
             covariates: Vec::new(),
-            pose: columns.has(Role::Pose).then(Vec::new),
+            pose: None,
+            pose_names: None,
             session: Labels::default(),
             target: columns.has(Role::Target).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
             command_columns: columns.read.iter().filter_map(|column| command(column, table)).collect(),
             warnings: Vec::new(),
         };
+        let poses = PoseNames::of(columns.has(Role::Pose));
         let columns = columns.read.iter().map(|column| (*column, columns.name_of(column).to_owned())).collect();
         let (session, target) = (LabelsBuilder::default(), LabelsBuilder::default());
         Self {
             measurements,
             session,
             target,
+            poses,
             uses: problem.data.joints == JointSource::Read,
             rotation: problem.data.dialect.rotation,
             stems: stems(files),
@@ -326,7 +315,13 @@ impl Builder {
             position: Vector3::zeros(),
             time: None,
             after: self.measurements.len(),
-            session: String::new(),
+            session: columns
+                .file
+                .filter(|role| *role == Role::Session)
+                .and(self.stems.get(file))
+                .cloned()
+                .unwrap_or_default(),
+            sigma: None,
         };
         for column in &columns.read {
             match column.role {
@@ -335,6 +330,7 @@ impl Builder {
                 }
                 Role::Time => reading.time = Some(table.time(column.place, column.to_si)?),
                 Role::Session => table.text(column.place)?.clone_into(&mut reading.session),
+                Role::Sigma => reading.sigma = Some(above_zero(table, column)?),
                 _ => {}
             }
         }
@@ -392,7 +388,7 @@ impl Builder {
                 Role::Target => self.target.push(table.name(column.place)?),
                 // Rows of the arm name none.
                 Role::Nest => {}
-                Role::Pose => pose = table.text(column.place)?.parse().ok().filter(|number: &f64| number.is_finite()),
+                Role::Pose => pose = Some(table.text(column.place)?),
             }
         }
         match columns.file {
@@ -410,16 +406,14 @@ impl Builder {
                 _ => turned.of_quaternion().ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
             });
         }
-        match (&mut measurements.pose, pose) {
-            (Some(poses), Some(pose)) => poses.push(pose),
-            _ => measurements.pose = None,
-        }
+        self.poses.push(pose);
         Ok(())
     }
 
     /// All that was read, and the columns of the first file.
     fn finish(self) -> (Measurements, Vec<(Column, String)>) {
-        let Self { mut measurements, session, target, columns, .. } = self;
+        let Self { mut measurements, session, target, poses, columns, .. } = self;
+        (measurements.pose, measurements.pose_names) = poses.finish();
         measurements.session = session.labels;
         if measurements.session.names.is_empty() {
             let of_row = vec![0; measurements.len()];

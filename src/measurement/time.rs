@@ -12,7 +12,10 @@ pub(super) fn iso_8601(text: &str) -> Option<f64> {
         return None;
     }
     let (digits, fraction) = match plain.split_once(['.', ',']) {
-        Some((digits, fraction)) => (digits, format!("0.{fraction}").parse::<f64>().ok()?),
+        Some((digits, fraction)) if fraction.bytes().all(|byte| byte.is_ascii_digit()) => {
+            (digits, format!("0.{fraction}").parse::<f64>().ok()?)
+        }
+        Some(_) => return None,
         None => (plain.as_str(), 0.0),
     };
     if !digits.is_ascii() || !digits.bytes().all(|byte| byte.is_ascii_digit()) || ![12, 14].contains(&digits.len()) {
@@ -24,7 +27,9 @@ pub(super) fn iso_8601(text: &str) -> Option<f64> {
     let number = |from: usize, to: usize| digits.get(from..to).map_or(Some(0), |part| part.parse::<i64>().ok());
     let (year, month, day) = (number(0, 4)?, number(4, 6)?, number(6, 8)?);
     let (hour, minute, second) = (number(8, 10)?, number(10, 12)?, number(12, 14)?);
-    if !(1..=12).contains(&month) || !(1..=31).contains(&day) || hour > 24 || minute > 59 || second > 60 {
+    let next = if month < 12 { (year, month + 1) } else { (year + 1, 1) };
+    let length = days(next.0, next.1, 1) - days(year, month, 1);
+    if !(1..=12).contains(&month) || !(1..=length).contains(&day) || hour > 24 || minute > 59 || second > 60 {
         return None;
     }
     let whole = days(year, month, day) * 86400 + hour * 3600 + minute * 60 + second - zone?;
@@ -77,6 +82,10 @@ mod tests {
             ("12.5", None),
             ("1717164200", None),
             ("2024-13-01T00:00:00", None),
+            ("2024-02-30T00:00:00", None),
+            ("2023-02-29T00:00:00", None),
+            ("20240531140320.5e3", None),
+            ("2024-12-31T00:00:00", Some(1_735_603_200.0)),
             ("2024-05-31", None),
             ("noon", None),
             ("", None),

@@ -27,6 +27,12 @@ impl Model {
         }
     }
 
+    /// The same without what effects make of the measurement: it predicts where the target is, not what is read of it.
+    #[must_use]
+    pub fn true_to_position(self) -> Self {
+        Self { instrument: self.instrument.true_to_position(), ..self }
+    }
+
     /// The same corrections of the joints that follow others, of a commanded model.
     pub(super) fn followers(&self, problem: &Problem) -> Vec<Parameter> {
         commands(problem, &self.nominal, |joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed })

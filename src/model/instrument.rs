@@ -33,6 +33,14 @@ impl Instrument {
         instrument
     }
 
+    /// What is true of the arm's surroundings: bases that move with covariates, and no errors of the instrument.
+    pub fn true_to_position(&self) -> Self {
+        let moves = |all: &[(usize, Driver, f64)]| {
+            all.iter().filter(|(_, driver, _)| matches!(driver, Driver::Covariate(_))).copied().collect()
+        };
+        Self { scale: 0.0, shifts: moves(&self.shifts), turns: moves(&self.turns) }
+    }
+
     /// What is measured of a position, measuring frame \[m\].
     #[inline]
     pub fn of(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {

@@ -175,15 +175,16 @@ impl Model {
         all.map(|turn| turn.unwrap_or(Vector3::from_element(f64::NAN))).collect()
     }
 
-    /// Positions of poses as the geometry alone has them at the full parameter vector `x`, measuring frame \[m\]: nothing gives way,
-    /// and no effect acts.
+    /// Positions of poses as the geometry alone has them at the full parameter vector `x`, as measured, measuring frame \[m\]: nothing
+    /// of the arm gives way, and no effect acts on it.
     pub fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let arm = self.arm(|k| x[k]);
-        let (bases, targets) = (self.base_frames(x), self.target_positions(x));
+        let (bases, targets, instrument) = (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
         let mut commands = Commands::new(&self.driven, &[], &[]);
         let position = |pose: &Pose| {
             let tip = arm.rigid_frame(&commands.apply(&pose.setup));
-            bases[pose.base].point(&tip.point(&targets[pose.target]))
+            let base = instrument.base(&bases[pose.base], &pose.setup);
+            instrument.of(&base.point(&tip.point(&targets[pose.target])), &pose.setup)
         };
         poses.iter().map(position).collect()
     }

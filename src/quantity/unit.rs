@@ -52,6 +52,8 @@ pub enum Unit {
     AnglePerUnit,
     /// Per unit of a covariate [m/unit]
     LengthPerUnit,
+    /// Per row, where no time was measured [m/row]
+    LengthPerRow,
     /// A small part: rad/rad, m/m
     Ratio,
     /// A number of order 1
@@ -163,6 +165,7 @@ impl Unit {
                 let suffixes = const { &[si("m_per_unit"), suffix("mm_per_unit", |x| x / 1000.0)] };
                 row("a length per unit of a covariate", "m/unit", suffixes, As(1e3, "mm/unit"))
             }
+            Self::LengthPerRow => row("a length per row", "m/row", &[], As(1e3, "mm/row")),
             Self::Ratio => row("a ratio", "1", const { &[si("relative")] }, As(1e3, "‰")),
             Self::Number => row("a ratio", "1", const { &[si("relative")] }, Plain),
         }

@@ -40,7 +40,7 @@ object! {
         /// Further structure without a known law.
         further: Vec<UnexplainedEntry> = closure.unexplained.iter().skip(1).map(|left| UnexplainedEntry::of(left, &closure.before)).collect(),
         /// 1 σ of the prior that waves of joints were given \[rad\].
-        wave_prior_rad: Option<f64> = closure.harmonic_sigma,
+        harmonic_prior_rad: Option<f64> = closure.harmonic_sigma,
         steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
         checks_before: Vec<findings::Entry> = findings::entries(&closure.before.findings),
         checks_after: Vec<findings::Entry> = findings::entries(&closure.findings),
@@ -250,7 +250,9 @@ fn verdict_word(verdict: Verdict) -> &'static str {
 /// The outcome in a sentence or two.
 fn verdict(closure: &ClosedLoop) -> String {
     let stated = SelectionRules::DEFAULT.stated;
-    let (named, such): (Vec<&Found>, Vec<&Found>) = closure.effects.iter().partition(|found| found.is_named(stated));
+    let (contradicted, others): (Vec<&Found>, Vec<&Found>) =
+        closure.effects.iter().partition(|found| found.is_contradicted());
+    let (named, such): (Vec<&Found>, Vec<&Found>) = others.into_iter().partition(|found| found.is_named(stated));
     let named = match named.as_slice() {
         [] => "No effect was found".to_owned(),
         [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
@@ -261,7 +263,13 @@ fn verdict(closure: &ClosedLoop) -> String {
         1 => format!("{named}; of one cause the place is known and the law not sure"),
         more => format!("{named}; of {more} causes the places are known and the laws not sure"),
     };
+    let found = match contradicted.as_slice() {
+        [] => found,
+        [one] => format!("{found}; {} is contradicted by data that took no part", closure.before.describe(&one.effect)),
+        several => format!("{found}; {} causes are contradicted by data that took no part", several.len()),
+    };
     match (closure.verdict, closure.findings.is_testable()) {
+        (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
         (_, false) => format!("{found}; whether structure is left could not be tested."),
         (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
@@ -353,7 +361,7 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     details.extend(
         found
             .stability
-            .map(|share| format!("named by {} % of fits to four fifths of the poses", number(share * 100.0, 0))),
+            .map(|share| format!("named in {} % of weighings without a fifth of the poses", number(share * 100.0, 0))),
     );
     details.extend(found.witness.as_ref().map(|own| format!("{} by {}, which took no part", says(own), own.data)));
     let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));

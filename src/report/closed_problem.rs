@@ -22,8 +22,11 @@ pub fn closed_problem(
     files: &[PathBuf],
 ) -> Result<String, TomlError> {
     let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
-    let closed = closure.closed.effects.iter().map(|declared| {
-        let found = closure.effects.iter().find(|found| found.effect == declared.effect);
+    let of = |effect: &Effect| closure.effects.iter().find(|found| found.effect == *effect);
+    // What data that took no part contradict is not declared.
+    let holds = |effect: &Effect| declared.contains(effect) || of(effect).is_none_or(|found| !found.is_contradicted());
+    let closed = closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
+        let found = of(&declared.effect);
         (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
     });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;

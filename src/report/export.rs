@@ -9,7 +9,7 @@ use super::errors;
 use super::json::{Summary, object, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
-use crate::identify::{ErrorSummary, Placement};
+use crate::identify::{ErrorSummary, Placement, SavedEstimate};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::parameter::Slot;
@@ -30,14 +30,18 @@ pub struct ExportErrors {
 }
 
 impl ExportErrors {
-    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of the model's parameters.
-    pub fn of(model: &Model, x: &DVector<f64>, data: &Dataset) -> Self {
+    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of the model's parameters, in a
+    /// `saved` estimate or from the same data.
+    pub fn of(model: &Model, x: &DVector<f64>, data: &Dataset, saved: Option<&SavedEstimate>) -> Self {
         let Dataset { measurements, split } = data;
         let placement = Placement::of(measurements);
-        let poses = placement.poses(measurements, &split.held_out, 1.0);
+        let mut poses = placement.poses(measurements, &split.held_out, 1.0);
+        if let Some(saved) = saved {
+            saved.count_time_in(&mut poses);
+        }
         let geometric = model.geometric_positions(&poses, x.as_slice());
         let rigid: Vec<_> = poses.iter().zip(geometric).map(|(pose, predicted)| pose.measured - predicted).collect();
-        let whole = placement.position_errors(model, x, measurements, &split.held_out);
+        let whole = model.residuals(poses, x);
         Self { whole: ErrorSummary::of(&whole), rigid: ErrorSummary::of(&rigid) }
     }
 }

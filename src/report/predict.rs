@@ -114,18 +114,22 @@ impl<'a> RowNames<'a> {
     }
 
     fn header(&self) -> Vec<String> {
-        let Measurements { pose, target, .. } = self.rows;
-        let there =
-            [("pose", pose.is_some()), ("session", table::sessions(self.rows).is_some()), ("target", target.is_some())];
+        let Measurements { pose, pose_names, target, .. } = self.rows;
+        let there = [
+            ("pose", pose.is_some() || pose_names.is_some()),
+            ("session", table::sessions(self.rows).is_some()),
+            ("target", target.is_some()),
+        ];
         let own = there.into_iter().filter(|(_, there)| *there).map(|(name, _)| name);
         ["file", "line"].into_iter().chain(own).map(str::to_owned).collect()
     }
 
     fn cells(&self, row: usize) -> Vec<String> {
-        let Measurements { pose, target, .. } = self.rows;
+        let Measurements { pose, pose_names, target, .. } = self.rows;
         let place = self.rows.location(row);
         let mut cells = vec![place.file.display().to_string(), place.line.unwrap_or(0).to_string()];
         cells.extend(pose.as_ref().map(|all| all[row].to_string()));
+        cells.extend(pose_names.as_ref().map(|all| table::word(all, row)));
         cells.extend(
             [table::sessions(self.rows), target.as_ref()].into_iter().flatten().map(|all| table::word(all, row)),
         );

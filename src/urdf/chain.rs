@@ -115,18 +115,21 @@ impl<'a> Chain<'a> {
         Ok(())
     }
 
-    /// The joint whose command a joint follows, with factor and addend; none where that joint is not in the chain, so that
-    /// it is commanded itself.
+    /// The first joint of the chain whose command a joint follows in the end, with factor and addend; none where no joint of the chain
+    /// leads it, so that it is commanded itself.
     fn leader(&self, index: usize) -> Result<(Option<(usize, f64)>, f64), InputError> {
         let (mut factor, mut addend, mut at) = (1.0, 0.0, index);
+        let mut last = (None, 0.0);
         for _ in 0..=self.robot.joints.len() {
             let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|own| own.mimic) else {
-                let follows = at != index && self.joints.contains(&at);
-                return Ok(if follows { (Some((at, factor)), addend) } else { (None, 0.0) });
+                return Ok(last);
             };
             addend += factor * plus;
             factor *= by;
             at = leader;
+            if self.joints.contains(&at) {
+                last = (Some((at, factor)), addend);
+            }
         }
         Err(self.robot.error_at(index, UrdfMistake::MimicCircle))
     }

@@ -59,11 +59,18 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     let rows = rows(chain, &mut notes);
     let name = name(&chain.robot.name);
     let arm = arm(chain, &name, &rows);
-    let problem = Problem::parse(&arm, Path::new("problem.toml"))?;
+    // What the arm cannot hold, the URDF cannot: numbers beyond any size.
+    let problem = Problem::parse(&arm, Path::new("problem.toml")).map_err(|error| chain.robot.as_problem(&error))?;
     let free = told_apart(&problem)?;
     notes.extend(right_angles(chain));
     let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
     Ok(Description { name, text, notes })
+}
+
+/// A name for a row that is no joint of the URDF: columns go by the names of joints.
+fn unlike_joints(chain: &Chain, name: &str) -> String {
+    let taken = chain.robot.joints.iter().any(|joint| joint.name == name);
+    if taken { format!("{name} frame") } else { name.to_owned() }
 }
 
 fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
@@ -74,7 +81,12 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
         && [first.theta_before, first.d_before, first.beta].iter().any(|value| value.abs() > ROUNDING)
     {
         *first = Step::default();
-        rows.push(Row { name: "mounting".to_owned(), kind: "fixed", placement: Some(stage.step), ..Row::default() });
+        rows.push(Row {
+            name: unlike_joints(chain, "mounting"),
+            kind: "fixed",
+            placement: Some(stage.step),
+            ..Row::default()
+        });
     }
     let lead = rows.len();
     // What lies behind the last joint fits its θ and d, or is a joint of its own.
@@ -103,7 +115,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
         }
     }
     if !on_axis {
-        let name = chain.ends().1.to_owned();
+        let name = unlike_joints(chain, chain.ends().1);
         rows.push(Row { name, kind: "fixed", placement: Some(chain.end), ..Row::default() });
     }
     let mut frame = Frame::identity();

@@ -90,6 +90,14 @@ impl Robot {
         Self::of(source)
     }
 
+    /// Reads a URDF from its text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
+        Self::of(Document { file: file.to_owned(), text: text.into() })
+    }
+
     fn of(source: Document) -> Result<Self, InputError> {
         let text = source.text.clone();
         let xml = Xml::parse(&text).map_err(|error| {
@@ -114,6 +122,12 @@ impl Robot {
     /// A mistake of the whole.
     pub(super) fn error(&self, mistake: UrdfMistake) -> InputError {
         Location::file(&self.source.file).error(mistake.into())
+    }
+
+    /// A mistake that is seen only in the problem made of it.
+    pub(super) fn as_problem(&self, error: &InputError) -> InputError {
+        let key = error.location.key.clone().unwrap_or_default();
+        self.error(UrdfMistake::AsProblem { key, why: error.kind.to_string() })
     }
 
     /// The file that was read.

@@ -64,7 +64,7 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     // Nothing identified: nothing moves but what was rounded in the file.
     let same = export(&chain, &problem, &Arm::nominal(&problem)).unwrap();
     let rounded: Vec<&str> = same.moved.iter().map(|origin| origin.joint.as_str()).collect();
-    assert!(rounded.iter().all(|name| ["stand", "flange"].contains(name)), "{rounded:?}");
+    assert_eq!(rounded, ["stand", "flange"]);
     assert!(same.moved.iter().all(|origin| origin.distance < 3e-6 && origin.angle < 4e-6), "{:?}", same.moved);
     let mut other = problem.clone();
     other.joints[3].a += 1e-3;

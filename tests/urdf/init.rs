@@ -137,3 +137,38 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
     assert!(chain(Some("hand"), Some("camera")).contains("is not below link \"hand\"; above it are plate, fore"));
     assert!(chain(Some("world"), Some("base")).contains("no joint moves"));
 }
+
+/// Two joints of the chain follow one another, the first a joint outside of it; and joints bear the names of rows that are no joints.
+const FOLLOWERS: &str = r#"<robot name="followers">
+<link name="base"/><link name="side"/><link name="one"/><link name="two"/><link name="tip"/>
+<joint name="aside" type="revolute"><parent link="base"/><child link="side"/><limit lower="-1" upper="1"/></joint>
+<joint name="mounting" type="revolute"><parent link="base"/><child link="one"/><origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1"/><mimic joint="aside" multiplier="2" offset="0.5"/></joint>
+<joint name="tip" type="revolute"><parent link="one"/><child link="two"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1"/><mimic joint="mounting" multiplier="-1" offset="0.25"/></joint>
+<joint name="end" type="fixed"><parent link="two"/><child link="tip"/><origin xyz="0.1 0.1 0"/></joint>
+</robot>"#;
+
+#[test]
+fn a_joint_follows_the_nearest_joint_of_the_chain() {
+    let robot = Robot::parse(FOLLOWERS, Path::new("followers.urdf")).unwrap();
+    let described = describe(&Chain::new(&robot, None, Some("tip")).unwrap()).unwrap();
+    let problem = Problem::parse(&described.text, Path::new("problem.toml")).unwrap();
+    let names: Vec<&str> = problem.joints.iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["mounting frame", "mounting", "tip", "tip frame"]);
+    assert_eq!(problem.joints[2].mimic, Some(Mimic { joint: 1, ratio: -1.0 }));
+    assert_eq!(
+        described.notes.iter().filter(|note| note.contains("is not in the chain")).count(),
+        1,
+        "{:?}",
+        described.notes
+    );
+    // Two turns about parallel axes: the second by 0.25 − q.
+    let [origin, x, _] = tips(&problem, &[vec![0.0, 0.7, 0.0, 0.0]], &DVector::zeros(0))[0];
+    let shoulder = nalgebra::Rotation3::from_euler_angles(0.4, 0.5, 0.6);
+    let turn = |angle: f64| nalgebra::Rotation3::from_axis_angle(&Vector3::y_axis(), angle);
+    let elbow = Vector3::new(0.1, 0.2, 0.3) + shoulder * (turn(0.7) * Vector3::new(0.3, 0.0, 0.0));
+    let last = shoulder * turn(0.7) * turn(0.25 - 0.7);
+    assert!((origin - (elbow + last * Vector3::new(0.1, 0.1, 0.0))).norm() < 1e-9, "{origin}");
+    assert!((x - last * Vector3::x()).norm() < 1e-9, "{x}");
+}

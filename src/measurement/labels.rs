@@ -1,0 +1,63 @@
+//! Words of a column as they come.
+
+use std::collections::HashMap;
+
+use super::Labels;
+
+/// Words of rows, each kept once.
+#[derive(Default)]
+pub(super) struct LabelsBuilder {
+    pub labels: Labels,
+    places: HashMap<String, usize>,
+}
+
+impl LabelsBuilder {
+    pub fn push(&mut self, word: &str) {
+        let place = self.places.get(word).copied().unwrap_or_else(|| {
+            let place = self.labels.names.len();
+            self.labels.names.push(word.to_owned());
+            self.places.insert(word.to_owned(), place);
+            place
+        });
+        self.labels.of_row.push(place);
+    }
+}
+
+/// Names of poses: numbers, or else words; none at all where a row has none.
+pub(super) enum PoseNames {
+    Numbers(Vec<f64>),
+    Words(LabelsBuilder),
+    Lost,
+}
+
+impl PoseNames {
+    /// Before the first row, of tables that have the column or not.
+    pub fn of(there: bool) -> Self {
+        if there { Self::Numbers(Vec::new()) } else { Self::Lost }
+    }
+
+    /// Of the next row.
+    pub fn push(&mut self, name: Option<&str>) {
+        let number = name.and_then(|name| name.parse().ok()).filter(|number: &f64| number.is_finite());
+        match (&mut *self, number, name) {
+            (Self::Numbers(numbers), Some(number), _) => numbers.push(number),
+            (Self::Numbers(numbers), None, Some(name)) => {
+                let mut words = LabelsBuilder::default();
+                numbers.iter().for_each(|number| words.push(&number.to_string()));
+                words.push(name);
+                *self = Self::Words(words);
+            }
+            (Self::Words(words), _, Some(name)) => words.push(name),
+            _ => *self = Self::Lost,
+        }
+    }
+
+    /// The numbers, or the words.
+    pub fn finish(self) -> (Option<Vec<f64>>, Option<Labels>) {
+        match self {
+            Self::Numbers(numbers) => (Some(numbers), None),
+            Self::Words(words) => (None, Some(words.labels)),
+            Self::Lost => (None, None),
+        }
+    }
+}
