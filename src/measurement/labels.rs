@@ -43,7 +43,9 @@ impl PoseNames {
             (Self::Numbers(numbers), Some(number), _) => numbers.push(number),
             (Self::Numbers(numbers), None, Some(name)) => {
                 let mut words = LabelsBuilder::default();
-                numbers.iter().for_each(|number| words.push(&number.to_string()));
+                for number in &*numbers {
+                    words.push(&number.to_string());
+                }
                 words.push(name);
                 *self = Self::Words(words);
             }
