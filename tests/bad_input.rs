@@ -1,11 +1,9 @@
-//! Mistakes in the input: each message names file, line and key, and no input makes the reader panic.
+//! Mistakes in the input: each message names file, line and key; `tests/fuzz` has those changed at random.
 
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
 #[path = "bad_input/files.rs"]
 mod files;
-#[path = "bad_input/mutated.rs"]
-mod mutated;
 #[path = "bad_input/reading.rs"]
 mod reading;
 #[path = "bad_input/sections.rs"]

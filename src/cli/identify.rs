@@ -72,6 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
     if common.json {
         output::print_json(&json)?;
+        if let (Some(sources), false) = (&sources, common.quiet) {
+            diagnostic::warn(&report::joint_sources_text(sources));
+        }
     } else if common.talks() {
         output::print(&report::estimate_text(&problem, &identification))?;
         if let Some(sources) = &sources {

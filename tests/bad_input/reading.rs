@@ -8,7 +8,6 @@ use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::Problem;
 use tempfile::TempDir;
 
-pub const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases");
 pub const ARM: &str = "name = 'arm'\n[[joint]]\n";
 
 pub fn problem(text: &str) -> Result<Problem, InputError> {
