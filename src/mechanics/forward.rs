@@ -130,6 +130,7 @@ impl<S: Scalar> Arm<S> {
         ws.events.clear();
         ws.hooks.clear();
         ws.cuts.clear();
+        ws.trail.clear();
         if matches!(bend, Bend::Rigid) {
             ws.rigid_roots.clear();
         }
@@ -147,6 +148,8 @@ impl<S: Scalar> Arm<S> {
             walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             if let Some(beam) = &joint.beam {
                 self.walk_beam(beam, i, &mut walk, ws);
+            } else {
+                ws.trail.push(walk.frame.origin);
             }
             if let Some(lateral) = &joint.lateral {
                 walk.tilt(lateral, Segment::Joint(i), ws);
@@ -161,6 +164,7 @@ impl<S: Scalar> Arm<S> {
                 slip = joint.slip(approach);
             }
             joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
+            ws.trail.push(walk.frame.origin);
             walk.cut(Segment::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
             if walk.records() {
                 for body in &joint.bodies {
@@ -179,7 +183,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Walks along the beam of joint `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
-        let Workspace { events, hooks, cuts, ropes, beyond, rigid_roots, link_loads, points, .. } = ws;
+        let Workspace { events, hooks, cuts, ropes, beyond, rigid_roots, trail, link_loads, points, .. } = ws;
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
@@ -236,6 +240,7 @@ impl<S: Scalar> Arm<S> {
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
             }
+            trail.push(walk.frame.origin);
         }
     }
 

@@ -40,6 +40,8 @@ pub struct Workspace<S> {
     pub(super) beyond: Vec<Vector3<S>>,
     /// Frame at each link's root in the last rigid walk.
     pub(super) rigid_roots: Vec<Frame<S>>,
+    /// Where the last walk came by: ends of beam elements, and each joint before and after it turned, arm base frame \[m\].
+    pub(super) trail: Vec<Vector3<S>>,
     pub(super) link_loads: Vec<LinkLoad<S>>,
     pub(super) points: Vec<(S, Wrench<S>)>,
     /// What passes towards equilibrium have shown.
@@ -57,6 +59,7 @@ impl<S> Default for Workspace<S> {
             ropes: Vec::new(),
             beyond: Vec::new(),
             rigid_roots: Vec::new(),
+            trail: Vec::new(),
             link_loads: Vec::new(),
             points: Vec::new(),
             anderson: Anderson::default(),

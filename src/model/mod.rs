@@ -21,6 +21,7 @@ mod terms;
 mod turn;
 
 pub use ablation::Ablation;
+pub use crate::mechanics::Shape;
 pub use pose::{Pose, SeenOrientation};
 pub use poses::PoseResiduals;
 

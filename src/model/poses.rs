@@ -10,7 +10,7 @@ use super::derivative::Linearised;
 use super::driven::Commands;
 use super::pose::Pose;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
-use crate::mechanics::{Equilibrated, Workspace};
+use crate::mechanics::{Equilibrated, Shape, Workspace};
 use crate::spatial::{Frame, rotation_axes, turn_between};
 
 /// Coordinates of a position, and of a position with an orientation.
@@ -187,6 +187,22 @@ impl Model {
             instrument.of(&base.point(&tip.point(&targets[pose.target])), &pose.setup)
         };
         poses.iter().map(position).collect()
+    }
+
+    /// The arm as a line to the target at the full parameter vector `x`, measuring frame \[m\]; `None` without equilibrium.
+    pub fn shapes(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Shape>> {
+        let arm = self.arm(|k| x[k]);
+        let (bases, targets) = (self.base_frames(x), self.target_positions(x));
+        let shape = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
+            let mut commands = self.commands(x);
+            let setup = commands.apply(&pose.setup);
+            let Shape { mut rigid, mut bent } = arm.shape(&setup).ok()?;
+            rigid.push(arm.rigid_frame(&setup).point(&targets[pose.target]));
+            bent.push(frame?.point(&targets[pose.target]));
+            rigid.iter_mut().chain(&mut bent).for_each(|point| *point = bases[pose.base].point(point));
+            Some(Shape { rigid, bent })
+        };
+        poses.iter().zip(self.frames(poses, x)).map(shape).collect()
     }
 
     /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.

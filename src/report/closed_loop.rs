@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 use super::document::{Block, Headline, Point, Table, code, some_of};
 use super::errors::{NOMINAL, mean_and_rms, row, unpredicted};
 use super::figures::{Figure, PlotData};
-use super::identify::{beware, change, fitted_parameters, poses, short_mm, size, spread, told, why_not_trusted};
+use super::identify::{
+    BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted,
+};
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, p_value};
@@ -172,6 +174,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
         Block::Table(errors(closure)),
         Block::Text(gain(closure)),
         Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]),
+        Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
     ]);
     blocks.extend(findings::blocks(&closure.before.findings));
@@ -183,7 +186,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks.extend(rounds(closure));
     blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
-    let causes = plots.causes.iter().enumerate().map(|(k, cause)| Figure::Cause(cause, k + 1));
+    let causes = plots.causes.iter().enumerate().map(|(k, cause)| Figure::Cause(plots, cause, k + 1));
     blocks.push(Block::Figures(causes.collect()));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure).into_iter().map(Point::from);
@@ -192,12 +195,18 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
         Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
         Block::Figures(
-            plots.trend.iter().map(Figure::Trend).chain([Figure::Histogram(plots), Figure::Order(plots)]).collect(),
+            plots
+                .trend
+                .iter()
+                .map(|trend| Figure::Trend(plots, trend))
+                .chain([Figure::Histogram(plots), Figure::Order(plots), Figure::JointMap(plots)])
+                .collect(),
         ),
         Block::heading("Parameters of the final fit"),
     ]);
     blocks.extend(parameters(&closure.closed, after, &file));
     blocks.extend(lower_waves(&closure.closed, after, &file));
+    blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
     let mut seen = vec![
         Block::heading("What the poses can tell"),
         Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&after.identifiability)]),
@@ -232,10 +241,13 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| mm(value, digits));
         ("Gain of the effects", format!("{value} mm, 95 % interval {low} to {high} mm"))
     }));
-    facts.push(("Nominal arm", format!("{} mm", short_mm(fit.registered.held_out.mean.norm))));
     facts.extend((!problem.effects.is_empty()).then(|| ("Effects declared", problem.effects.len().to_string())));
-    let of = format!("{} held-out poses, as declared and after the loop{with}", last.n);
-    Headline { change: change(&first, &best), of, facts }
+    let of = format!("{} held-out poses{with}", last.n);
+    let mut states = vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
+    if !closure.effects.is_empty() || correction.is_some() {
+        states.push(("with what was found", mean(&best)));
+    }
+    Headline { states, of, facts }
 }
 
 /// What it came to, in a word.

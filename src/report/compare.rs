@@ -6,7 +6,9 @@ use serde::{Serialize, Serializer};
 
 use super::document::{Block, Headline, Table, code};
 use super::figures::{Figure, PlotData};
-use super::identify::{beware, change, counts, errors, fitted_parameters, no_errors, poses, remainder, short_mm, size};
+use super::identify::{
+    BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder, short_mm, size,
+};
 use super::json::{Both, object, to_text};
 use super::paper_tables::{Tables, table_2, table_3, title};
 use super::quantity::{mm, number, or_dash};
@@ -135,7 +137,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
     let joint = &comparison.joint;
     let held_out = joint.fitted.held_out;
     let head = Headline {
-        change: change(&joint.registered.held_out, &held_out),
+        states: vec![(BEFORE, mean(&joint.registered.held_out)), ("identified", mean(&held_out))],
         of: format!("{} held-out poses, everything fitted at once", held_out.n),
         facts: vec![
             poses(joint),
@@ -167,6 +169,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
     blocks.push(Block::heading("Everything fitted at once"));
     blocks.extend(errors(joint));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.push(Block::Poses(plots));
     blocks.extend(remainder(problem, joint, plots, &format!("the estimate.json of {}", code("flexcal identify"))));
     blocks
 }

@@ -3,7 +3,7 @@
 //! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone; [`Block::Page`] and
 //! [`Block::Words`] hold what only one kind of reader gets.
 
-use super::figures::Figure;
+use super::figures::{Figure, PlotData};
 
 /// Marks of code in words: control characters, so that no title has them on purpose and terminals drop them.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
@@ -29,6 +29,8 @@ pub(super) enum Block<'a> {
     Headline(Headline),
     /// Drawings side by side; on the page alone.
     Figures(Vec<Figure<'a>>),
+    /// Every pose that the figures draw, to look at one by one; on the page alone.
+    Poses(&'a PlotData),
     /// What a page shows on demand: its title, what it holds, and where it is found on paper; on the page alone.
     Folded(String, Vec<Block<'a>>, String),
     /// On the page alone.
@@ -79,8 +81,8 @@ pub(super) struct Bar {
 /// What it came to, at one glance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Headline {
-    /// Before and after, with unit.
-    pub change: (String, String),
+    /// States of the arm from the first to the last, each with its error \[mm\].
+    pub states: Vec<(&'static str, String)>,
     /// Of what.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,

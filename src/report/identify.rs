@@ -157,7 +157,7 @@ pub fn identification_report(problem: &Problem, found: &Identification, plots: &
 fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let held_out = found.fitted.held_out;
     let head = Headline {
-        change: change(&found.registered.held_out, &held_out),
+        states: vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))],
         of: format!("{} held-out poses", held_out.n),
         facts: vec![
             poses(found),
@@ -173,6 +173,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(errors(found));
     blocks.extend(orientation(found));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.push(Block::Poses(plots));
     blocks.extend(remainder(problem, found, plots, FILE));
     blocks
 }
@@ -296,12 +297,14 @@ pub(super) fn remainder<'a>(
 ) -> Vec<Block<'a>> {
     let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
     blocks.extend(outliers(problem, found));
-    blocks.push(Block::Figures(vec![Figure::Histogram(plots), Figure::Order(plots)]));
+    let figures = [Figure::Histogram(plots), Figure::Order(plots), Figure::JointMap(plots)];
+    blocks.push(Block::Figures(figures.to_vec()));
     blocks.extend(findings::blocks(&plots.findings));
     blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
     blocks.extend(lower_waves(problem, found, file));
+    blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
     blocks.extend(active_constraints(found).map(|own| Block::Page(vec![own])));
     blocks.push(Block::heading("What the poses can tell"));
     blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&found.identifiability)]));
@@ -436,9 +439,12 @@ pub(super) fn short_mm(length: f64) -> String {
     mm(length, (decimals(length * 1e3, 4) + 1).min(4))
 }
 
-/// Mean errors before and after.
-pub(super) fn change(before: &ErrorSummary, after: &ErrorSummary) -> (String, String) {
-    (short_mm(before.mean.norm), short_mm(after.mean.norm))
+/// The arm before, in a headline.
+pub(super) const BEFORE: &str = "nominal arm";
+
+/// A mean error in a headline.
+pub(super) fn mean(of: &ErrorSummary) -> String {
+    short_mm(of.mean.norm)
 }
 
 pub(super) fn poses(found: &Identification) -> (&'static str, String) {

@@ -39,7 +39,9 @@ pub use closed_problem::closed_problem;
 pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use export::{ExportErrors, Exported, export_json, export_text};
-pub use figures::{Cause, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure};
+pub use figures::{
+    Cause, Command, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure,
+};
 pub use identify::{
     estimate_json, estimate_text, identification_report, joint_sources_text, lacks_something, why_not_trusted,
 };

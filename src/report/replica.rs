@@ -93,8 +93,11 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
         or_dash(spread, |spread| mm(spread.mean, 3))
     };
     let head = Headline {
-        change: (error(|own| own.rigid), error(|own| own.left(0, 0))),
-        of: "held-out poses, elasticity ignored and by the corrected formulas with the stiffness known".to_owned(),
+        states: vec![
+            ("elasticity ignored", error(|own| own.rigid)),
+            ("corrected formulas, stiffness known", error(|own| own.left(0, 0))),
+        ],
+        of: "held-out poses".to_owned(),
         facts: vec![("Everything fitted at once", format!("{} mm", error(|own| Some(own.joint))))],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];

@@ -8,13 +8,19 @@ use plotters::prelude::*;
 
 use super::arm::{Arm, LEAST_LEVER, Poses};
 use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, INK, Mark, WIDTH, chart, every, figure, legend, line, radius, range, thinned,
+    ACCENT, Axis, Drawing, FAINT, INK, Mark, WARM, WIDTH, chart, figure, legend, line, note_beyond, radius, range,
     with_margin,
 };
-use crate::diagnose::{Covariate, Unexplained};
+use super::pose::{thin, thinned};
+use super::reach::{beyond, reach};
+use super::sheet::Sheet;
+use super::tags::Tags;
+use crate::diagnose::{Covariate, PartialResidual, Unexplained};
+use crate::measurement::Split;
 use crate::model::parameter::{EffectParameter, JointField, Slot};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
+use crate::report::quantity::fixed;
 
 /// Steps of a curve.
 const STEPS: u32 = 160;
@@ -41,6 +47,8 @@ pub struct Point {
     pub y: f64,
     /// Whether the pose was held out.
     pub held_out: bool,
+    /// The row of the pose, counted from 0, where it is known.
+    pub row: Option<usize>,
 }
 
 /// The residual against the cause of an effect.
@@ -87,11 +95,12 @@ impl Quantity {
         Self::new(format!("time since the first pose [{unit}]"), factor)
     }
 
-    /// An error of a coordinate, in a unit that suits its largest value.
-    fn error(of: &str, unit: Unit, most: f64) -> Self {
+    /// An error of a coordinate.
+    fn error(of: &str, unit: Unit) -> Self {
         match unit {
             Unit::Length => Self::new(format!("error of {of} [mm]"), 1e3),
-            _ => Self::small(&format!("error of {of}"), "rad", most),
+            // In the unit of the tables.
+            _ => Self::new(format!("error of {of} [°]"), DEGREES),
         }
     }
 
@@ -152,6 +161,7 @@ pub fn of(found: &Effect, problem: &Problem, arm: &Arm, poses: &Poses) -> Option
         x: view.x[k],
         y: along(&view.levers[k], &with[k]),
         held_out: poses.split.held_out.binary_search(&k).is_ok(),
+        row: Some(k),
     };
     let telling = (0..with.len()).filter(|&k| view.levers[k].norm() > LEAST_LEVER * most);
     let points: Vec<Point> = telling.map(point).collect();
@@ -225,7 +235,7 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
         _ => return None,
     };
     let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
-    let up = Box::new(move |most| Quantity::error(&format!("joint {joint}"), unit, most));
+    let up = Box::new(move |_| Quantity::error(&format!("joint {joint}"), unit));
     Some(View { across, up, x, levers, law, reading: COORDINATE })
 }
 
@@ -317,7 +327,7 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
 
 /// The correction of structure without a cause, less its mean; none where it is no function of one covariate, or of the order of the
 /// rows.
-pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
+pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
     let of = left.correction.as_ref()?.curve.as_ref()?;
     let mut curve: Vec<(f64, f64)> = of.points.iter().map(|point| (point.covariate, point.correction)).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -338,42 +348,65 @@ pub fn unexplained(left: &Unexplained, problem: &Problem) -> Option<Cause> {
         _ => return None,
     };
     let most = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
-    let telling = of.points.iter().filter(|point| point.lever > LEAST_LEVER * most);
-    let points: Vec<Point> =
-        telling.map(|point| Point { x: point.covariate, y: point.value - mean, held_out: false }).collect();
+    let telling = of.points.iter().enumerate().filter(|(_, point)| point.lever > LEAST_LEVER * most);
+    let point = |(k, point): (usize, &PartialResidual)| Point {
+        x: point.covariate,
+        y: point.value - mean,
+        held_out: false,
+        row: split.identification.get(k).copied(),
+    };
+    let points: Vec<Point> = telling.map(point).collect();
     let place = left.part?;
-    let up = Quantity::error(&place.to_string(), of.unit, largest(&points, &curve));
+    let up = Quantity::error(&place.to_string(), of.unit);
     let title = format!("{place}: structure without a known cause");
     Some(Cause { title, across, up, points, curve, reading: COORDINATE })
 }
 
+/// The fitted law at a value, between the points of its curve; 0 without one.
+fn at_law(curve: &[(f64, f64)], x: f64) -> f64 {
+    let next = curve.partition_point(|at| at.0 < x);
+    match (next.checked_sub(1).and_then(|k| curve.get(k)), curve.get(next)) {
+        (Some(a), Some(b)) if b.0 > a.0 => a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0),
+        (Some(one), _) | (None, Some(one)) => one.1,
+        (None, None) => 0.0,
+    }
+}
+
 impl Cause {
     /// Of an effect that was found, with its number.
-    pub fn draw_effect(&self, number: usize) -> Drawing {
-        self.draw(format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
+    pub fn draw_effect(&self, number: usize, shown: &[usize]) -> Drawing {
+        self.draw(shown, format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
     }
 
     /// Of structure that no effect explains.
-    pub fn draw_unexplained(&self) -> Drawing {
+    pub fn draw_unexplained(&self, shown: &[usize]) -> Drawing {
         let lead = "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line \
                     and dots: a constant is what base and geometry take up.";
-        self.draw("unexplained".to_owned(), "correction", lead)
+        self.draw(shown, "unexplained".to_owned(), "correction", lead)
     }
 
-    /// Each pose's own measurement, and the law as a line.
-    fn draw(&self, name: String, law: &str, lead: &str) -> Drawing {
+    /// Each pose's own measurement, of the poses that figures show, and the law as a line.
+    fn draw(&self, shown: &[usize], name: String, law: &str, lead: &str) -> Drawing {
         let finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
         let all: Vec<&Point> = self.points.iter().filter(finite).collect();
-        let step = every(all.len(), MOST);
         let at = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
-        let shown = all.into_iter().step_by(step);
-        let points: Vec<((f64, f64), bool)> = shown.map(|point| (at(point.x, point.y), point.held_out)).collect();
+        let known = |k: &usize| all[*k].row.is_none_or(|row| shown.binary_search(&row).is_ok());
+        let known: Vec<usize> = (0..all.len()).filter(known).collect();
+        let kept = thin(&known, MOST, |k| all[k].y - at_law(&self.curve, all[k].x));
+        let points: Vec<((f64, f64), &Point)> = kept.iter().map(|&k| (at(all[k].x, all[k].y), all[k])).collect();
         let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| at(x, y)).collect();
         let every_point = || points.iter().map(|(at, _)| *at).chain(curve.iter().copied());
-        let (x, y) = (range(every_point().map(|at| at.0)), range(every_point().map(|at| at.1)));
-        let (x, y) = (with_margin(x, 0.04), with_margin(y, 0.06));
+        let x = with_margin(range(every_point().map(|at| at.0)), 0.04);
+        let law_at = |x: f64| at_law(&curve, x);
+        let most = reach(points.iter().map(|((x, y), _)| y - law_at(*x)));
+        let near = |(x, y): &(f64, f64)| (y - law_at(*x)).abs() <= most;
+        let close = points.iter().map(|(at, _)| *at).filter(near).chain(curve.iter().copied());
+        let y = with_margin(range(close.map(|at| at.1)), 0.06);
+        let is_beyond = |at: &(f64, f64)| at.1 < y.0 || at.1 > y.1;
+        let outside = points.iter().filter(|(at, _)| is_beyond(at)).count();
+        let tags = Tags::of_dots();
         let svg = figure((WIDTH, HEIGHT), &self.title, |area| {
-            let held_out = points.iter().any(|(_, held_out)| *held_out);
+            let held_out = points.iter().any(|(_, point)| point.held_out);
             let dots = [("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)];
             let dots = dots.into_iter().take(if held_out { 2 } else { 1 });
             let entries: Vec<_> = dots.chain([(law, ACCENT, Mark::Line)]).collect();
@@ -383,14 +416,21 @@ impl Cause {
                 chart.draw_series([PathElement::new(vec![(x.0, 0.0), (x.1, 0.0)], line(FAINT, 1.0))])?;
             }
             for (only, colour) in [(false, FAINT), (true, INK)] {
-                let dots = points.iter().filter(|(_, held_out)| *held_out == only);
-                chart.draw_series(dots.map(|(at, _)| Circle::new(*at, radius(2.2), colour.filled())))?;
+                for (at, point) in points.iter().filter(|(_, point)| point.held_out == only) {
+                    let style = if is_beyond(at) { line(WARM, 1.4) } else { colour.filled() };
+                    tags.pose(point.row);
+                    chart.draw_series([Circle::new((at.0, at.1.clamp(y.0, y.1)), radius(2.2), style)])?;
+                }
             }
             chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
-            Ok(())
+            note_beyond(&body, outside)
         });
         let mut letters = self.title.chars();
         let title = letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect());
-        Drawing { name, title, caption: format!("{lead} {}{}", self.reading, thinned(step)), svg }
+        let caption = format!("{lead} {}{}{}", self.reading, beyond(outside), thinned(kept.len(), all.len()));
+        let columns = ["held_out", self.across.label.as_str(), self.up.label.as_str()];
+        let row = |(at, point): &((f64, f64), &Point)| vec![point.held_out.to_string(), fixed(at.0, 6), fixed(at.1, 9)];
+        let sheet = Sheet::new(&columns, points.iter().map(row).collect());
+        Drawing::new(&name, &title, caption, tags.put(&svg)).with(sheet)
     }
 }

@@ -1,10 +1,13 @@
 //! Which estimates go together.
 
+use nalgebra::DMatrix;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::frame::{ACCENT, Drawing, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
+use super::sheet::Sheet;
 use crate::identify::Correlations;
+use crate::report::quantity::fixed;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 20;
@@ -22,11 +25,7 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     if all < 2 {
         return None;
     }
-    let strongest = |i: usize| (0..all).filter(|&j| j != i).map(|j| matrix[(i, j)].abs()).fold(0.0, f64::max);
-    let mut shown: Vec<usize> = (0..all).collect();
-    shown.sort_by(|&i, &j| strongest(j).total_cmp(&strongest(i)).then(i.cmp(&j)));
-    shown.truncate(MOST);
-    shown.sort_unstable();
+    let shown = partners(matrix);
     let count = i32::try_from(shown.len()).unwrap_or(1);
     let longest = shown.iter().map(|&i| correlations.names[i].chars().count()).max().unwrap_or_default();
     let letters_of = |cell: i32| (0.85 * f64::from(cell)).min(TEXT);
@@ -65,14 +64,75 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
             area.draw(&Rectangle::new([(px(left), px(y - 6)), (px(left + 14), px(y + 6))], colour.filled()))?;
         }
         write(area, "−1", (names - 6, y), MUTED, HPos::Right)?;
-        write(area, "+1   correlation [1]", (names + 14 * 11 + 6, y), MUTED, HPos::Left)
+        write(area, "+1   correlation", (names + 14 * 11 + 6, y), MUTED, HPos::Left)
     });
     let left_out = all - shown.len();
     let part =
         if left_out > 0 { format!(" Of {all} parameters the {MOST} that go together most.") } else { String::new() };
     let caption = format!(
-        "Correlation of every pair of estimates, columns in the order of the rows. Deep colours off the diagonal: only the \
+        "Correlation of every pair of estimates, columns in the order of the rows, those that go together side \
+             by side. Deep colours off the diagonal: only the \
              sum (orange) or the difference (blue) of two parameters is well known, so do not read much into either alone.{part}"
     );
-    Some(Drawing::new("correlations", "Which estimates go together", caption, svg))
+    let names = || shown.iter().map(|&i| correlations.names[i].as_str());
+    let header: Vec<&str> = std::iter::once("parameter").chain(names()).collect();
+    let row = |(name, &i): (&str, &usize)| {
+        let values = shown.iter().map(|&j| fixed(matrix[(i, j)], 4));
+        std::iter::once(name.to_owned()).chain(values).collect()
+    };
+    let sheet = Sheet::new(&header, names().zip(&shown).map(row).collect());
+    Some(Drawing::new("correlations", "Which estimates go together", caption, svg).with(sheet))
+}
+
+/// The parameters of the largest correlations, at most so many, ordered so that partners stand side by side: groups are joined
+/// from the largest correlation down, end to end (single linkage).
+fn partners(matrix: &DMatrix<f64>) -> Vec<usize> {
+    let all = matrix.ncols();
+    let size = |&(i, j): &(usize, usize)| Some(matrix[(i, j)].abs()).filter(|size| size.is_finite()).unwrap_or(0.0);
+    let mut pairs: Vec<(usize, usize)> = (0..all).flat_map(|j| (0..j).map(move |i| (i, j))).collect();
+    pairs.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+    let mut strongest: Vec<usize> = Vec::new();
+    for i in pairs.iter().flat_map(|&(i, j)| [i, j]) {
+        if strongest.len() < MOST && !strongest.contains(&i) {
+            strongest.push(i);
+        }
+    }
+    let mut groups: Vec<Vec<usize>> = strongest.iter().map(|&i| vec![i]).collect();
+    for (i, j) in pairs {
+        let place = |k: usize| groups.iter().position(|group| group.contains(&k));
+        let (Some(one), Some(other)) = (place(i), place(j)) else { continue };
+        if one != other {
+            let (first, last) = (one.min(other), one.max(other));
+            let mut joined = groups.remove(last);
+            // The partner's end of each group comes to the middle.
+            let near = |group: &[usize], k: usize| group.iter().position(|&own| own == k).unwrap_or(0);
+            let (a, b) = if groups[first].contains(&i) { (i, j) } else { (j, i) };
+            if 2 * near(&groups[first], a) + 1 < groups[first].len() {
+                groups[first].reverse();
+            }
+            if 2 * near(&joined, b) + 1 > joined.len() {
+                joined.reverse();
+            }
+            groups[first].append(&mut joined);
+        }
+    }
+    groups.concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partners_stand_side_by_side() {
+        let mut matrix = DMatrix::identity(5, 5);
+        for (i, j, value) in [(0, 3, -0.99), (1, 4, 0.95), (4, 2, 0.5)] {
+            matrix[(i, j)] = value;
+            matrix[(j, i)] = value;
+        }
+        let order = partners(&matrix);
+        let place = |k: usize| order.iter().position(|&own| own == k).unwrap_or(9);
+        assert_eq!((order.len(), place(0).abs_diff(place(3)), place(1).abs_diff(place(4))), (5, 1, 1));
+        assert_eq!(place(2).abs_diff(place(4)), 1, "{order:?}");
+    }
 }

@@ -4,12 +4,35 @@ use nalgebra::Vector3;
 
 use super::arm::{Arm, Poses};
 use super::cause::{self, Cause};
+use super::contribution::{self, Contribution};
+use super::coverage::{self, Coverage};
+use super::pose::{PoseError, thin};
 use crate::diagnose::{ClosedLoop, Findings, examine};
 use crate::error::Warning;
 use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
 use crate::measurement::Dataset;
-use crate::model::Model;
-use crate::problem::Problem;
+use crate::model::{Model, Pose, Shape};
+use crate::problem::{Joint, JointKind, Problem};
+use crate::quantity::Unit;
+
+/// Poses that a page knows one by one at most.
+const MOST: usize = 600;
+
+/// A joint that takes a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Command {
+    /// Counted from 0.
+    pub joint: usize,
+    /// Of an angle or a length.
+    pub unit: Unit,
+}
+
+impl Command {
+    /// `q2`
+    pub fn name(self) -> String {
+        format!("q{}", self.joint + 1)
+    }
+}
 
 /// What has been done for the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,21 +61,6 @@ pub struct StageErrors {
     pub errors: Vec<Vector3<f64>>,
 }
 
-/// A pose and what a fit leaves of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PoseError {
-    /// Whether it was held out.
-    pub held_out: bool,
-    /// Measured position, measuring frame \[m\].
-    pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame \[m\].
-    pub error: Vector3<f64>,
-    /// 1 σ of each coordinate \[m\].
-    pub sigma: f64,
-    /// Time \[s\], or the row's number where no time was measured.
-    pub time: f64,
-}
-
 /// Everything that the figures of one report show, and the tests of the residual.
 #[derive(Debug, Clone)]
 pub struct PlotData {
@@ -60,6 +68,16 @@ pub struct PlotData {
     pub stages: Vec<StageErrors>,
     /// What the best leaves, pose by pose, in the order of the rows.
     pub residuals: Vec<PoseError>,
+    /// The rows among them that figures may draw, ascending: all, or evenly many with the largest residuals among them.
+    pub shown: Vec<usize>,
+    /// Joints that take a command.
+    pub commands: Vec<Command>,
+    /// What the change of each parameter, and each effect, does to the predicted positions, the largest first.
+    pub contributions: Vec<Contribution>,
+    /// What of the workspace was measured.
+    pub coverage: Coverage,
+    /// The best arm in the poses of `shown`; none where a pose has no equilibrium.
+    pub arms: Vec<Option<Shape>>,
     /// Whether `time` of the residuals was measured.
     pub time_measured: bool,
     /// Tests of what it leaves of the fitted poses.
@@ -83,7 +101,7 @@ impl PlotData {
         let poses = Poses::new(data);
         let fitted = poses.arm(problem, found)?;
         let stages = vec![registered(&poses, &fitted, found), identified(&poses, &fitted, found)];
-        Ok(Self::of(&poses, stages, &fitted, found, examine(problem, data, found)?))
+        Ok(Self::of(problem, &poses, stages, (&fitted, found), examine(problem, data, found)?))
     }
 
     /// Of a comparison: of its joint fit, beside what the paper calls before and ignoring elasticity.
@@ -95,7 +113,7 @@ impl PlotData {
         let fitted = poses.arm(problem, joint)?;
         let stages = comparison.procedures.first().map(|own| own_stages(&comparison.before, own));
         let stages = stages.unwrap_or_default();
-        Ok(Self::of(&poses, stages, &fitted, joint, examine(problem, data, joint)?))
+        Ok(Self::of(problem, &poses, stages, (&fitted, joint), examine(problem, data, joint)?))
     }
 
     /// Of a closed loop, with the cause of every effect that it found.
@@ -113,32 +131,77 @@ impl PlotData {
         let effects = closure.effects.iter();
         Ok(Self {
             causes: effects.filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &poses)).collect(),
-            trend: closure.unexplained.iter().find_map(|left| cause::unexplained(left, &closure.closed)),
-            ..Self::of(&poses, stages, &after, &closure.after, closure.findings.clone())
+            trend: closure.unexplained.iter().find_map(|left| cause::unexplained(left, &closure.closed, poses.split)),
+            ..Self::of(&closure.closed, &poses, stages, (&after, &closure.after), closure.findings.clone())
         })
     }
 
-    fn of(poses: &Poses, stages: Vec<StageErrors>, best: &Arm, found: &Identification, findings: Findings) -> Self {
-        let time_measured = poses.measurements.time_measured;
-        let errors = poses.errors(best, &poses.rows());
-        let residual = |((row, pose), error): ((usize, crate::model::Pose), Vector3<f64>)| PoseError {
+    fn of(
+        problem: &Problem,
+        poses: &Poses,
+        stages: Vec<StageErrors>,
+        (best, found): (&Arm, &Identification),
+        findings: Findings,
+    ) -> Self {
+        let measurements = poses.measurements;
+        let rows = poses.rows();
+        let before = poses.errors(&untouched(best, found), &rows);
+        let residual = |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| PoseError {
+            place: measurements.location(row).to_string(),
+            configuration: pose.setup.configuration.to_vec(),
             held_out: poses.split.held_out.binary_search(&row).is_ok(),
             position: pose.measured,
             error,
+            before,
             sigma: pose.sigma,
-            time: if time_measured { pose.setup.time } else { (row + 1) as f64 },
+            time: if measurements.time_measured { pose.setup.time } else { (row + 1) as f64 },
         };
+        let errors = poses.errors(best, &rows).into_iter().zip(before);
+        let all = poses.all(found.sigma);
+        let residuals: Vec<PoseError> = all.iter().copied().enumerate().zip(errors).map(residual).collect();
+        let shown = thin(&rows, MOST, |row| residuals[row].error.norm());
+        let drawn: Vec<Pose> = shown.iter().map(|&row| all[row]).collect();
         Self {
             stages,
-            residuals: poses.all(found.sigma).into_iter().enumerate().zip(errors).map(residual).collect(),
-            time_measured,
+            arms: best.model.shapes(&drawn, best.x.as_slice()),
+            contributions: contribution::of(problem, poses, best, (found, &shown)),
+            commands: commands(problem),
+            coverage: coverage::of(problem, poses, best),
+            shown,
+            residuals,
+            time_measured: measurements.time_measured,
             findings,
-            warnings: poses.measurements.warnings.clone(),
+            warnings: measurements.warnings.clone(),
             correlations: found.correlations(),
             causes: Vec::new(),
             trend: None,
         }
     }
+
+    /// Rows of held-out poses, in the order of the errors of `stages`.
+    pub fn held_out(&self) -> Vec<usize> {
+        (0..self.residuals.len()).filter(|&row| self.residuals[row].held_out).collect()
+    }
+
+    /// Length of what the best arm leaves of a row \[m\].
+    pub fn size(&self, row: usize) -> f64 {
+        self.residuals[row].error.norm()
+    }
+}
+
+/// Joints that take a command.
+fn commands(problem: &Problem) -> Vec<Command> {
+    let command = |(joint, kind)| match kind {
+        JointKind::Revolute => Some(Command { joint, unit: Unit::Angle }),
+        JointKind::Prismatic => Some(Command { joint, unit: Unit::Length }),
+        JointKind::Fixed => None,
+    };
+    problem.joints.iter().map(Joint::commanded).enumerate().filter_map(command).collect()
+}
+
+/// The arm with nothing but base and target fitted.
+fn untouched(best: &Arm, found: &Identification) -> Arm {
+    Arm { model: best.model.clone(), x: found.registered_x.clone() }
 }
 
 /// Errors before and after a procedure, and with elasticity ignored: figure 13 of the paper.
@@ -155,7 +218,7 @@ fn stage(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
 }
 
 fn registered(poses: &Poses, fitted: &Arm, found: &Identification) -> StageErrors {
-    stage(poses, Stage::Registered, &Arm { model: fitted.model.clone(), x: found.registered_x.clone() })
+    stage(poses, Stage::Registered, &untouched(fitted, found))
 }
 
 fn identified(poses: &Poses, fitted: &Arm, found: &Identification) -> StageErrors {

@@ -5,9 +5,12 @@ use plotters::prelude::*;
 
 use super::data::{PlotData, Stage, StageErrors, own_stages};
 use super::frame::{
-    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, Mark, WIDTH, chart, every, figure, left_out, legend, line,
-    radius, range, stacked, thinned,
+    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, Mark, WIDTH, chart, figure, legend, line, radius, range,
+    stacked,
 };
+use super::pose::{left_out, thin, thinned};
+use super::sheet::Sheet;
+use super::tags::Tags;
 use crate::identify::{Before, Procedure};
 use crate::report::quantity::number;
 
@@ -40,19 +43,28 @@ fn colour(place: usize, count: usize) -> RGBColor {
 
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
 pub fn errors(data: &PlotData) -> Drawing {
-    drawn("held-out-errors", "Error of each held-out pose", &data.stages)
+    let drawn = drawn("held-out-errors", "Error of each held-out pose", &data.stages, &data.held_out());
+    let held_out = data.residuals.iter().filter(|pose| pose.held_out).enumerate();
+    let further: Vec<String> = data.stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
+    let of_stages = |k: usize| data.stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
+    let rows = held_out.map(|(k, pose)| (pose, of_stages(k)));
+    let columns: Vec<&str> = further.iter().map(String::as_str).collect();
+    drawn.with(Sheet::of_poses(&columns, rows))
 }
 
 /// The same of one procedure of a comparison, by its name.
 pub fn of_procedure(before: &Before, own: &Procedure) -> Drawing {
     let name = own.name();
     let title = format!("Error of each held-out pose: {name}");
-    drawn(&format!("held-out-errors-{name}"), &title, &own_stages(before, own))
+    drawn(&format!("held-out-errors-{name}"), &title, &own_stages(before, own), &[])
 }
 
-fn drawn(name: &str, title: &str, states: &[StageErrors]) -> Drawing {
+/// `rows` are those of the poses, where they are known.
+fn drawn(name: &str, title: &str, states: &[StageErrors], rows: &[usize]) -> Drawing {
     let count = states.first().map_or(0, |state| state.errors.len());
-    let step = every(count, MOST);
+    let last = |k: usize| states.last().and_then(|state| state.errors.get(k)).map_or(0.0, Vector3::norm);
+    let shown = thin(&(0..count).collect::<Vec<_>>(), MOST, last);
+    let tags = Tags::of_dots();
     let size = (WIDTH, 24 + 4 * PANEL + 34);
     let mut norms: Vec<f64> =
         states.last().map_or_else(Vec::new, |state| state.errors.iter().map(Vector3::norm).collect());
@@ -76,7 +88,7 @@ fn drawn(name: &str, title: &str, states: &[StageErrors]) -> Drawing {
             let bottom = Axis::linear((0.0, count as f64 + 1.0), if last { "held-out pose" } else { "" })
                 .numbers(if last { 8 } else { 0 });
             let left = Axis::logarithmic(extent, label).numbers(4);
-            draw(panel, &bottom, &left, states, (axis, step))?;
+            draw(panel, (&bottom, &left), states, (axis, &shown), |k| tags.pose(rows.get(k).copied()))?;
         }
         Ok(())
     });
@@ -89,24 +101,29 @@ fn drawn(name: &str, title: &str, states: &[StageErrors]) -> Drawing {
              is ten times better. None of these poses took part in fitting. Values below {floor} mm are drawn at the lower \
              edge.{}{}",
         left_out(without),
-        thinned(step)
+        thinned(shown.len(), count)
     );
-    Drawing::new(name, title, caption, svg)
+    Drawing::new(name, title, caption, tags.put(&svg))
 }
 
-fn draw(panel: &Area, x: &Axis, y: &Axis, states: &[StageErrors], (axis, step): (usize, usize)) -> Result<(), Failure> {
+fn draw(
+    panel: &Area,
+    (x, y): (&Axis, &Axis),
+    states: &[StageErrors],
+    (axis, shown): (usize, &[usize]),
+    tag: impl Fn(usize),
+) -> Result<(), Failure> {
     let mut chart = chart(panel, x, y)?;
     for (place, state) in states.iter().enumerate() {
         let colour = colour(place, states.len());
         let value = |error: &Vector3<f64>| if axis == 3 { error.norm() } else { error[axis].abs() };
-        let points: Vec<(f64, f64)> = (0..state.errors.len())
-            .step_by(step)
-            .filter(|&k| state.errors[k].norm().is_finite())
-            .map(|k| (k as f64 + 1.0, (value(&state.errors[k]) * 1e3).log10().clamp(y.range.0, y.range.1)))
-            .collect();
-        chart.draw_series(LineSeries::new(points.iter().copied(), colour.mix(0.45).stroke_width(3)))?;
+        let there = shown.iter().copied().filter(|&k| state.errors[k].norm().is_finite());
+        let at = |k: usize| (k as f64 + 1.0, (value(&state.errors[k]) * 1e3).log10().clamp(y.range.0, y.range.1));
+        let points: Vec<(usize, (f64, f64))> = there.map(|k| (k, at(k))).collect();
+        chart.draw_series(LineSeries::new(points.iter().map(|own| own.1), colour.mix(0.45).stroke_width(3)))?;
         let style = if place == 0 { line(colour, 1.2) } else { colour.filled() };
-        chart.draw_series(points.into_iter().map(|at| Circle::new(at, radius(1.9), style)))?;
+        points.iter().for_each(|own| tag(own.0));
+        chart.draw_series(points.into_iter().map(|(_, at)| Circle::new(at, radius(1.9), style)))?;
     }
     Ok(())
 }

@@ -9,6 +9,8 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::sheet::Sheet;
+
 /// Figures are drawn this much larger than they are shown: the backend keeps to whole pixels.
 pub const SCALE: i32 = 4;
 /// Width of a figure as shown.
@@ -47,11 +49,18 @@ pub struct Drawing {
     pub caption: String,
     /// The drawing.
     pub svg: String,
+    /// Its numbers, as drawn.
+    pub data: Sheet,
 }
 
 impl Drawing {
     pub fn new(name: &str, title: &str, caption: impl Into<String>, svg: String) -> Self {
-        Self { name: name.to_owned(), title: title.to_owned(), caption: caption.into(), svg }
+        Self { name: name.to_owned(), title: title.to_owned(), caption: caption.into(), svg, data: Sheet::default() }
+    }
+
+    /// With its numbers.
+    pub fn with(self, data: Sheet) -> Self {
+        Self { data, ..self }
     }
 }
 
@@ -358,21 +367,10 @@ pub fn stacked<'a>(area: &Area<'a>, heights: &[i32]) -> Vec<Area<'a>> {
     heights.iter().map(part).collect()
 }
 
-/// Every how many of `count` are drawn so that there are no more than `most`.
-pub fn every(count: usize, most: usize) -> usize {
-    count.div_ceil(most).max(1)
-}
-
-/// " 3 poses without an equilibrium are left out." where there are any.
-pub fn left_out(poses: usize) -> String {
-    match poses {
-        0 => String::new(),
-        1 => " One pose without an equilibrium is left out.".to_owned(),
-        n => format!(" {n} poses without an equilibrium are left out."),
+/// Writes at the top right of a panel how many values lie beyond it.
+pub fn note_beyond(panel: &Area, count: usize) -> Result<(), Failure> {
+    if count == 0 {
+        return Ok(());
     }
-}
-
-/// " One pose in 3 is drawn." where poses are left out of a drawing.
-pub fn thinned(every: usize) -> String {
-    if every > 1 { format!(" One pose in {every} is drawn.") } else { String::new() }
+    write(panel, &format!("{count} beyond"), (WIDTH - 16, 15), WARM, HPos::Right)
 }

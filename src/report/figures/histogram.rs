@@ -1,12 +1,17 @@
 //! How the residuals scatter.
 
 use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
 
 use super::data::PlotData;
-use super::frame::{ACCENT, Axis, Drawing, FAINT, Mark, WIDTH, chart, figure, legend, line};
+use super::frame::{ACCENT, Axis, Drawing, FAINT, LEFT, Mark, WARM, WIDTH, chart, figure, legend, line, write};
+use super::sheet::Sheet;
+use crate::numeric::median;
+use crate::report::quantity::fixed;
 
 const HEIGHT: i32 = 280;
-/// Least that the axis reaches \[σ\]; else four times what the residuals scatter. What lies beyond is counted into the last bar.
+/// Least that the axis reaches \[σ\]; else four times what most residuals scatter. What lies beyond is counted into the outermost
+/// bars.
 const REACH: f64 = 5.0;
 
 /// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
@@ -17,7 +22,8 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     if values.len() < 3 {
         return None;
     }
-    let scatter = (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
+    // From the median of their sizes: a few large ones do not flatten the others.
+    let scatter = 1.4826 * median(values.iter().map(|value| value.abs()))?;
     let reach = (4.0 * scatter).ceil().max(REACH);
     let half: usize = if values.len() < 150 { 10 } else { 20 };
     let width = reach / half as f64;
@@ -31,22 +37,30 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let scale = values.len() as f64 * width;
     let normal = |u: f64| scale * (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let tallest = counts.iter().map(|count| *count as f64).fold(normal(0.0), f64::max) * 1.08;
-    let beyond = values.iter().filter(|value| value.abs() > reach).count();
+    let beyond = [values.iter().filter(|value| **value < -reach).count(), values.iter().filter(|value| **value > reach).count()];
     let svg = figure((WIDTH, HEIGHT), "Histogram of the residuals", |area| {
         let body = legend(area, 20, &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)])?;
         let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);
-        let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "coordinates [1]"))?;
+        let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "number of coordinates"))?;
         let bars = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(|(k, count)| {
             let left = k as f64 * width - reach;
-            Rectangle::new([(left + 0.04 * width, 0.0), (left + 0.96 * width, *count as f64)], FAINT.filled())
+            let outermost = (k == 0 && beyond[0] > 0) || (k + 1 == 2 * half && beyond[1] > 0);
+            let colour = if outermost { WARM } else { FAINT };
+            Rectangle::new([(left + 0.04 * width, 0.0), (left + 0.96 * width, *count as f64)], colour.filled())
         });
         chart.draw_series(bars)?;
         let curve = (-60..=60).map(|k| reach * f64::from(k) / 60.0).map(|u| (u, normal(u)));
         chart.draw_series(LineSeries::new(curve, line(ACCENT, 2.0)))?;
+        for (count, at, side) in [(beyond[0], LEFT + 6, HPos::Left), (beyond[1], WIDTH - 16, HPos::Right)] {
+            if count > 0 {
+                write(&body, &format!("{count} beyond"), (at, 18), WARM, side)?;
+            }
+        }
         Ok(())
     });
-    let outside = if beyond > 0 {
-        format!(" {beyond} lie beyond ±{reach} σ and are counted into the outermost bars.")
+    let outside = if beyond[0] + beyond[1] > 0 {
+        let all = beyond[0] + beyond[1];
+        format!(" {all} lie beyond ±{reach} σ and are counted into the outermost bars.")
     } else {
         String::new()
     };
@@ -54,5 +68,10 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
         "Residual coordinates of the fitted poses against the σ of the measurement. Noise alone would follow the line; a \
              fit takes a little off it, the more parameters the more.{outside}"
     );
-    Some(Drawing::new("residual-histogram", "How the residuals scatter", caption, svg))
+    let rows = counts.iter().enumerate().map(|(k, count)| {
+        let left = k as f64 * width - reach;
+        vec![fixed(left, 4), fixed(left + width, 4), count.to_string()]
+    });
+    let sheet = Sheet::new(&["from_sigma", "to_sigma", "coordinates"], rows.collect());
+    Some(Drawing::new("residual-histogram", "How the residuals scatter", caption, svg).with(sheet))
 }

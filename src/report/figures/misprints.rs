@@ -79,7 +79,7 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
             }
         }
         let middle = NAMES + (WIDTH - NAMES) / 2;
-        write(area, "held-out mean over that of the rigid fit [1]", (middle, bottom + 28), INK, HPos::Center)
+        write(area, "held-out mean over that of the rigid fit", (middle, bottom + 28), INK, HPos::Center)
     })
 }
 

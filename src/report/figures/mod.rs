@@ -2,16 +2,23 @@
 
 mod arm;
 mod cause;
+mod contribution;
 mod correlation;
+mod coverage;
 mod data;
 mod errors;
 mod frame;
 mod histogram;
+mod joint_map;
 mod misprints;
 mod order;
+mod pose;
 mod ranking;
+mod reach;
+mod sheet;
 mod spectrum;
 mod strategies;
+mod tags;
 mod vectors;
 
 pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
@@ -22,7 +29,10 @@ use crate::least_squares::Identifiability;
 use crate::monte_carlo::{MisprintStudy, ReplicaResults};
 
 pub use cause::{Cause, Point, Quantity};
-pub use data::{PlotData, PoseError, Stage, StageErrors};
+pub use contribution::Contribution;
+pub use coverage::Coverage;
+pub use data::{Command, PlotData, Stage, StageErrors};
+pub use pose::PoseError;
 
 /// A figure with its numbers.
 #[derive(Debug, Clone, Copy)]
@@ -41,8 +51,10 @@ pub enum Figure<'a> {
     Ablations(&'a Comparison),
     Misprints(&'a MisprintStudy, &'a ReplicaResults),
     /// Of an effect, with its number from 1.
-    Cause(&'a Cause, usize),
-    Trend(&'a Cause),
+    Cause(&'a PlotData, &'a Cause, usize),
+    Trend(&'a PlotData, &'a Cause),
+    Contributions(&'a PlotData),
+    JointMap(&'a PlotData),
 }
 
 impl Figure<'_> {
@@ -60,20 +72,24 @@ impl Figure<'_> {
             Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
             Self::Ablations(comparison) => strategies::ablations(comparison),
             Self::Misprints(study, found) => Some(misprints::misprints(study, found)),
-            Self::Cause(own, number) => Some(own.draw_effect(number)),
-            Self::Trend(own) => Some(own.draw_unexplained()),
+            Self::Cause(data, own, number) => Some(own.draw_effect(number, &data.shown)),
+            Self::Trend(data, own) => Some(own.draw_unexplained(&data.shown)),
+            Self::Contributions(data) => contribution::contributions(&data.contributions),
+            Self::JointMap(data) => joint_map::joint_map(data),
         }
     }
 }
 
 /// Every name but those of effects, which are numbered, and of procedures, which are named.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 13] = [
     "ablations",
+    "contributions",
     "correlations",
     "held-out-errors",
     "misprints",
     "ranking",
     "residual-histogram",
+    "residual-joints",
     "residual-order",
     "residual-vectors",
     "singular-values",

@@ -2,11 +2,15 @@
 
 use plotters::prelude::*;
 
-use super::data::{PlotData, PoseError};
+use super::data::PlotData;
 use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, Mark, WIDTH, band, chart, every, figure, left_out, legend, line, radius, range,
-    stacked, thinned, with_margin,
+    ACCENT, Axis, Drawing, FAINT, Mark, WARM, WIDTH, band, chart, figure, legend, line, note_beyond, radius, range,
+    stacked, with_margin,
 };
+use super::pose::{PoseError, left_out, thin, thinned};
+use super::reach::{beyond, reach};
+use super::sheet::Sheet;
+use super::tags::Tags;
 
 /// Poses that are drawn at most.
 const MOST: usize = 300;
@@ -14,24 +18,27 @@ const PANEL: i32 = 92;
 
 /// Residual coordinates in the order of time, with the band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
-    let mut fitted: Vec<&PoseError> = data.residuals.iter().filter(|residual| !residual.held_out).collect();
-    let all = fitted.len();
-    fitted.retain(|residual| residual.error.norm().is_finite());
-    let without = all - fitted.len();
-    let step = every(fitted.len(), MOST);
-    let shown: Vec<&PoseError> = fitted.into_iter().step_by(step).collect();
-    let first = range(shown.iter().map(|residual| residual.time));
+    let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
+    let (finite, lost): (Vec<&PoseError>, Vec<&PoseError>) = fitted.partition(|own| own.error.norm().is_finite());
+    let is_fitted = |row: &usize| !data.residuals[*row].held_out && data.size(*row).is_finite();
+    let known: Vec<usize> = data.shown.iter().copied().filter(is_fitted).collect();
+    let shown: Vec<(usize, &PoseError)> =
+        thin(&known, MOST, |row| data.size(row)).into_iter().map(|row| (row, &data.residuals[row])).collect();
+    let first = range(shown.iter().map(|(_, residual)| residual.time));
     if shown.len() < 2 {
         return None;
     }
     let (factor, label) = match (data.time_measured, first.1 - first.0) {
-        (false, _) => (1.0, "row [1]"),
+        (false, _) => (1.0, "row"),
         (true, span) if span > 7200.0 => (1.0 / 3600.0, "time [h]"),
         (true, _) => (1.0, "time [s]"),
     };
     let across = with_margin((first.0 * factor, first.1 * factor), 0.02);
-    let sigma = shown.iter().map(|residual| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
-    let most = shown.iter().map(|residual| residual.error.amax() * 1e3).fold(2.2 * sigma, f64::max) * 1.08;
+    let sigma = shown.iter().map(|(_, residual)| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
+    let most = reach(shown.iter().flat_map(|(_, own)| own.error.iter().map(|x| x * 1e3))).max(2.2 * sigma) * 1.08;
+    let is_beyond = |own: &PoseError, axis: usize| (own.error[axis] * 1e3).abs() > most;
+    let outside = |axis: usize| shown.iter().filter(|(_, own)| is_beyond(own, axis)).count();
+    let tags = Tags::of_dots();
     let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "Residuals in order", |area| {
         let entries = [("fitted pose", FAINT, Mark::Dot), ("noise alone: ±2 σ of the measurement", ACCENT, Mark::Band)];
         let panels = stacked(&legend(area, 20, &entries)?, &[PANEL, PANEL, PANEL + 36]);
@@ -42,16 +49,25 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
             let noise = Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], band(ACCENT));
             chart.draw_series([noise])?;
             chart.draw_series([PathElement::new(vec![(across.0, 0.0), (across.1, 0.0)], line(FAINT, 1.0))])?;
-            let at = |residual: &&PoseError| (residual.time * factor, residual.error[axis] * 1e3);
-            chart.draw_series(shown.iter().map(|residual| Circle::new(at(residual), radius(2.0), FAINT.filled())))?;
+            for (row, own) in &shown {
+                let at = (own.time * factor, (own.error[axis] * 1e3).clamp(-most, most));
+                let style = if is_beyond(own, axis) { line(WARM, 1.4) } else { FAINT.filled() };
+                tags.pose(Some(*row));
+                chart.draw_series([Circle::new(at, radius(2.0), style)])?;
+            }
+            note_beyond(panel, outside(axis))?;
         }
         Ok(())
     });
     let caption = format!(
         "Residuals measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
-             should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}",
-        left_out(without),
-        thinned(step)
+             should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}{}",
+        beyond((0..3).map(outside).sum()),
+        left_out(lost.len()),
+        thinned(shown.len(), finite.len())
     );
-    Some(Drawing::new("residual-order", "The residuals one after another", caption, svg))
+    let row = |own: &PoseError| std::iter::once(own.time * factor).chain(own.error.iter().map(|x| x * 1e3)).collect();
+    let columns = [label, "residual_x_mm", "residual_y_mm", "residual_z_mm"];
+    let sheet = Sheet::of_poses(&columns, shown.iter().map(|&(_, own)| (own, row(own))));
+    Some(Drawing::new("residual-order", "The residuals one after another", caption, tags.put(&svg)).with(sheet))
 }

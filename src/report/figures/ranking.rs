@@ -4,9 +4,10 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::frame::{ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
+use super::sheet::Sheet;
 use crate::diagnose::{Ranked, Trace};
 use crate::problem::Effect;
-use crate::report::quantity::number;
+use crate::report::quantity::{fixed, mm};
 
 /// Candidates that are drawn.
 const MOST: usize = 12;
@@ -71,14 +72,14 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
             };
             area.draw(&Rectangle::new(bar, style))?;
             let mark = if k > 0 && alike(ranked) { "≈ first  " } else { "" };
-            let gain = format!("{mark}−{} µm", number(ranked.gain.max(0.0) * 1e6, 0));
+            let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
             // Beside the bar, and clear of the line.
             let beside = end.max(place(-trace.level.log10()));
             write(area, &gain, (beside / px(1) + 6, y), MUTED, HPos::Left)?;
         }
         let level = place(-trace.level.log10());
         area.draw(&PathElement::new(vec![(level, px(top - 4)), (level, px(bottom))], line(INK, 1.0)))?;
-        write(area, "evidence, −log₁₀ p [1]", (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28), INK, HPos::Center)
+        write(area, "evidence, −log₁₀ p", (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28), INK, HPos::Center)
     });
     let caption = format!(
         "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
@@ -86,5 +87,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
              take off the root mean square error. Pale blue: hard to tell from the first with these poses.",
         trace.tried, trace.level
     );
-    Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg))
+    let row = |ranked: &&Ranked| vec![named(&ranked.effect, trace), format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)];
+    let sheet = Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
+    Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg).with(sheet))
 }

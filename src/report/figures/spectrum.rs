@@ -3,6 +3,7 @@
 use plotters::prelude::*;
 
 use super::frame::{ACCENT, Axis, Drawing, FAINT, Mark, WARM, WIDTH, chart, figure, legend, line, radius};
+use super::sheet::Sheet;
 use crate::least_squares::Identifiability;
 
 const HEIGHT: i32 = 280;
@@ -21,7 +22,7 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         let entries = [("identifiable", ACCENT, Mark::Dot), ("not identifiable", WARM, Mark::Dot)];
         let body = legend(area, 20, if blind > 0 { &entries } else { &entries[..1] })?;
         let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best identified first");
-        let y = Axis::logarithmic((lowest, 0.3), "relative singular value [1]");
+        let y = Axis::logarithmic((lowest, 0.3), "singular value / largest");
         let mut chart = chart(&body, &x, &y)?;
         for (k, at) in values.iter().enumerate() {
             let colour = if k < found.rank { ACCENT } else { WARM };
@@ -42,5 +43,8 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         found.singular_values.len(),
         found.condition_number()
     );
-    Some(Drawing::new("singular-values", "What the poses can tell", caption, svg))
+    let values = found.singular_values.iter().enumerate();
+    let rows = values.map(|(k, value)| vec![(k + 1).to_string(), format!("{value:e}"), (k < found.rank).to_string()]);
+    let sheet = Sheet::new(&["number", "singular_value", "identifiable"], rows.collect());
+    Some(Drawing::new("singular-values", "What the poses can tell", caption, svg).with(sheet))
 }

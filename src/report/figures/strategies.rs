@@ -6,8 +6,9 @@ use plotters::style::text_anchor::HPos;
 use super::frame::{
     ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
 };
+use super::sheet::Sheet;
 use crate::identify::{Baseline, Comparison, Errors};
-use crate::report::quantity::{decimals, number};
+use crate::report::quantity::{decimals, fixed, number};
 
 const ROW: i32 = 22;
 /// Room for names.
@@ -49,7 +50,8 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
     let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
                    wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
                    share a row.";
-    Drawing::new("strategies", "Strategies side by side", caption, rows(&entries, "Error of every strategy"))
+    let svg = rows(&entries, "Error of every strategy");
+    Drawing::new("strategies", "Strategies side by side", caption, svg).with(sheet(&entries))
 }
 
 fn entry(strategy: &str, errors: Errors) -> Entry<'_> {
@@ -64,7 +66,15 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
                    rigid to complete, on a logarithmic scale.";
     let title = "What each part of the elasticity is worth";
     (entries.len() > 1)
-        .then(|| Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity")))
+        .then(|| Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity")).with(sheet(&entries)))
+}
+
+fn sheet(entries: &[Entry]) -> Sheet {
+    let row = |own: &Entry| {
+        let errors = [own.errors.identification.mean.norm, own.errors.held_out.mean.norm];
+        std::iter::once(own.name.clone()).chain(errors.map(|error| fixed(error * 1e3, 6))).collect()
+    };
+    Sheet::new(&["name", "fitted_mean_mm", "held_out_mean_mm"], entries.iter().map(row).collect())
 }
 
 fn rows(entries: &[Entry], label: &str) -> String {

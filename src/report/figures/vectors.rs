@@ -3,11 +3,14 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
-use super::data::{PlotData, PoseError};
+use super::data::PlotData;
 use super::frame::{
-    Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, Mark, WIDTH, chart, every, figure, left_out, legend, line,
-    px, radius, range, stacked, thinned, with_margin, write,
+    Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, Mark, WIDTH, chart, figure, legend, line, px, radius, range,
+    stacked, with_margin, write,
 };
+use super::pose::{PoseError, left_out, thin, thinned};
+use super::sheet::Sheet;
+use super::tags::Tags;
 use crate::report::quantity::number;
 
 /// Poses that are drawn at most.
@@ -20,19 +23,19 @@ const GREATEST: f64 = 330.0;
 
 /// Residuals from above and from the side, at their measured positions.
 pub fn vectors(data: &PlotData) -> Drawing {
-    let finite = |residual: &&PoseError| residual.error.norm().is_finite();
-    let all: Vec<&PoseError> = data.residuals.iter().filter(finite).collect();
-    let count = all.len();
-    let step = every(count, MOST);
-    let shown: Vec<&PoseError> = all.into_iter().step_by(step).collect();
-    let extent = |axis: usize| with_margin(range(shown.iter().map(|residual| residual.position[axis])), 0.12);
+    let count = (0..data.residuals.len()).filter(|&row| data.size(row).is_finite()).count();
+    let finite: Vec<usize> = data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
+    let shown: Vec<(usize, &PoseError)> =
+        thin(&finite, MOST, |row| data.size(row)).into_iter().map(|row| (row, &data.residuals[row])).collect();
+    let tags = Tags::of_dots();
+    let extent = |axis: usize| with_margin(range(shown.iter().map(|(_, residual)| residual.position[axis])), 0.12);
     let width = f64::from(WIDTH - LEFT - 12);
     let size = |(low, high): (f64, f64)| high - low;
     // One scale for all: strokes keep their directions.
     let per_pixel = (size(extent(0)) / width).max(size(extent(1)) / GREATEST).max(size(extent(2)) / GREATEST);
     let across = about(extent(0), width * per_pixel);
     let views = [1, 2].map(|axis| View::new(axis, extent(axis), per_pixel));
-    let mut lengths: Vec<f64> = shown.iter().map(|residual| residual.error.norm()).collect();
+    let mut lengths: Vec<f64> = shown.iter().map(|(_, residual)| residual.error.norm()).collect();
     lengths.sort_by(f64::total_cmp);
     let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
     // A scale of 1, 2 or 5 times a power of ten.
@@ -47,7 +50,7 @@ pub fn vectors(data: &PlotData) -> Drawing {
         write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
         let panels = stacked(&body, &views.each_ref().map(|view| view.height + BELOW + 8));
         for (view, panel) in views.iter().zip(&panels) {
-            view.draw(panel, across, &shown, larger)?;
+            view.draw(panel, across, (&shown, larger), &tags)?;
         }
         Ok(())
     });
@@ -57,9 +60,12 @@ pub fn vectors(data: &PlotData) -> Drawing {
              structure; a tangle is noise.{}{}",
         short(larger),
         left_out(data.residuals.len() - count),
-        thinned(step)
+        thinned(shown.len(), count)
     );
-    Drawing::new("residual-vectors", "What is left, over the workspace", caption, svg)
+    let columns = ["x_mm", "y_mm", "z_mm", "residual_x_mm", "residual_y_mm", "residual_z_mm"];
+    let row = |(_, own): (usize, &'_ PoseError)| own.position.iter().chain(own.error.iter()).map(|x| x * 1e3).collect();
+    let sheet = Sheet::of_poses(&columns, shown.iter().map(|&own| (own.1, row(own))));
+    Drawing::new("residual-vectors", "What is left, over the workspace", caption, tags.put(&svg)).with(sheet)
 }
 
 /// 1, 2 or 5 times the power of ten below.
@@ -108,11 +114,17 @@ impl View {
         Self { axis, range: about(range, height * per_pixel), height: shown }
     }
 
-    fn draw(&self, panel: &Area, across: (f64, f64), shown: &[&PoseError], larger: f64) -> Result<(), Failure> {
+    fn draw(
+        &self,
+        panel: &Area,
+        across: (f64, f64),
+        (shown, larger): (&[(usize, &PoseError)], f64),
+        tags: &Tags,
+    ) -> Result<(), Failure> {
         let label = if self.axis == 1 { "y [m]" } else { "z [m]" };
         let below = if self.axis == 1 { "x [m], seen from above" } else { "x [m], seen from the side" };
         let mut chart = chart(panel, &Axis::linear(across, below), &Axis::linear(self.range, label).numbers(5))?;
-        for residual in shown {
+        for (row, residual) in shown {
             let colour = if residual.held_out { INK } else { FAINT };
             let from = (residual.position.x, residual.position[self.axis]);
             let end = (from.0 + larger * residual.error.x, from.1 + larger * residual.error[self.axis]);
@@ -120,6 +132,7 @@ impl View {
             let part = inside(from.0, end.0, across).min(inside(from.1, end.1, self.range));
             let to = (from.0 + part * (end.0 - from.0), from.1 + part * (end.1 - from.1));
             chart.draw_series([PathElement::new(vec![from, to], line(colour, 1.2))])?;
+            tags.pose(Some(*row));
             chart.draw_series([Circle::new(from, radius(1.5), colour.filled())])?;
         }
         Ok(())

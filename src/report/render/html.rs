@@ -1,8 +1,10 @@
-//! Blocks as a page that needs nothing else: no scripts, nothing to load; its figures are files of their own as well.
+//! Blocks as a page that needs nothing else: nothing to load, and no script to be read; its own adds what one can do with poses.
+//! Its figures are files of their own as well.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::markdown::markdown;
+use super::poses;
 use super::style;
 use super::text::marked;
 use crate::error::is_hidden;
@@ -13,13 +15,16 @@ use crate::report::figures::{Drawing, Figure};
 /// Half the width of a bar in standard errors: wider changes run off it.
 const REACH: f64 = 10.0;
 
+/// What a page does beyond being read, and the arm in three dimensions.
+const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
+
 /// A report for people.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Report {
     /// In brief and without figures.
     pub markdown: String,
-    /// The whole page: no scripts, nothing to load.
+    /// The whole page: nothing to load, and no script needed to read it.
     pub html: String,
     /// File name and SVG text of every figure.
     pub figures: Vec<(String, String)>,
@@ -55,6 +60,7 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
                         Every figure is also a file in the folder figures."
                     }
                 }
+                script { (PreEscaped(SCRIPTS.concat())) }
             }
         }
     };
@@ -101,6 +107,7 @@ fn one(block: &Block, figures: &mut Vec<Drawing>) -> Markup {
             Block::Ranking(points) => ol { @for point in points { (item(point)) } },
             Block::Table(own) => (table(own)),
             Block::Headline(own) => (headline(own)),
+            Block::Poses(own) => (poses::section(own)),
             Block::Figures(own) => (grid(own.iter().filter_map(Figure::draw).collect(), figures)),
             Block::Folded(title, inner, on_paper) => {
                 details { summary { (words(title)) } @for block in inner { (one(block, figures)) } }
@@ -146,10 +153,15 @@ fn item(point: &Point) -> Markup {
 /// Before → after, as large as it deserves, and facts.
 fn headline(own: &Headline) -> Markup {
     html! {
-        p.big {
-            span.was { (own.change.0) }
-            span.arrow { "→" }
-            span.now { (own.change.1) " " span.unit { "mm" } }
+        @let last = own.states.len().saturating_sub(1);
+        div.big {
+            @for (k, (label, error)) in own.states.iter().enumerate() {
+                @if k > 0 { span.arrow { "→" } }
+                span.state {
+                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { "mm" } } }
+                    span.label { (label) }
+                }
+            }
         }
         p.under { "mean position error on " (own.of) }
         dl.facts { @for (term, value) in &own.facts { div { dt { (term) } dd { (value) } } } }
@@ -172,7 +184,9 @@ fn table(table: &Table) -> Markup {
             p.o { "bars: the change from nominal in units of its standard error, up to ten either way, with one standard error about \
                 it; changes beyond that rest at the end, an orange mark there is a bound" }
         }
-        div.scroll { table {
+        // Rows that continue those above keep their places.
+        @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
+        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts] {
             thead { tr {
                 @for (k, text) in table.header.iter().enumerate() { th class=[class(k)] { (text) } }
                 @if let Some((title, _)) = bars { th.l.o { (title) } }
@@ -204,6 +218,23 @@ fn bar(own: &Bar) -> Markup {
     }
 }
 
+/// A table as an address that holds it.
+fn address(csv: &str) -> String {
+    let mut text = String::from("data:text/csv;charset=utf-8,");
+    for character in csv.chars() {
+        match character {
+            '%' => text.push_str("%25"),
+            '#' => text.push_str("%23"),
+            '\n' => text.push_str("%0A"),
+            '\r' => {}
+            ' ' => text.push_str("%20"),
+            '/' => text.push_str("%2F"),
+            other => text.push(other),
+        }
+    }
+    text
+}
+
 /// Figures side by side where there is room, numbered after those that were shown.
 fn grid(new: Vec<Drawing>, shown: &mut Vec<Drawing>) -> Markup {
     let first = shown.len() + 1;
@@ -213,7 +244,11 @@ fn grid(new: Vec<Drawing>, shown: &mut Vec<Drawing>) -> Markup {
                 @for (k, figure) in new.iter().enumerate() {
                     figure id=(figure.name) {
                         (PreEscaped(&figure.svg))
-                        figcaption { b { "Figure " (first + k) ". " (figure.title) } (figure.caption) }
+                        figcaption {
+                            b { "Figure " (first + k) ". " (figure.title) }
+                            (figure.caption) " "
+                            a.data download={ (figure.name) ".csv" } href=(address(&figure.data.csv())) { "Data of this figure (CSV)" }
+                        }
                     }
                 }
             }

@@ -2,6 +2,7 @@
 
 mod html;
 mod markdown;
+mod poses;
 mod style;
 mod text;
 

@@ -32,7 +32,7 @@ pub(in crate::report) fn text(blocks: &[Block]) -> String {
                 text.push_str(&table(own));
                 text.extend(own.notes.iter().map(|note| format!("  {note}\n")));
             }
-            Block::Headline(_) | Block::Figures(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
+            Block::Headline(_) | Block::Figures(_) | Block::Poses(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
         }
     }
     text
@@ -44,7 +44,7 @@ pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     for block in blocks {
         match block {
             Block::Words(inner) => all.extend(flat(inner)),
-            Block::Headline(_) | Block::Figures(_) | Block::Folded(..) | Block::Page(_) => {}
+            Block::Headline(_) | Block::Figures(_) | Block::Poses(_) | Block::Folded(..) | Block::Page(_) => {}
             shown => all.push(shown),
         }
     }

@@ -1,0 +1,77 @@
+//! A pose as the figures show it, and which poses are drawn.
+
+use nalgebra::Vector3;
+
+/// A pose and what arms leave of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseError {
+    /// File and line of its row.
+    pub place: String,
+    /// Commands or readings of its joints, 0 at fixed ones \[rad\] or \[m\].
+    pub configuration: Vec<f64>,
+    /// Whether it was held out.
+    pub held_out: bool,
+    /// Measured position, measuring frame \[m\].
+    pub position: Vector3<f64>,
+    /// Residual measured − predicted, measuring frame \[m\].
+    pub error: Vector3<f64>,
+    /// The same of the nominal arm, with base and tool fitted where they are free \[m\].
+    pub before: Vector3<f64>,
+    /// 1 σ of each coordinate \[m\].
+    pub sigma: f64,
+    /// Time \[s\], or the row's number where no time was measured.
+    pub time: f64,
+}
+
+/// Of those that are drawn, one in so many is there because its value is among the largest.
+const LARGEST: usize = 10;
+
+/// At most `most` of some rows, ascending: those of the largest `size`, and others evenly among the rest.
+pub fn thin(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
+    if rows.len() <= most {
+        return rows.to_vec();
+    }
+    let finite = |row: usize| Some(size(row)).filter(|size| size.is_finite()).unwrap_or(0.0);
+    let mut by_size = rows.to_vec();
+    by_size.sort_by(|&a, &b| finite(b).total_cmp(&finite(a)).then(a.cmp(&b)));
+    let (largest, rest) = by_size.split_at_mut((most / LARGEST).max(1));
+    rest.sort_unstable();
+    let every = rest.len().div_ceil((most - largest.len()).max(1));
+    let mut kept: Vec<usize> = largest.iter().copied().chain(rest.iter().copied().step_by(every)).collect();
+    kept.sort_unstable();
+    kept
+}
+
+/// " 300 of 6487 poses are drawn, those with the largest residuals among them." where not all are.
+pub fn thinned(drawn: usize, all: usize) -> String {
+    if drawn < all {
+        format!(" {drawn} of {all} poses are drawn, those with the largest residuals among them.")
+    } else {
+        String::new()
+    }
+}
+
+/// " 3 poses without an equilibrium are left out." where there are any.
+pub fn left_out(poses: usize) -> String {
+    match poses {
+        0 => String::new(),
+        1 => " One pose without an equilibrium is left out.".to_owned(),
+        n => format!(" {n} poses without an equilibrium are left out."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_stay() {
+        let rows: Vec<usize> = (0..1000).collect();
+        let size = |row: usize| if row == 501 { 9.0 } else { 1.0 / (row + 1) as f64 };
+        let kept = thin(&rows, 100, size);
+        assert!(kept.len() <= 100 && kept.len() > 80, "{}", kept.len());
+        assert!(kept.contains(&501) && kept.contains(&0) && kept.is_sorted());
+        assert_eq!(thin(&rows[..7], 100, size), rows[..7]);
+        assert_eq!(thin(&rows, 100, |_| f64::NAN).len(), kept.len());
+    }
+}
