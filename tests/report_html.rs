@@ -12,9 +12,10 @@ use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData, Report};
 use nalgebra::Vector3;
+use serde_json::Value;
 
 /// Elements without an end.
-const VOID: [&str; 3] = ["meta", "link", "!DOCTYPE"];
+const VOID: [&str; 4] = ["meta", "link", "input", "!DOCTYPE"];
 
 fn case(file: &str) -> (Problem, Dataset) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
@@ -37,12 +38,19 @@ fn badly_nested(text: &str) -> Option<String> {
             }
         } else if !tag.ends_with('/') && !VOID.contains(&name) {
             open.push(name);
-            if name == "style" {
-                rest = &rest[rest.find("</style>")?..];
+            if name == "style" || name == "script" {
+                rest = &rest[rest.find(&format!("</{name}>"))?..];
             }
         }
     }
     open.pop().map(str::to_owned)
+}
+
+/// What a page knows of its poses.
+fn poses(page: &Report) -> Vec<Value> {
+    let (_, after) = page.html.split_once("id=\"poses\">").unwrap();
+    let store: Value = serde_json::from_str(after.split_once("</script>").unwrap().0).unwrap();
+    store["poses"].as_array().unwrap().clone()
 }
 
 /// What every page and figure must be.
@@ -51,10 +59,14 @@ fn check(page: &Report) {
     let namespace = "http://www.w3.org/2000/svg";
     for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())]) {
         let outside = text.replace(namespace, "");
-        for reference in ["http:", "https:", "//", "<script", "@import", "url(", "NaN", "inf\""] {
+        for reference in ["http:", "https:", "//", " src=", "@import", "url(", "NaN", "inf\""] {
             assert!(!outside.contains(reference), "{name} has {reference}");
         }
     }
+    // One script that is its own, and what it knows of the poses; none in the figures.
+    let scripts: Vec<&str> = page.html.split("<script").skip(1).map(|text| text.split('>').next().unwrap()).collect();
+    assert_eq!(scripts, [" type=\"application/json\" id=\"poses\"", ""]);
+    assert!(page.figures.iter().all(|(_, figure)| !figure.contains("<script")));
     assert!(page.figures.len() >= 5);
     for (name, figure) in &page.figures {
         assert!(report::is_figure(name), "{name}");
@@ -71,11 +83,26 @@ fn check(page: &Report) {
                 assert!(!is_mark || mark.contains(colour), "{name}: {mark} for {kind}");
             }
         }
-        // Labels carry their units; places on a map of residuals and states are words.
+        // Labels carry their units, but where there are none: numbers without one have no brackets.
         let labelled =
             figure.matches('[').count() - figure.matches("[fill=").count() - figure.matches("[stroke=").count();
-        assert!(labelled >= 1, "{name} has no axis with a unit");
+        let units = ["correlations", "misprints", "ranking", "residual-joints", "singular-values"];
+        let without = units.iter().any(|own| name.starts_with(own));
+        assert!((labelled >= 1) != without, "{name} has no axis with a unit");
+        assert!(!figure.contains("[1]") && !figure.contains("−0 "), "{name}");
     }
+    // The data of each figure, in the page itself.
+    for data in page.html.split("href=\"data:text/csv;charset=utf-8,").skip(1).map(|text| text.split('"').next().unwrap()) {
+        let lines: Vec<&str> = data.trim_end_matches("%0A").split("%0A").collect();
+        assert!(lines.len() > 1 && lines[0].contains(','), "{data}");
+    }
+    assert_eq!(page.html.matches(".csv\" href=\"data:text/csv").count(), page.figures.len());
+    // Every dot of a pose is one that the page knows.
+    let poses = poses(page);
+    let known: Vec<u64> = poses.iter().map(|pose| pose["row"].as_u64().unwrap()).collect();
+    let dots = page.html.split(" data-p=\"").skip(1).map(|text| text.split('"').next().unwrap().parse().unwrap());
+    let dots: Vec<u64> = dots.collect();
+    assert!(dots.len() > 50 && dots.iter().all(|row| known.contains(row)), "{} dots", dots.len());
     assert_eq!(page.html.matches("<figure ").count(), page.figures.len());
     assert_eq!(page.html.matches("<figcaption>").count(), page.figures.len());
 }
@@ -106,6 +133,12 @@ fn a_closed_loop_shows_what_it_found() {
     assert!((slope * 3600.0 / 0.707e-3 - 1.0).abs() < 0.25, "{slope}");
     let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
+    // The headline tells the whole gain.
+    let states = ["nominal arm", "as declared, fitted", "with what was found"];
+    assert!(states.iter().all(|state| page.html.contains(&format!("class=\"label\">{state}<"))));
+    // Each effect contributes, in millimetres over the workspace.
+    let drift = shown.contributions.iter().find(|own| own.name.starts_with("tracker-drift")).unwrap();
+    assert!(drift.is_effect && (0.2e-3..3e-3).contains(&drift.moved), "{drift:?}");
     let again = report::loop_report(&problem, &closure, &shown);
     assert_eq!(page, again);
     let other = PlotData::of_loop(&problem, &data, &closure).unwrap();
@@ -186,6 +219,35 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
 }
 
 #[test]
+fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
+    let (problem, mut data) = case("tests/cases/a-none.csv");
+    let row = data.split.identification[9];
+    data.measurements.positions[row] += Vector3::new(0.3, 0.0, 0.0);
+    let problem = Problem { robust: Some(flexcal::problem::Robust::default()), ..problem };
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
+    let page = report::identification_report(&problem, &found, &shown);
+    check(&page);
+    // The first row of the table, and in the data of every figure that has it.
+    let place = shown.residuals[row].place.clone();
+    assert_eq!(place, format!("a-none.csv:{}", data.measurements.location(row).line.unwrap()));
+    let first = page.html.split("<tr data-row=\"").nth(1).unwrap();
+    assert!(first.starts_with(&row.to_string()) && first[..80].contains(&place), "{}", &first[..80]);
+    let own = poses(&page).into_iter().find(|pose| pose["row"] == row).unwrap();
+    assert!((own["after"][0].as_f64().unwrap() - shown.residuals[row].error.x * 1e3).abs() < 1e-3);
+    assert_eq!(own["q"].as_array().unwrap().len(), 4);
+    // It stands at the rim with a note, and the others keep their room: their mean size is more than a tenth of the panel.
+    let order = &page.figures.iter().find(|(name, _)| name == "residual-order.svg").unwrap().1;
+    assert!(order.contains("1 beyond"), "{order}");
+    let tagged = order.split("<circle data-p=\"").skip(1).take(28);
+    let height = |text: &str| -> f64 { text.split("cy=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    let heights: Vec<f64> = tagged.map(height).collect();
+    let middle = heights.iter().sum::<f64>() / heights.len() as f64;
+    let spread = (heights.iter().map(|at| (at - middle).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
+    assert!(spread > 0.1 * 4.0 * 80.0, "{spread}");
+}
+
+#[test]
 fn thousands_of_poses_make_no_large_page() {
     let (problem, few) = case("tests/cases/h-none-large.csv");
     let found = identify(&problem, &few, &Options::default()).unwrap();
@@ -195,5 +257,5 @@ fn thousands_of_poses_make_no_large_page() {
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
-    assert!(page.html.contains("is drawn."), "what is left out is said");
+    assert!(page.html.contains("poses are drawn, those with the largest residuals among them."), "what is left out is said");
 }

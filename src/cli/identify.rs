@@ -28,6 +28,9 @@ pub struct Arguments {
     /// By which solver; auto keeps bounds and constraints where there are any
     #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
     solver: SolverChoice,
+    /// Print every table: parameters, outliers, what the poses can tell
+    #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
+    verbose: bool,
 }
 
 /// Words of an argument, each with what it stands for.
@@ -42,7 +45,7 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
     })
 }
 
-/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints the table.
+/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints what it came to.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
@@ -76,20 +79,26 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             diagnostic::warn(&report::joint_sources_text(sources));
         }
     } else if common.talks() {
-        output::print(&report::estimate_text(&problem, &identification))?;
+        let told = if arguments.verbose { report::estimate_text } else { report::estimate_brief };
+        output::print(&told(&problem, &identification))?;
         if let Some(sources) = &sources {
             output::print(&format!("\n{}\n", report::joint_sources_text(sources)))?;
         }
         let names = "estimate.json, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
-        if identification.is_trusted() && report::lacks_something(&identification) {
-            let data: Vec<String> = common.data().iter().map(|file| format!(" {}", file.display())).collect();
-            let data = if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
-            output::print(&format!(
-                "Next: flexcal loop {}{data} looks for what the model lacks\n",
-                common.problem().display()
-            ))?;
-        }
+        let (named, estimate) = (common.named(), results.path("estimate.json"));
+        let next = match identification.is_trusted() {
+            true if report::lacks_something(&identification) => {
+                format!("flexcal loop {named} looks for what the model lacks")
+            }
+            true => {
+                let problem = common.problem().display();
+                let estimate = estimate.display();
+                format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
+            }
+            false => format!("flexcal check {named} says what the poses can tell"),
+        };
+        output::print(&format!("Next: {next}\n"))?;
     }
     Ok(diagnostic::judged(&identification, common.quiet))
 }

@@ -21,7 +21,7 @@ pub struct Common {
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
     /// Folder for results [default: out/<name of the problem>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace files that this command or the problem reads, and files that flexcal did not write
     #[arg(long)]
@@ -30,7 +30,7 @@ pub struct Common {
     #[arg(long)]
     pub json: bool,
     /// Print nothing but errors (and the JSON, where it is asked for)
-    #[arg(long)]
+    #[arg(short, long)]
     pub quiet: bool,
 }
 
@@ -56,6 +56,13 @@ impl Common {
     /// The problem's file or folder.
     pub fn problem(&self) -> &Path {
         split(self.named.as_deref(), &self.data).0
+    }
+
+    /// The problem, and the measurement files where any are named, as arguments of another command.
+    pub fn named(&self) -> String {
+        let data: String = self.data().iter().map(|file| format!(" {}", file.display())).collect();
+        let data = if data.is_empty() { data } else { format!(" --data{data}") };
+        format!("{}{data}", self.problem().display())
     }
 
     /// The measurement files that are named, none where those of the problem count.

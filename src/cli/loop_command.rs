@@ -28,6 +28,9 @@ report.md and report.html, with its figures in figures/.")]
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
+    /// Print the whole story: every check that failed, and all that is claimed of each effect
+    #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
+    verbose: bool,
 }
 
 /// Closes the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and prints the story.
@@ -64,9 +67,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if common.json {
         output::print_json(&json)?;
     } else if common.talks() {
-        output::print(&report::loop_text(&problem, &closure))?;
+        let told = if arguments.verbose { report::loop_text } else { report::loop_brief };
+        output::print(&told(&problem, &closure))?;
         let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
+        let closed = results.path("problem.closed.toml");
+        output::print(&format!(
+            "Next: flexcal identify {} -v lists the parameters of the final fit\n",
+            closed.display()
+        ))?;
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))
 }

@@ -20,8 +20,8 @@ mod rows;
 mod terms;
 mod turn;
 
-pub use ablation::Ablation;
 pub use crate::mechanics::Shape;
+pub use ablation::Ablation;
 pub use pose::{Pose, SeenOrientation};
 pub use poses::PoseResiduals;
 

@@ -5,9 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Headline, Point, Table, code, some_of};
 use super::errors::{NOMINAL, mean_and_rms, row, unpredicted};
 use super::figures::{Figure, PlotData};
-use super::identify::{
-    BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted,
-};
+use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted};
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, p_value};
@@ -260,7 +258,7 @@ fn verdict_word(verdict: Verdict) -> &'static str {
 }
 
 /// The outcome in a sentence or two.
-fn verdict(closure: &ClosedLoop) -> String {
+pub(super) fn verdict(closure: &ClosedLoop) -> String {
     let stated = SelectionRules::DEFAULT.stated;
     let (contradicted, others): (Vec<&Found>, Vec<&Found>) =
         closure.effects.iter().partition(|found| found.is_contradicted());
@@ -295,13 +293,13 @@ fn lower(words: &str) -> String {
 }
 
 /// Why the final fit is not to be trusted.
-fn quality_flag<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
+pub(super) fn quality_flag<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
     let after = &closure.after;
     (!after.is_trusted()).then(|| Block::Note(format!("Beware: {}.", why_not_trusted(after))))
 }
 
 /// Errors of the nominal arm, the declared problem and the closed one.
-fn errors(closure: &ClosedLoop) -> Table {
+pub(super) fn errors(closure: &ClosedLoop) -> Table {
     let (before, after) = (&closure.before.fit, &closure.after);
     let mut rows = Vec::new();
     for (poses, of, is_fitted) in [
@@ -387,15 +385,19 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
         named.extend((more > 0).then(|| format!("and {more} more")));
         details.push(format!("these data do not distinguish it from: {}", named.join("; ")));
     }
+    Point { text: called(closure, found), details, mark: None }
+}
+
+/// An effect that was found, as surely as it is known.
+pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
     let own = effect::both(&found.effect, &closure.before);
-    let text = match &found.claims {
+    match &found.claims {
         _ if found.is_contradicted() => format!("contradicted: {own}"),
         Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
             format!("{}: its law is not known, such as: {own}", claims.place.0)
         }
         _ => own,
-    };
-    Point { text, details, mark: None }
+    }
 }
 
 /// What a witness says, in a word.

@@ -186,7 +186,8 @@ pub fn why_not_trusted(found: &Identification) -> String {
     }
 }
 
-fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
+/// What was fitted to what, and how it ended, in three lines.
+pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
     let fitted = &found.fitted;
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     Block::lines(format!(
@@ -235,7 +236,7 @@ fn measured(found: &Identification) -> String {
     }
 }
 
-fn errors_by_axis(found: &Identification) -> Table {
+pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
         let values = [of.mean.x, of.mean.y, of.mean.z, of.mean.norm, of.rms.norm, of.max.norm];
         [vec![poses.to_owned(), when.to_owned()], values.map(|value| mm(value, 4)).to_vec()].concat()
@@ -334,7 +335,7 @@ pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
 }
 
 /// How large the residual is against the declared noise.
-fn noise(problem: &Problem, found: &Identification) -> String {
+pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
     match (found.noise, found.reduced_chi2) {
         (Noise::Estimated(sigma), _) => format!(
             "No σ is declared; the scatter about the fit gives {} mm per coordinate, model errors included.",

@@ -99,7 +99,8 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
         let label = "rms move of the predicted position [mm], logarithmic";
         write(area, label, (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 12), INK, HPos::Center)
     });
-    let part = if all.len() > shown.len() { format!(" The {} largest of {}.", shown.len(), all.len()) } else { String::new() };
+    let part =
+        if all.len() > shown.len() { format!(" The {} largest of {}.", shown.len(), all.len()) } else { String::new() };
     let caption = format!(
         "How far the predicted positions of the measured poses move, root mean square, where one parameter goes back to its \
          nominal value (base and tool: to where the nominal arm has them), or one effect goes, and all else stays. Parameters \

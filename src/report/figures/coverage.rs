@@ -64,7 +64,12 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
         })
         .collect();
     let positions = arm.model.geometric_positions(&tried, arm.x.as_slice());
-    let near = NEAR * (0..3).map(|axis| range(positions.iter().map(|at| at[axis]))).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
+    let near = NEAR
+        * (0..3)
+            .map(|axis| range(positions.iter().map(|at| at[axis])))
+            .map(|(a, b)| (b - a).powi(2))
+            .sum::<f64>()
+            .sqrt();
     let covered = |at: &Vector3<f64>| fitted.iter().any(|pose| (pose.measured - at).norm_squared() <= near * near);
     let uncovered: Vec<Vector3<f64>> = positions.iter().filter(|at| !covered(at)).copied().collect();
     Coverage { uncovered, tried: positions.len(), near }

@@ -1,5 +1,7 @@
 //! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
 
+use std::path::PathBuf;
+
 use nalgebra::Vector3;
 
 use super::arm::{Arm, Poses};
@@ -8,7 +10,7 @@ use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
 use super::pose::{PoseError, thin};
 use crate::diagnose::{ClosedLoop, Findings, examine};
-use crate::error::Warning;
+use crate::error::{Location, Warning};
 use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
 use crate::measurement::Dataset;
 use crate::model::{Model, Pose, Shape};
@@ -146,8 +148,15 @@ impl PlotData {
         let measurements = poses.measurements;
         let rows = poses.rows();
         let before = poses.errors(&untouched(best, found), &rows);
+        let names: Vec<_> = measurements.files.iter().map(|file| file.file_name()).collect();
+        let distinct = names.iter().enumerate().all(|(k, name)| name.is_some() && !names[..k].contains(name));
+        let place = |row: usize| {
+            let whole = measurements.location(row);
+            let name = whole.file.file_name().filter(|_| distinct).map(PathBuf::from);
+            Location { file: name.unwrap_or_else(|| whole.file.clone()), ..whole }.to_string()
+        };
         let residual = |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| PoseError {
-            place: measurements.location(row).to_string(),
+            place: place(row),
             configuration: pose.setup.configuration.to_vec(),
             held_out: poses.split.held_out.binary_search(&row).is_ok(),
             position: pose.measured,

@@ -44,10 +44,10 @@ fn colour(place: usize, count: usize) -> RGBColor {
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
 pub fn errors(data: &PlotData) -> Drawing {
     let drawn = drawn("held-out-errors", "Error of each held-out pose", &data.stages, &data.held_out());
-    let held_out = data.residuals.iter().filter(|pose| pose.held_out).enumerate();
+    let held_out = data.held_out().into_iter().enumerate().filter(|(_, row)| data.shown.binary_search(row).is_ok());
     let further: Vec<String> = data.stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
     let of_stages = |k: usize| data.stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
-    let rows = held_out.map(|(k, pose)| (pose, of_stages(k)));
+    let rows = held_out.map(|(k, row)| (&data.residuals[row], of_stages(k)));
     let columns: Vec<&str> = further.iter().map(String::as_str).collect();
     drawn.with(Sheet::of_poses(&columns, rows))
 }

@@ -37,7 +37,8 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let scale = values.len() as f64 * width;
     let normal = |u: f64| scale * (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let tallest = counts.iter().map(|count| *count as f64).fold(normal(0.0), f64::max) * 1.08;
-    let beyond = [values.iter().filter(|value| **value < -reach).count(), values.iter().filter(|value| **value > reach).count()];
+    let beyond =
+        [values.iter().filter(|value| **value < -reach).count(), values.iter().filter(|value| **value > reach).count()];
     let svg = figure((WIDTH, HEIGHT), "Histogram of the residuals", |area| {
         let body = legend(area, 20, &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)])?;
         let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);

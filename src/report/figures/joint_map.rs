@@ -49,7 +49,8 @@ fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
 
 /// A row a joint, a box a range, darker where the residual is larger.
 pub fn joint_map(data: &PlotData) -> Option<Drawing> {
-    let joints: Vec<_> = data.commands.iter().map(|own| (own, parts(data, own.joint))).filter(|own| !own.1.is_empty()).collect();
+    let joints: Vec<_> =
+        data.commands.iter().map(|own| (own, parts(data, own.joint))).filter(|own| !own.1.is_empty()).collect();
     let rms = |part: &Part| Some(part.rms).filter(|_| part.count > 0);
     let (least, most) = range(joints.iter().flat_map(|(_, parts)| parts).filter_map(rms));
     if least > most {
@@ -64,8 +65,16 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
             let unit = command.unit.display(1.0);
             let (top, middle) = (28 + ROW * row, 28 + ROW * row + ROW / 2);
             write(area, &command.name(), (NAMES - 8, middle), INK, HPos::Right)?;
-            let end = |value: f64| format!("{}{}{}", number(value * unit.factor, 0).replace('-', "−"), if unit.symbol == "°" { "" } else { " " }, unit.symbol);
-            let (first, last) = (parts.first().map_or(0.0, |own| own.ends.0), parts.last().map_or(0.0, |own| own.ends.1));
+            let end = |value: f64| {
+                format!(
+                    "{}{}{}",
+                    number(value * unit.factor, 0).replace('-', "−"),
+                    if unit.symbol == "°" { "" } else { " " },
+                    unit.symbol
+                )
+            };
+            let (first, last) =
+                (parts.first().map_or(0.0, |own| own.ends.0), parts.last().map_or(0.0, |own| own.ends.1));
             write(area, &end(first), (NAMES + ENDS - 6, middle), MUTED, HPos::Right)?;
             write(area, &end(last), (NAMES + ENDS + 12 * CELL + 6, middle), MUTED, HPos::Left)?;
             for (k, part) in (0..).zip(parts) {
@@ -97,5 +106,8 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
         words(most)
     );
     let header = ["joint", "unit", "from", "to", "poses", "rms_mm"];
-    Some(Drawing::new("residual-joints", "What is left, by ranges of each joint", caption, tags.put(&svg)).with(Sheet::new(&header, rows)))
+    Some(
+        Drawing::new("residual-joints", "What is left, by ranges of each joint", caption, tags.put(&svg))
+            .with(Sheet::new(&header, rows)),
+    )
 }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 /// A pose and what arms leave of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
-    /// File and line of its row.
+    /// File and line of its row, without the folder where the names of the files are distinct.
     pub place: String,
     /// Commands or readings of its joints, 0 at fixed ones \[rad\] or \[m\].
     pub configuration: Vec<f64>,

@@ -87,7 +87,9 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
              take off the root mean square error. Pale blue: hard to tell from the first with these poses.",
         trace.tried, trace.level
     );
-    let row = |ranked: &&Ranked| vec![named(&ranked.effect, trace), format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)];
+    let row = |ranked: &&Ranked| {
+        vec![named(&ranked.effect, trace), format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)]
+    };
     let sheet = Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
     Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg).with(sheet))
 }

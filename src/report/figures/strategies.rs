@@ -65,8 +65,10 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     let caption = "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
                    rigid to complete, on a logarithmic scale.";
     let title = "What each part of the elasticity is worth";
-    (entries.len() > 1)
-        .then(|| Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity")).with(sheet(&entries)))
+    (entries.len() > 1).then(|| {
+        Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity"))
+            .with(sheet(&entries))
+    })
 }
 
 fn sheet(entries: &[Entry]) -> Sheet {

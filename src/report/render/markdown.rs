@@ -32,7 +32,12 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                     let _ = writeln!(text, "{}\n", escaped(&own.notes.join("\n")));
                 }
             }
-            Block::Headline(_) | Block::Figures(_) | Block::Poses(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
+            Block::Headline(_)
+            | Block::Figures(_)
+            | Block::Poses(_)
+            | Block::Folded(..)
+            | Block::Page(_)
+            | Block::Words(_) => {}
         }
     }
     text

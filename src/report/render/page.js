@@ -163,7 +163,7 @@ const flexcal = (() => {
         const value = (line) => {
           const text = line.cells[column].textContent.trim().replaceAll("\u2212", "-");
           const number = Number.parseFloat(text);
-          return Number.isNaN(number) ? text : number;
+          return Number.isFinite(number) ? number : text;
         };
         const order = (a, b) => {
           const [one, other] = [value(a), value(b)];

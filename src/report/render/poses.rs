@@ -4,7 +4,8 @@ use maud::{Markup, PreEscaped, html};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::report::figures::{Command, PlotData};
+use crate::model::Shape;
+use crate::report::figures::{Command, PlotData, Point};
 use crate::report::quantity::{mm, number};
 
 /// Poses in the table.
@@ -34,7 +35,7 @@ struct Entry {
     after: [f64; 3],
     /// The arm as a line, and by how much it gives.
     #[serde(skip_serializing_if = "Option::is_none")]
-    rigid: Option<Vec<f64>>,
+    rigid: Option<Vec<i64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     give: Option<Vec<f64>>,
 }
@@ -51,6 +52,18 @@ fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
     [length.x, length.y, length.z].map(|x| rounded(x * 1e3, decimals))
 }
 
+/// Points of the rigid arm \[mm\].
+fn rigid(arm: &Shape) -> Vec<i64> {
+    #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
+    let whole = |x: f64| (x * 1e3).round() as i64;
+    arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(whole).collect()
+}
+
+/// How far they give \[mm\].
+fn give(arm: &Shape) -> Vec<f64> {
+    arm.bent.iter().zip(&arm.rigid).flat_map(|(bent, rigid)| millimetres(&(bent - rigid), 2)).collect()
+}
+
 fn angle(command: Command, q: f64) -> f64 {
     q * command.unit.display(1.0).factor
 }
@@ -58,24 +71,26 @@ fn angle(command: Command, q: f64) -> f64 {
 impl Store {
     fn of(data: &PlotData) -> Self {
         let joint = |own: &Command| (own.name(), own.unit.display(1.0).symbol, own.joint);
-        let entry = |(&row, arm): (&usize, &Option<crate::model::Shape>)| {
+        let entry = |(&row, arm): (&usize, &Option<Shape>)| {
             let own = &data.residuals[row];
-            let flat = |points: Vec<Vector3<f64>>, decimals| points.iter().flat_map(|at| millimetres(at, decimals)).collect();
-            let give = |arm: &crate::model::Shape| arm.bent.iter().zip(&arm.rigid).map(|(bent, rigid)| bent - rigid).collect();
             Entry {
                 row,
                 place: own.place.clone(),
                 held_out: own.held_out,
-                q: data.commands.iter().map(|own_q| rounded(angle(*own_q, own.configuration[own_q.joint]), 3)).collect(),
+                q: data
+                    .commands
+                    .iter()
+                    .map(|own_q| rounded(angle(*own_q, own.configuration[own_q.joint]), 3))
+                    .collect(),
                 position: millimetres(&own.position, 2),
                 before: millimetres(&own.before, 4),
                 after: millimetres(&own.error, 4),
-                rigid: arm.as_ref().map(|arm| flat(arm.rigid.clone(), 0)),
-                give: arm.as_ref().map(|arm| flat(give(arm), 2)),
+                rigid: arm.as_ref().map(rigid),
+                give: arm.as_ref().filter(|arm| arm.bent != arm.rigid).map(give),
             }
         };
         let traced = data.causes.iter().map(|cause| {
-            let value = |point: &crate::report::figures::Point| {
+            let value = |point: &Point| {
                 let row = point.row.filter(|row| data.shown.binary_search(row).is_ok())?;
                 Some((row, rounded(point.x * cause.across.factor, 4)))
             };

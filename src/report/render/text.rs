@@ -32,7 +32,12 @@ pub(in crate::report) fn text(blocks: &[Block]) -> String {
                 text.push_str(&table(own));
                 text.extend(own.notes.iter().map(|note| format!("  {note}\n")));
             }
-            Block::Headline(_) | Block::Figures(_) | Block::Poses(_) | Block::Folded(..) | Block::Page(_) | Block::Words(_) => {}
+            Block::Headline(_)
+            | Block::Figures(_)
+            | Block::Poses(_)
+            | Block::Folded(..)
+            | Block::Page(_)
+            | Block::Words(_) => {}
         }
     }
     text

@@ -4,7 +4,7 @@
   const { data, state, norm, choose, point, listeners } = flexcal;
   if (!box || data.poses.length === 0) return;
   const canvas = box.querySelector("canvas");
-  const gl = canvas.getContext("webgl", { antialias: true, preserveDrawingBuffer: true });
+  const gl = canvas.getContext("webgl", { alpha: false, antialias: true, preserveDrawingBuffer: true });
   if (!gl) return;
   box.hidden = false;
 
@@ -62,7 +62,7 @@
   const places = data.poses.map((pose) => pose.position).concat(data.poses.flatMap((pose) => (pose.rigid ? [pose.rigid.slice(0, 3)] : [])));
   const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
   const middle = ends.map(([low, high]) => (low + high) / 2);
-  const reach = Math.max(1, Math.hypot(...ends.map(([low, high]) => high - low)) / 2);
+  const reach = Math.max(1, ...places.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
   const most = Math.max(...data.poses.flatMap((pose) => (pose.give ? pose.give.map(Math.abs) : [0])), 0);
   const sizes = data.poses.map((pose) => norm(pose.after)).filter(Number.isFinite).sort((a, b) => a - b);
   const large = sizes[Math.floor(sizes.length * 0.95)] || 1;
@@ -74,7 +74,7 @@
   if (most > 0) give.value = Math.min(3, Math.max(0, Math.log10((0.12 * reach) / most)));
   data.traced.forEach(([label], k) => input("colour").append(new Option(label, "traced" + k)));
 
-  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2.9 };
+  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2.3 };
   const camera = () => {
     const [cy, sy, cp, sp] = [Math.cos(orbit.yaw), Math.sin(orbit.yaw), Math.cos(orbit.pitch), Math.sin(orbit.pitch)];
     /* Rows: to the right, up, towards the eye; z of the measuring frame points up. */
@@ -142,8 +142,8 @@
       const main = pose === chosen;
       for (let k = 0; k + 5 < pose.rigid.length; k += 3) {
         const at = (list, j) => list.slice(j, j + 3);
-        if (main) segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), NONE, NONE, [...muted, 0.5], 1.2 * ratio);
-        segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), at(pose.give, k), at(pose.give, k + 3), main ? [...accent, 1] : [...muted, 0.22], (main ? 3.2 : 1.6) * ratio);
+        if (main) segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), NONE, NONE, [...muted, 0.8], 1 * ratio);
+        segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), pose.give ? at(pose.give, k) : NONE, pose.give ? at(pose.give, k + 3) : NONE, main ? [...accent, 1] : [...muted, 0.4], (main ? 2.6 : 1.3) * ratio);
       }
     }
     draw("line", arms, matrix, factor);
@@ -172,7 +172,7 @@
     draw("point", dots, matrix, 0);
 
     const scale = (value) => value.toPrecision(2);
-    legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + factor.toPrecision(2) : "; nothing gives way in this model") +
+    legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + factor.toPrecision(2) : "; in this model nothing gives way") +
       (input("vectors").value === "none" ? "" : "; strokes \u00d7 " + scale(lengthen / unit)) +
       (by === "kind" ? "; dark: held out, pale: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);

@@ -1,0 +1,151 @@
+//! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
+
+use super::closed_loop::{called, errors, quality_flag, verdict};
+use super::document::{Block, Point};
+use super::findings;
+use super::identify::{errors_by_axis, headline, noise};
+use super::quantity::{mm, number};
+use super::render::text;
+use super::unexplained::place;
+use crate::diagnose::{ClosedLoop, Verdict};
+use crate::identify::{Estimate, Identification};
+use crate::problem::Problem;
+
+/// Lines of a screen, less those that say where results are and what to do next.
+const LINES: usize = 22;
+
+/// "1 pose", "3 poses".
+fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A fit on one screen, ending in a line break: errors, how large the residual is, and what to look at.
+pub fn estimate_brief(problem: &Problem, found: &Identification) -> String {
+    let blocks = [
+        headline(problem, found),
+        Block::Table(errors_by_axis(found)),
+        Block::lines(noise(problem, found)),
+        Block::Lines(parameters(&found.estimates), worth_a_look(found)),
+    ];
+    text(&blocks)
+}
+
+/// How many parameters are known how well.
+fn parameters(estimates: &[Estimate]) -> String {
+    let count = |is: fn(&Estimate) -> bool| estimates.iter().filter(|own| is(own)).count();
+    let held = count(|own| own.at_bound.is_some() || !own.fitted);
+    let well = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.9);
+    let in_part = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.1) - well;
+    let parts = [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
+    let rest: String = parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
+    format!("{} of {} identified well{rest}; -v lists them.", well, counted(estimates.len(), "parameter"))
+}
+
+/// What the tables would tell at length.
+fn worth_a_look(found: &Identification) -> Vec<String> {
+    let mut points = Vec::new();
+    if let Some(own) = &found.orientation {
+        let mean = |of: &crate::identify::Errors| number(of.held_out.mean.norm.to_degrees(), 4);
+        points.push(format!(
+            "orientation: {} ° before, {} ° after, mean of the held-out poses",
+            mean(&own.registered),
+            mean(&own.fitted)
+        ));
+    }
+    let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
+    points.extend(farthest.map(|own| {
+        let (n, error) = (counted(found.outliers.len(), "pose"), mm(own.error.norm(), 3));
+        format!("{n} too far off to be noise, the farthest {}: {error} mm", own.location)
+    }));
+    let blind = found.identifiability.blind.len();
+    if blind > 0 {
+        points.push(format!(
+            "{} of {} not identifiable",
+            counted(blind, "combination"),
+            counted(found.unknowns.len(), "parameter")
+        ));
+    }
+    if !found.weak.is_empty() {
+        points.push(format!("{} seen too weakly", counted(found.weak.len(), "combination")));
+    }
+    let correlated = found.strong_correlations().len();
+    if correlated > 0 {
+        points.push(format!("{} correlated by more than 0.9", counted(correlated, "pair")));
+    }
+    if !found.active_constraints.is_empty() {
+        points.push(format!("{} at its limit", counted(found.active_constraints.len(), "constraint")));
+    }
+    points
+}
+
+/// A loop on one screen, ending in a line break: what it came to, what was found, and what remains.
+pub fn loop_brief(problem: &Problem, closure: &ClosedLoop) -> String {
+    let poses = &closure.before.fit.fitted;
+    let (n, held_out) = (poses.identification.n, poses.held_out.n);
+    let mut table = errors(closure);
+    // Of the held-out poses, whose column of χ² is empty.
+    table.rows.truncate(table.rows.len() / 2);
+    table.header.pop();
+    table.rows.iter_mut().for_each(|row| _ = row.pop());
+    let mut blocks = vec![
+        Block::lines(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
+        Block::Text(verdict(closure)),
+    ];
+    blocks.extend(quality_flag(closure));
+    blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
+    let remains = remains(closure);
+    let last = usize::from(remains.is_some()) * 2;
+    if !closure.effects.is_empty() {
+        // A blank line and a heading, and perhaps how many more there are.
+        let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
+        let titles = closure.effects.iter().map(|found| Point::from(cut(&called(closure, found))));
+        blocks.push(Block::heading("What was found"));
+        blocks.push(Block::Ranking(titles.take(room).collect()));
+        let more = closure.effects.len().saturating_sub(room);
+        let words = if more > 0 { format!("     and {more} more") } else { String::new() };
+        return text(&blocks) + &if more > 0 { words + "\n" } else { words } + &end(remains);
+    }
+    text(&blocks) + &end(remains)
+}
+
+fn end(remains: Option<String>) -> String {
+    remains.map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])))
+}
+
+/// The beginning of words that would not fit in a line.
+fn cut(words: &str) -> String {
+    const MOST: usize = 100;
+    if words.chars().count() <= MOST { words.to_owned() } else { words.chars().take(MOST - 1).chain(['…']).collect() }
+}
+
+/// What was gained.
+fn gain(closure: &ClosedLoop) -> String {
+    let [before, after] = [&closure.before.fit, &closure.after].map(|fit| fit.reduced_chi2);
+    let chi2 = match (before, after) {
+        (Some(before), Some(after)) if !closure.effects.is_empty() => {
+            format!("χ²/ν of the residual falls from {} to {}; noise alone: 1.", number(before, 2), number(after, 2))
+        }
+        (Some(before), _) => format!("χ²/ν of the residual is {}; noise alone: 1.", number(before, 2)),
+        _ => String::new(),
+    };
+    let gain = closure.gain;
+    if closure.effects.is_empty() || !gain.value.is_finite() {
+        return chi2;
+    }
+    let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| mm(value, 4));
+    format!("Gain on the held-out poses {value} mm in the mean (95 % interval {low} to {high} mm). {chi2}")
+}
+
+/// What is left, in a sentence.
+fn remains(closure: &ClosedLoop) -> Option<String> {
+    let failed = findings::failed(&closure.findings).len();
+    let first = closure.unexplained.first().filter(|_| closure.verdict == Verdict::Unexplained);
+    let structure = first.map(|left| {
+        let more = closure.unexplained.len() - 1;
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("structure without a known law ({}{more})", cut(&place(left)))
+    });
+    let checks = (failed > 0).then(|| format!("{} failed", counted(failed, "check")));
+    let parts: Vec<String> = structure.into_iter().chain(checks).collect();
+    (!parts.is_empty()).then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
+}
