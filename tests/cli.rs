@@ -61,7 +61,7 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn identify_prints_a_table_and_writes_the_estimate() {
     let bench = Bench::new();
-    let assert = bench.identify(&[]).success();
+    let assert = bench.identify(&["-v"]).success();
     let out = text(&assert.get_output().stdout);
     for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "rank 31 of 32", "estimate.json"] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
@@ -127,6 +127,34 @@ fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
 }
 
 #[test]
+fn what_is_printed_fits_on_a_screen_unless_more_is_asked_for() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        text(&flexcal.current_dir(folder.path()).args(arguments).assert().success().get_output().stdout)
+    };
+    let cases: Vec<String> =
+        ["a-none", "f-two", "g-not-in-catalogue"].map(|name| format!("tests/cases/{name}.csv")).to_vec();
+    let problem = root.join("tests/cases");
+    for case in cases.iter().map(|name| root.join(name)) {
+        for command in ["identify", "loop"] {
+            let arguments =
+                [command, problem.to_str().unwrap(), "-o", "out", "--data", case.to_str().unwrap()].map(str::to_owned);
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            let (brief, whole) = (run(&arguments), run(&[&arguments[..], &["-v"]].concat()));
+            let lines = |text: &str| text.lines().count();
+            assert!(lines(&brief) <= 25 && lines(&whole) > lines(&brief), "{command} {}:\n{brief}", case.display());
+            assert!(brief.lines().all(|line| line.chars().count() <= 130), "{brief}");
+            for words in ["held out", "Written to out: ", "\nNext: flexcal "] {
+                assert!(brief.contains(words), "{words:?} missing in:\n{brief}");
+            }
+            assert_eq!(run(&[&arguments[..], &["-q"]].concat()), "");
+        }
+    }
+}
+
+#[test]
 fn json_is_all_there_is_on_standard_output_and_quiet_is_quiet() {
     let bench = Bench::new();
     let assert = bench.identify(&["--json", "--out", "elsewhere"]).success();
@@ -170,7 +198,7 @@ fn strategies_and_solvers_are_what_they_say() {
     );
     let (_, json) = rms(&[]);
     assert_eq!((&json["solver"], &json["solver_reason"]), (&"bounded".into(), &"bounds to keep".into()));
-    let told = text(&bench.identify(&[]).get_output().stdout);
+    let told = text(&bench.identify(&["-v"]).get_output().stdout);
     assert!(told.contains("\n  –: no standard error: "), "{told}");
     let parameters = json["parameters"].as_array().unwrap();
     let stiff = parameters.iter().find(|p| p["name"] == "A.EI").unwrap();
@@ -362,31 +390,45 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
 #[test]
 fn the_readme_shows_what_is_printed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let shown = |mark: &str| {
-        let (_, after) = readme.split_once(&format!("<!-- {mark} -->\n```text\n")).unwrap();
-        after.split_once("\n```").unwrap().0.to_owned()
+    let readme = std::cell::RefCell::new(fs::read_to_string(root.join("README.md")).unwrap());
+    let refills = std::env::var_os("FLEXCAL_REFILL").is_some();
+    // The third line of a fit ends in the time it took.
+    let timeless = |text: &str| -> Vec<String> {
+        text.trim_end().lines().map(|line| line.split(" steps, ").next().unwrap().to_owned()).collect()
+    };
+    let compare = |mark: &str, printed: &str| {
+        let fence = format!("<!-- {mark} -->\n```text\n");
+        let text = readme.borrow().clone();
+        let (before, after) = text.split_once(&fence).unwrap();
+        let (shown, rest) = after.split_once("\n```").unwrap();
+        if refills {
+            *readme.borrow_mut() = format!("{before}{fence}{}\n```{rest}", printed.trim_end());
+        } else {
+            assert_eq!(timeless(shown), timeless(printed), "FLEXCAL_REFILL=1 prints it anew");
+        }
     };
     let folder = tempfile::tempdir().unwrap();
     let printed = |command: &str, problem: &Path, more: &[&str]| {
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).args(more).output().unwrap().stdout)
     };
-    assert_eq!(shown("loop"), printed("loop", &root.join("problems/lunar-sampler"), &[]).trim_end());
+    compare("loop", &printed("loop", &root.join("problems/lunar-sampler"), &[]));
     let drawn = fs::read_to_string(folder.path().join("out/lunar-sampler/figures/effect-1.svg")).unwrap();
-    if std::env::var_os("FLEXCAL_REFILL").is_some() {
+    if refills {
         fs::write(root.join("docs/effect.svg"), &drawn).unwrap();
     }
     // Another machine may round a coordinate elsewhere.
     let shapes = |svg: &str| svg.replace(|c: char| c.is_ascii_digit() || c == '.', "");
     let kept = fs::read_to_string(root.join("docs/effect.svg")).unwrap();
     assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
-    let identified = printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"), &["--out", "out/closed"]);
-    // The third line ends in the time it took.
-    let timeless = |text: &str| -> Vec<String> {
-        text.trim_end().lines().enumerate().filter(|(k, _)| *k != 2).map(|(_, line)| line.to_owned()).collect()
-    };
-    assert_eq!(timeless(&shown("lunar")), timeless(&identified));
+    compare(
+        "lunar",
+        &printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"), &["--out", "out/closed"]),
+    );
+    if refills {
+        fs::write(root.join("README.md"), &*readme.borrow()).unwrap();
+    }
+    assert!(readme.borrow().lines().count() < 120, "one page");
 }
 
 /// A bench whose problem declares effects, with few other parameters.
@@ -406,7 +448,7 @@ fn bench_with_effects() -> Bench {
 #[test]
 fn declared_effects_are_in_the_results() {
     let bench = bench_with_effects();
-    let told = text(&bench.identify(&[]).success().get_output().stdout);
+    let told = text(&bench.identify(&["-v"]).success().get_output().stdout);
     let line = |name: &str| told.lines().find(|line| line.contains(name)).unwrap().to_owned();
     assert!(line("gear-ratio[3].error").contains('‰') && line("joint-harmonic[2].cos1").contains('°'), "{told}");
     let json = text(&bench.identify(&["--json"]).success().get_output().stdout);

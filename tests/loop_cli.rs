@@ -169,7 +169,7 @@ fn structure_without_a_name_is_said_to_be_left() {
     assert!(left["where"].is_string() && left["depends_on"][0].is_string() && left["p_value"].is_f64());
     is_summary(&left["held_out_with_empirical_correction"], 50);
     // Lines break anywhere.
-    let told = bench.told(&["loop", "arm"]).split_whitespace().collect::<Vec<_>>().join(" ");
+    let told = bench.told(&["loop", "arm", "-v"]).split_whitespace().collect::<Vec<_>>().join(" ");
     for words in ["Unexplained", "What remains", left["where"].as_str().unwrap(), "it keeps its last value"] {
         assert!(told.contains(words), "{words:?} missing in:\n{told}");
     }
@@ -178,7 +178,7 @@ fn structure_without_a_name_is_said_to_be_left() {
 #[test]
 fn the_loop_tells_its_story() {
     let bench = Bench::new(THERMAL);
-    let told = bench.told(&["loop", "arm"]);
+    let told = bench.told(&["loop", "arm", "-v"]);
     let report = fs::read_to_string(bench.path("out/lunar-sampler/report.md")).unwrap();
     for words in
         ["Explained", "link B bows with temperature", "95 % interval", "link-thermal-bending = { link = \"B\" }"]
@@ -191,7 +191,7 @@ fn the_loop_tells_its_story() {
         assert!(report.contains(words), "{words:?} missing in:\n{report}");
     }
     let bench = Bench::new(NONE);
-    let told = bench.told(&["loop", "arm"]);
+    let told = bench.told(&["loop", "arm", "-v"]);
     assert!(told.contains("Nothing found") && !told.contains("What was found"), "{told}");
 }
 

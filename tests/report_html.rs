@@ -9,7 +9,7 @@ use common::made::part;
 use flexcal::diagnose::close;
 use flexcal::identify::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
-use flexcal::problem::Problem;
+use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::report::{self, PlotData, Report};
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -92,7 +92,9 @@ fn check(page: &Report) {
         assert!(!figure.contains("[1]") && !figure.contains("−0 "), "{name}");
     }
     // The data of each figure, in the page itself.
-    for data in page.html.split("href=\"data:text/csv;charset=utf-8,").skip(1).map(|text| text.split('"').next().unwrap()) {
+    for data in
+        page.html.split("href=\"data:text/csv;charset=utf-8,").skip(1).map(|text| text.split('"').next().unwrap())
+    {
         let lines: Vec<&str> = data.trim_end_matches("%0A").split("%0A").collect();
         assert!(lines.len() > 1 && lines[0].contains(','), "{data}");
     }
@@ -223,7 +225,7 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let (problem, mut data) = case("tests/cases/a-none.csv");
     let row = data.split.identification[9];
     data.measurements.positions[row] += Vector3::new(0.3, 0.0, 0.0);
-    let problem = Problem { robust: Some(flexcal::problem::Robust::default()), ..problem };
+    let problem = Problem { robust: Some(Robust { loss: RobustLoss::Huber, threshold: None }), ..problem };
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
@@ -240,7 +242,8 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let order = &page.figures.iter().find(|(name, _)| name == "residual-order.svg").unwrap().1;
     assert!(order.contains("1 beyond"), "{order}");
     let tagged = order.split("<circle data-p=\"").skip(1).take(28);
-    let height = |text: &str| -> f64 { text.split("cy=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    let height =
+        |text: &str| -> f64 { text.split("cy=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
     let heights: Vec<f64> = tagged.map(height).collect();
     let middle = heights.iter().sum::<f64>() / heights.len() as f64;
     let spread = (heights.iter().map(|at| (at - middle).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
@@ -257,5 +260,8 @@ fn thousands_of_poses_make_no_large_page() {
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
-    assert!(page.html.contains("poses are drawn, those with the largest residuals among them."), "what is left out is said");
+    assert!(
+        page.html.contains("poses are drawn, those with the largest residuals among them."),
+        "what is left out is said"
+    );
 }

@@ -239,7 +239,7 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
         "{PRIORS}[[effect]]\njoint-coupling = {{ joint = 3, from = 4 }}\n[[effect]]\njoint-coupling = {{ joint = 2, from = 3 }}\n[[effect]]\njoint-coupling = {{ joint = 2, from = 1 }}\n"
     );
     let bench = Bench::new(&coupled, |lines| lines.into_iter().map(str::to_owned).collect());
-    let (status, out, err) = bench.command("identify", &[]);
+    let (status, out, err) = bench.command("identify", &["-v"]);
     assert_eq!(status, 0, "{err}");
     let json = bench.json("estimate.json");
     let parameters = json["parameters"].as_array().unwrap();
