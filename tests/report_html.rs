@@ -230,6 +230,15 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
+    // The arm ends where it predicts the target, one tool away from its last joint, and gives way.
+    let tool = problem.tool.target.norm();
+    for (&row, arm) in shown.shown.iter().zip(&shown.arms) {
+        let (pose, arm) = (&shown.residuals[row], arm.as_ref().unwrap());
+        let [.., joint, tip] = arm.bent.as_slice() else { panic!("a line has two ends") };
+        assert!((tip - (pose.position - pose.error)).norm() < 1e-9, "{row}");
+        assert!(((tip - joint).norm() - tool).abs() < 0.02, "{row}: {} {tool}", (tip - joint).norm());
+        assert!(arm.rigid.len() == arm.bent.len() && (tip - arm.rigid[arm.rigid.len() - 1]).norm() > 1e-3);
+    }
     // The first row of the table, and in the data of every figure that has it.
     let place = shown.residuals[row].place.clone();
     assert_eq!(place, format!("a-none.csv:{}", data.measurements.location(row).line.unwrap()));

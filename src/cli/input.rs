@@ -60,8 +60,8 @@ impl Common {
 
     /// The problem, and the measurement files where any are named, as arguments of another command.
     pub fn named(&self) -> String {
-        let data: String = self.data().iter().map(|file| format!(" {}", file.display())).collect();
-        let data = if data.is_empty() { data } else { format!(" --data{data}") };
+        let data: Vec<String> = self.data().iter().map(|file| format!(" {}", file.display())).collect();
+        let data = if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
         format!("{}{data}", self.problem().display())
     }
 

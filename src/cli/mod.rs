@@ -2,6 +2,7 @@
 
 #![allow(rustdoc::invalid_html_tags, reason = "<name> in a help text is for the terminal")]
 
+mod accept;
 mod check;
 mod compare;
 mod compensate;
@@ -63,6 +64,8 @@ enum Command {
     Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
+    /// Certify an arm: accuracy before and after as ISO 9283 counts it, with conditions and digests of every input.
+    Accept(accept::Arguments),
     /// Write the identified geometry into the URDF that the problem came from, or as YAML for a driver.
     Export(export::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
@@ -93,6 +96,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let outcome = match cli.command {
         Command::Init(arguments) => init::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Accept(arguments) => accept::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),

@@ -8,7 +8,7 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 pub use ready::Ready;
-pub use record::Record;
+pub use record::{Record, digest};
 
 /// The bytes of a file that has at most `most`.
 ///

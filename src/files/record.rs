@@ -28,6 +28,11 @@ struct Line {
     name: String,
 }
 
+/// SHA-256 of some bytes, hexadecimal.
+pub fn digest(bytes: &[u8]) -> String {
+    hexadecimal(Sha256::digest(bytes).as_slice())
+}
+
 impl Record {
     /// Of a folder; empty where nothing is recorded.
     ///

@@ -1,5 +1,6 @@
 //! What to fit, in which order, and what came of it.
 
+mod acceptance;
 mod active;
 mod applied;
 mod assumed;
@@ -33,6 +34,7 @@ mod stage;
 mod statistics;
 mod strategy;
 
+pub use acceptance::{Acceptance, AcceptancePose, Accuracy, acceptance};
 pub use active::ActiveConstraint;
 pub use applied::{ErrorsBySession, PredictError, Prediction, predict};
 pub use baseline::Baseline;

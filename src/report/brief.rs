@@ -4,6 +4,7 @@ use super::closed_loop::{called, errors, quality_flag, verdict};
 use super::document::{Block, Point};
 use super::findings;
 use super::identify::{errors_by_axis, headline, noise};
+use super::parameters::correlated;
 use super::quantity::{mm, number};
 use super::render::text;
 use super::unexplained::place;
@@ -37,7 +38,8 @@ fn parameters(estimates: &[Estimate]) -> String {
     let well = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.9);
     let in_part = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.1) - well;
     let parts = [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
-    let rest: String = parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
+    let rest: Vec<String> = parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
+    let rest = rest.concat();
     format!("{} of {} identified well{rest}; -v lists them.", well, counted(estimates.len(), "parameter"))
 }
 
@@ -68,7 +70,7 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     if !found.weak.is_empty() {
         points.push(format!("{} seen too weakly", counted(found.weak.len(), "combination")));
     }
-    let correlated = found.strong_correlations().len();
+    let correlated = correlated(found).len();
     if correlated > 0 {
         points.push(format!("{} correlated by more than 0.9", counted(correlated, "pair")));
     }

@@ -8,7 +8,7 @@ use super::figures::{Figure, PlotData};
 use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted};
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
-use super::quantity::{decimals, mm, number, p_value};
+use super::quantity::{decimals, mm, number, or_dash, p_value};
 use super::render::{Report, report, text};
 use super::unexplained::{correction, place, unexplained};
 use super::{effect, findings, trace};
@@ -182,6 +182,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::not_seen(&closure.before)));
     blocks.extend(rounds(closure));
+    blocks.extend(sureness(closure));
     blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().enumerate().map(|(k, cause)| Figure::Cause(plots, cause, k + 1));
@@ -409,7 +410,7 @@ fn says(own: &Witness) -> &'static str {
 }
 
 /// What each round of fit, trace and refit came to.
-fn rounds<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
+fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
     if closure.rounds.is_empty() {
         return Vec::new();
     }
@@ -421,5 +422,30 @@ fn rounds<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     };
     let header = ["round", "effects in the model", "identification rms, mm", "held out mean", "held out rms"];
     let rows = closure.rounds.iter().enumerate().map(row).collect();
-    vec![Block::heading("Rounds"), Block::Table(Table::new(&header, rows, &[1]))]
+    vec![
+        Block::heading("Rounds"),
+        Block::Figures(vec![Figure::Rounds(closure)]),
+        Block::Table(Table::new(&header, rows, &[1])),
+    ]
+}
+
+/// How sure each choice is: chance, its law, fits to part of the poses, and data that took no part.
+fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
+    let share = |part: f64| format!("{} %", number(part * 100.0, 0));
+    let row = |found: &Found| {
+        let witness = found.witness.as_ref().map(|own| format!("{} by {}", says(own), own.data));
+        vec![
+            closure.before.describe(&found.effect),
+            p_value(found.p_value),
+            or_dash(found.claims.as_ref(), |claims| share(claims.law.1)),
+            or_dash(found.stability, share),
+            or_dash(witness, |words| words),
+            mm(found.held_out_after.mean.norm, 4),
+        ]
+    };
+    let header = ["effect", "p by chance", "law", "resampled", "data that took no part", "held out mean, mm"];
+    let note = "law: its probability against every other at the same place; resampled: the share of fits to four fifths of the poses \
+                that name it; held out mean: once it was in the model";
+    let table = Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);
+    (!closure.effects.is_empty()).then_some(Block::Table(table))
 }

@@ -25,6 +25,8 @@ pub(super) enum Block<'a> {
     Ranking(Vec<Point>),
     /// Numbers.
     Table(Table),
+    /// Lines to fill in by hand, each with what goes there; on the page alone.
+    Blanks(Vec<&'static str>),
     /// What it came to, at one glance; on the page alone.
     Headline(Headline),
     /// Drawings side by side; on the page alone.

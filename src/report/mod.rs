@@ -3,6 +3,7 @@
 //! One file a command: its facts as JSON and as blocks (`document`), which `render` shows on terminals, as Markdown and
 //! as a page. `figures` draws what only a page shows.
 
+mod acceptance;
 mod brief;
 mod check;
 mod closed_loop;
@@ -34,6 +35,7 @@ mod table;
 mod trace;
 mod unexplained;
 
+pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
 pub use brief::{estimate_brief, loop_brief};
 pub use check::{check_json, check_text, why_not_sufficient};
 pub use closed_loop::{loop_json, loop_report, loop_text};

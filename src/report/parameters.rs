@@ -223,15 +223,19 @@ fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
     terms.join(" ")
 }
 
-/// Pairs of parameters that go together; `file` holds them all.
-pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
-    // What one blind combination ties together is told above.
+/// Pairs of parameters that go together, but for those that one blind combination ties: that is told by itself.
+pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
         let holds =
             |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
         found.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
     };
-    let pairs = found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).map(|(a, b, correlation)| {
+    found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
+}
+
+/// The same in words; `file` holds them all.
+pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
+    let pairs = correlated(found).into_iter().map(|(a, b, correlation)| {
         let sign = if correlation < 0.0 { '−' } else { '+' };
         format!("{a} and {b}: {sign}{:.3}", correlation.abs())
     });

@@ -11,11 +11,12 @@ use super::super::unexplained::{self, Unexplained};
 use super::super::witness::{Says, Witness, witness};
 use super::alternatives::Replacements;
 use super::harmonics;
-use super::interval::{self, Interval};
+use super::interval;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
 use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
 use crate::measurement::Dataset;
+use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
 
 /// What the loop came to.

@@ -3,82 +3,18 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
-use statrs::function::erf::{erfc, erfc_inv};
 
 use super::super::data::{Data, bits};
+use crate::numeric::{Interval, mean_interval};
 
-/// An estimate with the interval that covers it in 95 of 100 cases.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Estimate.
-    pub value: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
-/// Mean reduction of the distance to what was measured on held-out poses \[m\]; bootstrap over configurations, corrected for bias and for
-/// a spread that changes with the mean (BCa) [Efron 1987].
+/// Mean reduction of the distance to what was measured on held-out poses \[m\]; bootstrap over configurations.
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
-    let (rows, draws) = (&data.split.held_out, data.rules.resamples);
+    let rows = &data.split.held_out;
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
     for ((&row, before), after) in rows.iter().zip(before).zip(after) {
         let gain = before.norm() - after.norm();
         groups.entry(bits(data.measurements.configuration(row))).or_default().push(gain);
     }
     let sums: Vec<(f64, f64)> = groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
-    let mean = |drawn: &mut dyn Iterator<Item = (f64, f64)>| {
-        let (sum, count) = drawn.fold((0.0, 0.0), |(sum, count), (s, c)| (sum + s, count + c));
-        sum / f64::max(count, 1.0)
-    };
-    let value = mean(&mut sums.iter().copied());
-    let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
-    let mut means: Vec<f64> =
-        (0..draws).map(|_| mean(&mut (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())]))).collect();
-    means.sort_by(f64::total_cmp);
-    // z₀: by how much the mean itself is not in the middle; a: a sixth of the skewness of what one configuration does to it.
-    let z0 = quantile(means.partition_point(|own| *own < value) as f64 / draws as f64);
-    let without =
-        |left_out: usize| mean(&mut sums.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, sum)| *sum));
-    let influence: Vec<f64> = (0..sums.len()).map(without).collect();
-    let middle = influence.iter().sum::<f64>() / influence.len().max(1) as f64;
-    let power = |k: i32| influence.iter().map(|own| (middle - own).powi(k)).sum::<f64>();
-    let spread = power(2).powf(1.5);
-    let a = if spread > 0.0 { power(3) / (6.0 * spread) } else { 0.0 };
-    let at = |part: f64| {
-        let z = z0 + quantile(part);
-        let part = 0.5 * erfc(-(z0 + z / (1.0 - a * z).max(0.1)) / std::f64::consts::SQRT_2);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
-        let place = (part * draws as f64) as usize;
-        means[place.min(draws - 1)]
-    };
-    let beyond = (1.0 - data.rules.covered) / 2.0;
-    Interval { value, low: at(beyond), high: at(1.0 - beyond) }
-}
-
-/// z with Φ(z) = part, within four standard deviations.
-fn quantile(part: f64) -> f64 {
-    let most = 4.0;
-    if part > 0.0 && part < 1.0 {
-        (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * part)).clamp(-most, most)
-    } else if part > 0.0 {
-        most
-    } else {
-        -most
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::quantile;
-
-    #[test]
-    fn quantiles_are_those_of_the_normal_distribution() {
-        for (part, z) in [(0.025, -1.959_963_984_5), (0.5, 0.0), (0.841_344_746_1, 1.0), (0.0, -4.0), (1.0, 4.0)] {
-            assert!((quantile(part) - z).abs() < 1e-6, "{part} {}", quantile(part));
-        }
-    }
+    mean_interval(&sums, data.rules.resamples, data.rules.covered, data.rules.seed)
 }

@@ -7,6 +7,6 @@ mod interval;
 mod pick;
 mod rounds;
 
+pub use crate::numeric::Interval;
 pub use close::{ClosedLoop, Found, Round, Verdict, close, close_by};
 pub use harmonics::HARMONICS;
-pub use interval::Interval;

@@ -375,18 +375,18 @@ fn at_law(curve: &[(f64, f64)], x: f64) -> f64 {
 impl Cause {
     /// Of an effect that was found, with its number.
     pub fn draw_effect(&self, number: usize, shown: &[usize]) -> Drawing {
-        self.draw(shown, format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
+        self.draw(shown, &format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
     }
 
     /// Of structure that no effect explains.
     pub fn draw_unexplained(&self, shown: &[usize]) -> Drawing {
         let lead = "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line \
                     and dots: a constant is what base and geometry take up.";
-        self.draw(shown, "unexplained".to_owned(), "correction", lead)
+        self.draw(shown, "unexplained", "correction", lead)
     }
 
     /// Each pose's own measurement, of the poses that figures show, and the law as a line.
-    fn draw(&self, shown: &[usize], name: String, law: &str, lead: &str) -> Drawing {
+    fn draw(&self, shown: &[usize], name: &str, law: &str, lead: &str) -> Drawing {
         let finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
         let all: Vec<&Point> = self.points.iter().filter(finite).collect();
         let at = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
@@ -431,6 +431,6 @@ impl Cause {
         let columns = ["held_out", self.across.label.as_str(), self.up.label.as_str()];
         let row = |(at, point): &((f64, f64), &Point)| vec![point.held_out.to_string(), fixed(at.0, 6), fixed(at.1, 9)];
         let sheet = Sheet::new(&columns, points.iter().map(row).collect());
-        Drawing::new(&name, &title, caption, tags.put(&svg)).with(sheet)
+        Drawing::new(name, &title, caption, tags.put(&svg)).with(sheet)
     }
 }

@@ -44,7 +44,9 @@ pub fn of(
     let with = poses.errors(arm, &rows);
     let moved = |places: &[usize]| {
         let mut without = arm.clone();
-        places.iter().for_each(|&k| without.x[k] = found.registered_x[k]);
+        for &k in places {
+            without.x[k] = found.registered_x[k];
+        }
         let changes = poses.errors(&without, &rows).into_iter().zip(&with).map(|(without, with)| without - with);
         let squares: Vec<f64> = changes.map(|change| change.norm_squared()).filter(|own| own.is_finite()).collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
@@ -69,9 +71,14 @@ pub fn of(
     all
 }
 
-/// The largest as bars on a logarithmic scale.
+/// The largest as bars on a logarithmic scale, effects among them in any case.
 pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
-    let shown: Vec<&Contribution> = all.iter().filter(|own| own.moved > 0.0).take(MOST).collect();
+    let (mut effects, parameters): (Vec<&Contribution>, Vec<&Contribution>) =
+        all.iter().filter(|own| own.moved > 0.0).partition(|own| own.is_effect);
+    effects.truncate(MOST / 2);
+    let room = MOST - effects.len();
+    let mut shown: Vec<&Contribution> = effects.into_iter().chain(parameters.into_iter().take(room)).collect();
+    shown.sort_by(|a, b| b.moved.total_cmp(&a.moved));
     let most = (shown.first()?.moved * 1e3).log10();
     let least = shown.last().map_or(most, |own| (own.moved * 1e3).log10()).max(most - DECADES) - 0.25;
     let count = i32::try_from(shown.len()).unwrap_or_default();
@@ -99,8 +106,11 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
         let label = "rms move of the predicted position [mm], logarithmic";
         write(area, label, (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 12), INK, HPos::Center)
     });
-    let part =
-        if all.len() > shown.len() { format!(" The {} largest of {}.", shown.len(), all.len()) } else { String::new() };
+    let part = if all.len() > shown.len() {
+        format!(" {} of {} are drawn, the largest.", shown.len(), all.len())
+    } else {
+        String::new()
+    };
     let caption = format!(
         "How far the predicted positions of the measured poses move, root mean square, where one parameter goes back to its \
          nominal value (base and tool: to where the nominal arm has them), or one effect goes, and all else stays. Parameters \

@@ -12,7 +12,7 @@ use super::pose::{left_out, thin, thinned};
 use super::sheet::Sheet;
 use super::tags::Tags;
 use crate::identify::{Before, Procedure};
-use crate::report::quantity::number;
+use crate::report::quantity::{fixed, number};
 
 /// Poses that are drawn at most.
 const MOST: usize = 90;
@@ -43,27 +43,36 @@ fn colour(place: usize, count: usize) -> RGBColor {
 
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
 pub fn errors(data: &PlotData) -> Drawing {
-    let drawn = drawn("held-out-errors", "Error of each held-out pose", &data.stages, &data.held_out());
-    let held_out = data.held_out().into_iter().enumerate().filter(|(_, row)| data.shown.binary_search(row).is_ok());
-    let further: Vec<String> = data.stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
-    let of_stages = |k: usize| data.stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
-    let rows = held_out.map(|(k, row)| (&data.residuals[row], of_stages(k)));
-    let columns: Vec<&str> = further.iter().map(String::as_str).collect();
-    drawn.with(Sheet::of_poses(&columns, rows))
+    let rows = data.held_out();
+    let known: Vec<usize> = (0..rows.len()).filter(|&k| data.shown.binary_search(&rows[k]).is_ok()).collect();
+    let names: Vec<String> = data.stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
+    let columns: Vec<&str> = names.iter().map(String::as_str).collect();
+    let errors = |k: usize| data.stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
+    let sheet = Sheet::of_poses(&columns, known.iter().map(|&k| (&data.residuals[rows[k]], errors(k))));
+    drawn(("held-out-errors", "Error of each held-out pose"), &data.stages, &known, &rows).with(sheet)
 }
 
 /// The same of one procedure of a comparison, by its name.
 pub fn of_procedure(before: &Before, own: &Procedure) -> Drawing {
     let name = own.name();
     let title = format!("Error of each held-out pose: {name}");
-    drawn(&format!("held-out-errors-{name}"), &title, &own_stages(before, own), &[])
+    let stages = own_stages(before, own);
+    let all: Vec<usize> = (0..own.after.len()).collect();
+    let errors = |k: &usize| {
+        let norms = stages.iter().filter_map(|stage| Some(fixed(stage.errors.get(*k)?.norm() * 1e3, 6)));
+        std::iter::once((k + 1).to_string()).chain(norms).collect()
+    };
+    let names = stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage)));
+    let header: Vec<String> = std::iter::once("held_out_pose".to_owned()).chain(names).collect();
+    let sheet = Sheet { header, rows: all.iter().map(errors).collect() };
+    drawn((&format!("held-out-errors-{name}"), &title), &stages, &all, &[]).with(sheet)
 }
 
-/// `rows` are those of the poses, where they are known.
-fn drawn(name: &str, title: &str, states: &[StageErrors], rows: &[usize]) -> Drawing {
+/// Poses `known` by their places among the held-out ones may be drawn; `rows` are those of all, where a page knows them.
+fn drawn((name, title): (&str, &str), states: &[StageErrors], known: &[usize], rows: &[usize]) -> Drawing {
     let count = states.first().map_or(0, |state| state.errors.len());
     let last = |k: usize| states.last().and_then(|state| state.errors.get(k)).map_or(0.0, Vector3::norm);
-    let shown = thin(&(0..count).collect::<Vec<_>>(), MOST, last);
+    let shown = thin(known, MOST, last);
     let tags = Tags::of_dots();
     let size = (WIDTH, 24 + 4 * PANEL + 34);
     let mut norms: Vec<f64> =
@@ -122,7 +131,9 @@ fn draw(
         let points: Vec<(usize, (f64, f64))> = there.map(|k| (k, at(k))).collect();
         chart.draw_series(LineSeries::new(points.iter().map(|own| own.1), colour.mix(0.45).stroke_width(3)))?;
         let style = if place == 0 { line(colour, 1.2) } else { colour.filled() };
-        points.iter().for_each(|own| tag(own.0));
+        for (k, _) in &points {
+            tag(*k);
+        }
         chart.draw_series(points.into_iter().map(|(_, at)| Circle::new(at, radius(1.9), style)))?;
     }
     Ok(())

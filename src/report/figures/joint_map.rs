@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::data::PlotData;
-use super::frame::{BELOW, Drawing, FAINT, INK, MUTED, WARM, WIDTH, figure, line, px, range, write};
+use super::frame::{Drawing, FAINT, INK, MUTED, WARM, WIDTH, figure, line, px, range, write};
 use super::sheet::Sheet;
 use super::tags::Tags;
 use crate::report::quantity::{decimals, fixed, number};
@@ -60,7 +60,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let shade = |value: f64| if most > least { 0.08 + 0.92 * (value - least) / (most - least) } else { 0.5 };
     let tags = Tags::of_boxes();
     let mut rows = Vec::new();
-    let svg = figure((WIDTH, 30 + ROW * count + BELOW), "Residual by ranges of each joint", |area| {
+    let svg = figure((WIDTH, 34 + ROW * count), "Residual by ranges of each joint", |area| {
         for (row, (command, parts)) in (0..).zip(&joints) {
             let unit = command.unit.display(1.0);
             let (top, middle) = (28 + ROW * row, 28 + ROW * row + ROW / 2);

@@ -21,9 +21,10 @@ mod strategies;
 mod tags;
 mod vectors;
 
+pub(super) use frame::range;
 pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 
-use crate::diagnose::Trace;
+use crate::diagnose::{ClosedLoop, Trace};
 use crate::identify::{Before, Comparison, Procedure};
 use crate::least_squares::Identifiability;
 use crate::monte_carlo::{MisprintStudy, ReplicaResults};
@@ -48,6 +49,7 @@ pub enum Figure<'a> {
     /// The held-out errors of one procedure of a comparison.
     Procedure(&'a Before, &'a Procedure),
     Strategies(&'a Comparison),
+    Rounds(&'a ClosedLoop),
     Ablations(&'a Comparison),
     Misprints(&'a MisprintStudy, &'a ReplicaResults),
     /// Of an effect, with its number from 1.
@@ -70,6 +72,7 @@ impl Figure<'_> {
             Self::Ranking(trace) => ranking::ranking(trace),
             Self::Procedure(before, own) => Some(errors::of_procedure(before, own)),
             Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
+            Self::Rounds(closure) => strategies::rounds(closure),
             Self::Ablations(comparison) => strategies::ablations(comparison),
             Self::Misprints(study, found) => Some(misprints::misprints(study, found)),
             Self::Cause(data, own, number) => Some(own.draw_effect(number, &data.shown)),
@@ -81,7 +84,7 @@ impl Figure<'_> {
 }
 
 /// Every name but those of effects, which are numbered, and of procedures, which are named.
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 14] = [
     "ablations",
     "contributions",
     "correlations",
@@ -92,6 +95,7 @@ const NAMES: [&str; 13] = [
     "residual-joints",
     "residual-order",
     "residual-vectors",
+    "rounds",
     "singular-values",
     "strategies",
     "unexplained",

@@ -71,7 +71,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
                 _ => FAINT.filled(),
             };
             area.draw(&Rectangle::new(bar, style))?;
-            let mark = if k > 0 && alike(ranked) { "≈ first  " } else { "" };
+            let mark = if k > 0 && alike(ranked) { "≈ first, " } else { "" };
             let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
             // Beside the bar, and clear of the line.
             let beside = end.max(place(-trace.level.log10()));
@@ -83,7 +83,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     });
     let caption = format!(
         "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
-             could do as much; left of the black line (p = {}) nothing stands out. Behind each bar: how much the effect would \
+             could do as much; left of the upright line (p = {}) nothing stands out. Behind each bar: how much the effect would \
              take off the root mean square error. Pale blue: hard to tell from the first with these poses.",
         trace.tried, trace.level
     );

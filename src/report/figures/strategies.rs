@@ -7,7 +7,9 @@ use super::frame::{
     ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
 };
 use super::sheet::Sheet;
+use crate::diagnose::{ClosedLoop, Round};
 use crate::identify::{Baseline, Comparison, Errors};
+use crate::problem::Effect;
 use crate::report::quantity::{decimals, fixed, number};
 
 const ROW: i32 = 22;
@@ -69,6 +71,38 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
         Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity"))
             .with(sheet(&entries))
     })
+}
+
+/// The same after each round of a loop, with what it added.
+pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
+    let names: Vec<String> = closure.rounds.iter().enumerate().map(|(k, _)| round_name(closure, k)).collect();
+    let declared = closure.before.fit.fitted;
+    let after = |(name, round): (&'_ String, &Round)| {
+        (name.clone(), Errors { identification: round.identification, held_out: round.held_out })
+    };
+    let all: Vec<(String, Errors)> = std::iter::once(("as declared".to_owned(), declared))
+        .chain(names.iter().zip(&closure.rounds).map(after))
+        .collect();
+    let entries: Vec<Entry> = all.iter().map(|(name, errors)| entry(name, *errors)).collect();
+    let caption = "Mean position error after each round of the loop, on the fitted poses and on those held out, which took part in \
+                   no choice, on a logarithmic scale. Where the two part, a round has learned noise.";
+    let svg = || rows(&entries, "Error after every round");
+    (entries.len() > 1).then(|| Drawing::new("rounds", "Round by round", caption, svg()).with(sheet(&entries)))
+}
+
+/// What a round changed, counted from 0.
+fn round_name(closure: &ClosedLoop, k: usize) -> String {
+    let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
+    let own = &closure.rounds[k].effects;
+    let named = |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
+    let added: Vec<&Effect> = own.iter().filter(|effect| !before.contains(effect)).collect();
+    let change = match added.as_slice() {
+        [] if own.len() < before.len() => format!("− {} of {}", before.len() - own.len(), before.len()),
+        [] => "nothing more".to_owned(),
+        [one] => format!("+ {}", named(one)),
+        [one, rest @ ..] => format!("+ {} and {} more", named(one), rest.len()),
+    };
+    format!("{} {change}", k + 1)
 }
 
 fn sheet(entries: &[Entry]) -> Sheet {

@@ -107,6 +107,7 @@ fn one(block: &Block, figures: &mut Vec<Drawing>) -> Markup {
             Block::Ranking(points) => ol { @for point in points { (item(point)) } },
             Block::Table(own) => (table(own)),
             Block::Headline(own) => (headline(own)),
+            Block::Blanks(own) => dl.blanks { @for term in own { div { dt { (term) } dd {} } } },
             Block::Poses(own) => (poses::section(own)),
             Block::Figures(own) => (grid(own.iter().filter_map(Figure::draw).collect(), figures)),
             Block::Folded(title, inner, on_paper) => {

@@ -33,6 +33,7 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                 }
             }
             Block::Headline(_)
+            | Block::Blanks(_)
             | Block::Figures(_)
             | Block::Poses(_)
             | Block::Folded(..)

@@ -33,6 +33,7 @@ pub(in crate::report) fn text(blocks: &[Block]) -> String {
                 text.extend(own.notes.iter().map(|note| format!("  {note}\n")));
             }
             Block::Headline(_)
+            | Block::Blanks(_)
             | Block::Figures(_)
             | Block::Poses(_)
             | Block::Folded(..)
@@ -49,7 +50,12 @@ pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     for block in blocks {
         match block {
             Block::Words(inner) => all.extend(flat(inner)),
-            Block::Headline(_) | Block::Figures(_) | Block::Poses(_) | Block::Folded(..) | Block::Page(_) => {}
+            Block::Headline(_)
+            | Block::Blanks(_)
+            | Block::Figures(_)
+            | Block::Poses(_)
+            | Block::Folded(..)
+            | Block::Page(_) => {}
             shown => all.push(shown),
         }
     }

@@ -74,7 +74,7 @@
   if (most > 0) give.value = Math.min(3, Math.max(0, Math.log10((0.12 * reach) / most)));
   data.traced.forEach(([label], k) => input("colour").append(new Option(label, "traced" + k)));
 
-  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2.3 };
+  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2 };
   const camera = () => {
     const [cy, sy, cp, sp] = [Math.cos(orbit.yaw), Math.sin(orbit.yaw), Math.cos(orbit.pitch), Math.sin(orbit.pitch)];
     /* Rows: to the right, up, towards the eye; z of the measuring frame points up. */
@@ -130,7 +130,7 @@
     };
     const matrix = camera();
     const factor = most > 0 ? 10 ** Number(give.value) : 1;
-    const lengthen = 10 ** Number(input("length").value) * 0.06 * reach;
+    const lengthen = 10 ** Number(input("length").value) * 0.12 * reach;
 
     /* The arm in up to 24 poses evenly, and in the one that is chosen. */
     const arms = [];
@@ -174,7 +174,7 @@
     const scale = (value) => value.toPrecision(2);
     legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + factor.toPrecision(2) : "; in this model nothing gives way") +
       (input("vectors").value === "none" ? "" : "; strokes \u00d7 " + scale(lengthen / unit)) +
-      (by === "kind" ? "; dark: held out, pale: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
+      (by === "kind" ? "; strong: held out, faint: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);
   };
   let asked = false;

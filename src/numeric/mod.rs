@@ -1,5 +1,10 @@
 //! Small numerical methods that several rooms need.
 
+mod bootstrap;
+
+pub use bootstrap::Interval;
+pub(crate) use bootstrap::mean_interval;
+
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();

@@ -1,0 +1,88 @@
+//! `flexcal accept`.
+
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use flexcal::files::digest;
+use flexcal::identify::{self, Options, SolverChoice, Strategy};
+use flexcal::report::{self, AcceptanceRecord};
+
+use super::input::{Common, Input};
+use super::outcome::Outcome;
+use super::progress::Line;
+use super::{diagnostic, output};
+
+/// Arguments of `flexcal accept`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  flexcal accept problems/lunar-sampler --instrument 'laser tracker, 1.5 inch reflector'
+  flexcal accept out/lunar-sampler/problem.closed.toml
+
+Writes acceptance.html, a page to print and sign, and acceptance.json with the digest of every input.")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// The instrument, for the record
+    #[arg(long, value_name = "TEXT")]
+    instrument: Option<String>,
+}
+
+/// Identifies, judges the held-out poses, and writes the record and the page.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let Input { problem, data, results } = common.read("accept", &["acceptance.json", "acceptance.html"])?;
+    let line = common.talks().then(Line::new);
+    let options = Options::default()
+        .with_strategy(Strategy::Joint)
+        .with_solver(SolverChoice::Auto)
+        .with_progress(line.as_ref().map(Line::sink));
+    let result = identify::identify(&problem, &data, &options);
+    if let Some(line) = line {
+        line.clear();
+    }
+    let found = result?;
+    let judged = identify::acceptance(&problem, &data, &found)?;
+    let file = common.problem_file();
+    let inputs = std::iter::once(&file).chain(common.files(&problem));
+    let record = AcceptanceRecord {
+        inputs: inputs.map(|file| (file.clone(), sha256(file))).collect(),
+        commit: commit(&file),
+        instrument: arguments.instrument.clone(),
+    };
+    let json = report::acceptance_json(&problem, &data.measurements, &found, &judged, &record);
+    let page = report::acceptance_page(&problem, &data.measurements, &found, &judged, &record);
+    results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
+    if common.json {
+        output::print_json(&json)?;
+    } else if common.talks() {
+        output::print(&report::acceptance_text(&problem, &judged))?;
+        output::print(&format!("\nWritten to {}: acceptance.json, acceptance.html\n", results.folder.display()))?;
+    }
+    Ok(diagnostic::judged(&found, common.quiet))
+}
+
+/// Digest of a file; none of a pipe, which has been read.
+fn sha256(file: &Path) -> Option<String> {
+    file.is_file().then(|| fs::read(file).ok()).flatten().map(|bytes| digest(&bytes))
+}
+
+/// The commit of the git repository around a file, as its HEAD names it.
+fn commit(file: &Path) -> Option<String> {
+    let whole = file.canonicalize().ok()?;
+    let git = whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
+    let read = |path: PathBuf| Some(fs::read_to_string(path).ok()?.trim().to_owned());
+    // A worktree's .git is a file that names its folder, and that one the folder of the references.
+    let folder = match read(git.clone()) {
+        Some(text) => git.parent()?.join(text.strip_prefix("gitdir: ")?),
+        None => git,
+    };
+    let head = read(folder.join("HEAD"))?;
+    let Some(name) = head.strip_prefix("ref: ") else { return Some(head) };
+    let common = read(folder.join("commondir")).map_or_else(|| folder.clone(), |common| folder.join(common));
+    read(common.join(name)).or_else(|| {
+        let packed = read(common.join("packed-refs"))?;
+        packed.lines().find_map(|line| Some(line.strip_suffix(name)?.trim().to_owned()))
+    })
+}

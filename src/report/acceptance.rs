@@ -1,0 +1,241 @@
+//! What `accept` says and writes: the accuracy of an arm before and after, with what it was measured under and by, to be signed.
+
+use std::path::PathBuf;
+
+use super::document::{Block, Headline, Table};
+use super::figures::range;
+use super::identify::{BEFORE, short_mm};
+use super::json::{object, to_text};
+use super::quantity::{mm, number};
+use super::render::{report, text};
+use super::table;
+use crate::identify::{Acceptance, AcceptancePose, Accuracy, Identification};
+use crate::measurement::Measurements;
+use crate::problem::{HeldOut, Problem};
+
+/// Cycles that ISO 9283 asks for in each pose.
+const CYCLES: usize = 30;
+
+/// Which inputs a certificate is of, and what no file says.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct AcceptanceRecord {
+    /// Each file that was read with its SHA-256; `None` of what cannot be read again.
+    pub inputs: Vec<(PathBuf, Option<String>)>,
+    /// Commit of the repository in which the problem stands.
+    pub commit: Option<String>,
+    /// The instrument, in words.
+    pub instrument: Option<String>,
+}
+
+object! {
+    Document<'a>(problem: &'a Problem, rows: &Measurements, found: &'a Identification, judged: &Acceptance, record: &'a AcceptanceRecord) {
+        problem: &'a str = &problem.name,
+        flexcal: &'static str = env!("CARGO_PKG_VERSION"),
+        commit: Option<&'a str> = record.commit.as_deref(),
+        arm_digest: String = problem.digest(),
+        inputs: Vec<InputEntry<'a>> = record.inputs.iter().map(InputEntry::of).collect(),
+        instrument: Option<&'a str> = record.instrument.as_deref(),
+        position_sigma_mm: Option<f64> = problem.data.position_sigma.map(|sigma| sigma * 1e3),
+        protocol: String = protocol(problem),
+        strategy: &'a str = found.strategy.as_str(),
+        solver: &'a str = found.solver.as_str(),
+        trusted: bool = found.is_trusted(),
+        conditions: Vec<RangeEntry> = conditions(problem, rows, judged).into_iter().map(RangeEntry::of).collect(),
+        identification_rows: usize = found.fitted.identification.n,
+        held_out_rows: usize = found.fitted.held_out.n,
+        poses: usize = judged.poses.len(),
+        before: AccuracyEntry = AccuracyEntry::of(&judged.before),
+        after: AccuracyEntry = AccuracyEntry::of(&judged.after),
+        /// Poses that were measured several times, and the largest RP among them.
+        repeated_poses: usize = repeated(judged).count(),
+        repeatability_max_mm: Option<f64> = repeatability(judged).map(|most| most * 1e3),
+    }
+}
+object! {
+    InputEntry<'a>(input: &'a (PathBuf, Option<String>)) {
+        file: String = input.0.display().to_string(),
+        sha256: Option<&'a str> = input.1.as_deref(),
+    }
+}
+object! {
+    RangeEntry(own: Condition) {
+        of: String = own.name,
+        unit: String = own.unit,
+        range: [f64; 2] = own.range.into(),
+    }
+}
+object! {
+    /// AP over the held-out poses.
+    AccuracyEntry(of: &Accuracy) {
+        mean_mm: f64 = of.mean.value * 1e3,
+        interval_95_mm: [f64; 2] = [of.mean.low * 1e3, of.mean.high * 1e3],
+        rms_mm: f64 = of.rms * 1e3,
+        max_mm: f64 = of.max * 1e3,
+    }
+}
+
+/// A range under which the held-out poses were measured, in the unit that is shown.
+#[derive(Debug)]
+pub(in crate::report) struct Condition {
+    name: String,
+    unit: String,
+    range: (f64, f64),
+}
+
+fn repeated(judged: &Acceptance) -> impl Iterator<Item = &AcceptancePose> {
+    judged.poses.iter().filter(|pose| pose.repeatability.is_some())
+}
+
+fn repeatability(judged: &Acceptance) -> Option<f64> {
+    repeated(judged).filter_map(|pose| pose.repeatability).max_by(f64::total_cmp)
+}
+
+/// How the held-out poses were chosen.
+fn protocol(problem: &Problem) -> String {
+    let chosen = match &problem.data.held_out {
+        Some(HeldOut::Fraction { fraction, seed }) => {
+            format!("a random part of {} % of the configurations (seed {seed})", number(100.0 * fraction, 1))
+        }
+        Some(HeldOut::Session(name)) => {
+            format!("every row of session {name}, whose base and tool alone were fitted to it")
+        }
+        Some(HeldOut::Column(name)) => format!("rows that the column {name} marks as validation"),
+        _ => "rows that the column split marks as validation".to_owned(),
+    };
+    format!("held out: {chosen}; they took part in no fit of the arm and in no choice")
+}
+
+/// Ranges over the held-out poses.
+fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Vec<Condition> {
+    let own = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
+    let mut all: Vec<Condition> = Vec::new();
+    for (joint, name, factor) in table::commands(problem) {
+        let unit = if name.ends_with("_deg") { "°" } else { "mm" };
+        let range = range(own().map(|row| rows.configuration(row)[joint] * factor));
+        all.push(Condition { name: format!("q{}", joint + 1), unit: unit.to_owned(), range });
+    }
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let range = range(own().map(|row| rows.positions[row][axis] * 1e3));
+        all.push(Condition { name: name.to_owned(), unit: "mm".to_owned(), range });
+    }
+    let columns =
+        [("temperature", "°C", &rows.temperature), ("payload", "kg", &rows.payload), ("hoist", "N", &rows.hoist)];
+    for (name, unit, column) in columns {
+        if let Some(values) = column {
+            let range = range(own().map(|row| values[row]));
+            all.push(Condition { name: name.to_owned(), unit: unit.to_owned(), range });
+        }
+    }
+    all
+}
+
+/// The machine-readable record, ending in a line break.
+pub fn acceptance_json(
+    problem: &Problem,
+    rows: &Measurements,
+    found: &Identification,
+    judged: &Acceptance,
+    record: &AcceptanceRecord,
+) -> String {
+    to_text(&Document::of(problem, rows, found, judged, record))
+}
+
+/// The accuracy in brief, ending in a line break.
+pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
+    let blocks = [
+        Block::lines(format!("{}\n{} held-out poses; {}", problem.title, judged.poses.len(), protocol(problem))),
+        Block::Table(accuracy(judged)),
+        Block::Text(repeats(judged)),
+    ];
+    text(&blocks)
+}
+
+/// The page to sign.
+pub fn acceptance_page(
+    problem: &Problem,
+    rows: &Measurements,
+    found: &Identification,
+    judged: &Acceptance,
+    record: &AcceptanceRecord,
+) -> String {
+    let head = Headline {
+        states: vec![
+            (BEFORE, short_mm(judged.before.mean.value)),
+            ("as identified", short_mm(judged.after.mean.value)),
+        ],
+        of: format!("{} held-out poses", judged.poses.len()),
+        facts: Vec::new(),
+    };
+    let trust = if found.is_trusted() { "The fit is trusted." } else { "Beware: the fit is not to be trusted." };
+    let sigma = problem
+        .data
+        .position_sigma
+        .map_or("not declared".to_owned(), |sigma| format!("{} mm per coordinate, 1 σ", mm(sigma, 4)));
+    let instrument = record.instrument.as_deref().unwrap_or("not named");
+    let conditions = conditions(problem, rows, judged).into_iter().map(|own| {
+        let shown = [own.range.0, own.range.1].map(|value| number(value, 1));
+        [vec![own.name], shown.to_vec(), vec![own.unit]].concat()
+    });
+    let inputs = record.inputs.iter().map(|(file, digest)| {
+        vec![
+            file.display().to_string(),
+            digest.clone().unwrap_or_else(|| "not a file that can be read again".to_owned()),
+        ]
+    });
+    let mut blocks = vec![
+        Block::Headline(head),
+        Block::Table(accuracy(judged)),
+        Block::Text(repeats(judged)),
+        Block::heading("How it was measured"),
+        Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
+        Block::Text(format!(
+            "Poses {}. {} rows were fitted. {trust}",
+            protocol(problem),
+            found.fitted.identification.n
+        )),
+        Block::Table(Table::new(&["held-out poses", "from", "to", "unit"], conditions.collect(), &[0, 3])),
+        Block::heading("What it is of"),
+        Block::Text(format!(
+            "Arm {}; strategy {}, solver {}; digest of the declared arm {}.",
+            problem.name,
+            found.strategy.as_str(),
+            found.solver.as_str(),
+            problem.digest()
+        )),
+    ];
+    blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("Commit of the problem: {commit}."))));
+    blocks.extend([
+        Block::Table(Table::new(&["input", "SHA-256"], inputs.collect(), &[0, 1])),
+        Block::heading("Accepted"),
+        Block::Blanks(vec!["arm, serial number", "place, date", "measured by", "accepted by"]),
+    ]);
+    report(problem, "acceptance", &blocks).html
+}
+
+/// AP before and after.
+fn accuracy(judged: &Acceptance) -> Table {
+    let row = |name: &str, of: &Accuracy| {
+        let values = [of.mean.value, of.mean.low, of.mean.high, of.rms, of.max].map(|value| mm(value, 4));
+        [vec![name.to_owned()], values.to_vec()].concat()
+    };
+    let header = ["pose accuracy AP, mm", "mean", "95 % from", "to", "rms", "max"];
+    let rows = vec![row("nominal arm, base and tool fitted", &judged.before), row("as identified", &judged.after)];
+    let notes = "AP: distance from the predicted position to the barycentre of those measured in the same pose, after ISO 9283; \
+                 the interval is of the mean, by bootstrap over poses";
+    Table::new(&header, rows, &[0]).noted(&[notes])
+}
+
+/// What repeated poses say.
+fn repeats(judged: &Acceptance) -> String {
+    match repeatability(judged) {
+        Some(most) => format!(
+            "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm over {} poses measured more than once. \
+             ISO 9283 asks for {CYCLES} cycles a pose.",
+            mm(most, 4),
+            repeated(judged).count()
+        ),
+        None => format!(
+            "No held-out pose was measured twice: nothing is said of repeatability, for which ISO 9283 asks {CYCLES} cycles a pose."
+        ),
+    }
+}
