@@ -7,7 +7,7 @@
 use std::env;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A block between fences: what stands behind the opening one, and its lines.
@@ -41,15 +41,18 @@ fn parts(page: &str) -> Vec<Part<'_>> {
     parts
 }
 
-/// Arguments of a command, quotes kept together.
+/// Arguments of a command, what stands between quotes of one kind kept together.
 fn words(command: &str) -> Vec<String> {
-    let quoted = command.split('"').enumerate();
-    quoted
-        .flat_map(|(k, part)| match k % 2 {
-            0 => part.split_whitespace().map(str::to_owned).collect::<Vec<_>>(),
-            _ => vec![part.to_owned()],
-        })
-        .collect()
+    let (mut words, mut quote): (Vec<Option<String>>, Option<char>) = (vec![None], None);
+    for letter in command.chars() {
+        match (quote, letter) {
+            (Some(own), _) if own == letter => quote = None,
+            (None, '"' | '\'') => quote = Some(letter),
+            (None, ' ') => words.push(None),
+            _ => words.last_mut().unwrap().get_or_insert_default().push(letter),
+        }
+    }
+    words.into_iter().flatten().collect()
 }
 
 /// What a command prints in a folder.
@@ -143,4 +146,75 @@ fn what_is_left_out_is_marked() {
     assert_eq!(chosen("a\nb\n", ""), ["a", "b"]);
     assert_eq!(words("plan a --separate \"x = { y = 1 }\" z"), ["plan", "a", "--separate", "x = { y = 1 }", "z"]);
     assert_eq!(timeless("converged: nothing falls after 6 steps, 0.119 s"), "converged: nothing falls after 6");
+}
+
+/// The pages of the documentation, the README first.
+fn pages() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let docs = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let mut pages: Vec<PathBuf> = docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
+    pages.sort();
+    pages.insert(0, root.join("README.md"));
+    pages
+}
+
+#[test]
+fn every_page_is_in_the_book_and_every_link_leads_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let book = fs::read_to_string(root.join("docs/SUMMARY.md")).unwrap();
+    for page in pages() {
+        let name = page.file_name().unwrap().to_str().unwrap();
+        if !["README.md", "SUMMARY.md"].contains(&name) {
+            assert!(book.contains(&format!("]({name})")), "{name} is not in docs/SUMMARY.md");
+        }
+        let text = fs::read_to_string(&page).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = link.split('#').next().unwrap();
+            if !file.is_empty() && !file.contains("://") && !file.contains([' ', '\\', '`']) {
+                assert!(page.parent().unwrap().join(file).exists(), "{}: {link}", page.display());
+            }
+        }
+    }
+}
+
+/// The commands of a page that stand on lines of their own, without comments.
+fn commands(page: &str) -> Vec<String> {
+    let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
+    let commands = lines.filter(|line| line.starts_with("flexcal "));
+    commands.map(|line| line.split(" # ").next().unwrap().trim_end().to_owned()).collect()
+}
+
+#[test]
+fn commands_of_the_documentation_are_understood() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (empty, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(root.join("problems"), folder.path().join("problems")).unwrap();
+    let run = |command: &str, folder: &Path| {
+        let words = words(command);
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let output = flexcal.args(&words[1..]).current_dir(folder).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let mut understood = 0;
+    for page in pages() {
+        for command in commands(&fs::read_to_string(&page).unwrap()) {
+            // Where there are no files, arguments are all that can be understood.
+            let (_, said) = run(&command, empty.path());
+            assert!(!said.contains("try '--help'"), "{}: {command}: {said}", page.display());
+            understood += 1;
+        }
+    }
+    assert!(understood > 20, "{understood}");
+    // Those of the list of commands do what they say, but for what takes minutes.
+    let list = fs::read_to_string(root.join("docs/commands.md")).unwrap();
+    let own = |command: &String| {
+        command.contains("lunar-sampler") && !["study", "plan"].contains(&words(command)[1].as_str())
+    };
+    let quick: Vec<String> = commands(&list).into_iter().filter(own).collect();
+    assert!(quick.len() >= 8, "{quick:?}");
+    for command in quick.iter().filter(|_| cfg!(unix)) {
+        let (status, said) = run(command, folder.path());
+        assert!(status < 2, "{command}: {said}");
+    }
 }
