@@ -179,6 +179,7 @@ fn every_page_is_in_the_book_and_every_link_leads_somewhere() {
 
 /// The commands of a page that stand on lines of their own, without comments.
 fn commands(page: &str) -> Vec<String> {
+    let page = page.replace("\\\n", "");
     let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
     let commands = lines.filter(|line| line.starts_with("flexcal "));
     commands.map(|line| line.split(" # ").next().unwrap().trim_end().to_owned()).collect()
