@@ -444,7 +444,7 @@ fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
         ]
     };
     let header = ["effect", "p by chance", "law", "resampled", "data that took no part", "held out mean, mm"];
-    let note = "law: its probability against every other at the same place; resampled: the share of fits to four fifths of the poses \
+    let note = "law: its probability against every other at the same place; resampled: the share of weighings without a fifth of the poses \
                 that name it; held out mean: once it was in the model";
     let table = Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);
     (!closure.effects.is_empty()).then_some(Block::Table(table))
