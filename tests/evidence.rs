@@ -184,3 +184,41 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
         assert_eq!(own("gear-ratio").witness, None);
     }
 }
+
+#[test]
+fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let arm = fs::read_to_string(cases.join("problem.toml")).unwrap();
+    let arm = format!("{arm}\n[data.covariates]\ntilt_deg = 'tilt of the carriage'\noil_bar = 'pressure'\n");
+    let problem = Problem::parse(&arm, &cases.join("problem.toml")).unwrap();
+    let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let truth = truth.split("[[effect]]").next().unwrap().replacen(
+        "[poses]\n",
+        "[poses]\ncovariates = { tilt_deg = [-2, 2], oil_bar = [80, 120] }\n",
+        1,
+    );
+    for (effect, strength, name) in [
+        ("covariate = { base = true, of = 'tilt_deg' }", "rx_deg_per_unit = 0.02\nz_mm_per_unit = 0.1", "base"),
+        ("covariate = { joint = 2, of = 'oil_bar' }", "rate_deg_per_unit = 0.002", "joint 2"),
+    ] {
+        let text = format!("{truth}\n[[effect]]\n{effect}\n{strength}\n");
+        let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 28, 3).unwrap().rows;
+        let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+        let mut data = Dataset::new(table(&rows), split);
+        let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
+        assert_eq!(stated(&evidence), ["covariate"], "{:?}", evidence.best());
+        assert_eq!(evidence.best()[0].part.to_string(), name);
+        // The same quantity told by a curve of it: no line is its law.
+        let bent = |value: &mut f64| *value = (*value / 2.0).powi(3);
+        data.measurements.covariates.iter_mut().step_by(2).for_each(bent);
+        data.measurements
+            .covariates
+            .iter_mut()
+            .skip(1)
+            .step_by(2)
+            .for_each(|bar| *bar = ((*bar - 100.0) / 20.0).powi(3));
+        let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
+        assert_eq!(stated(&evidence), Vec::<String>::new(), "{:?}", evidence.best());
+    }
+}

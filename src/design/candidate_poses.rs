@@ -65,8 +65,9 @@ impl PoseRanges {
             let choice = value(&mut random, (0.0, 1.0));
             let hoist = self.hoist.map(|range| value(&mut random, range));
             let temperature = self.temperature.map(|range| value(&mut apart, range));
+            let covariates = self.covariates.iter().map(|&range| value(&mut apart, range)).collect();
             let sides = self.joints.iter().map(|_| random.random()).collect();
-            drawn.push(problem, &Draft { joints, choice, hoist, temperature, sides });
+            drawn.push(problem, &Draft { joints, choice, hoist, temperature, covariates, sides });
         }
         drawn.finish()
     }
@@ -97,6 +98,7 @@ impl PoseRanges {
                 next.joints.iter_mut().zip(&self.joints).for_each(|(q, &range)| near(q, range));
                 next.hoist.iter_mut().zip(&self.hoist).for_each(|(force, &range)| near(force, range));
                 next.temperature.iter_mut().zip(&self.temperature).for_each(|(degrees, &range)| near(degrees, range));
+                next.covariates.iter_mut().zip(&self.covariates).for_each(|(own, &range)| near(own, range));
                 if random.random::<f64>() < 0.25 {
                     next.choice = random.random();
                 }
@@ -119,6 +121,7 @@ struct Draft {
     choice: f64,
     hoist: Option<f64>,
     temperature: Option<f64>,
+    covariates: Vec<f64>,
     /// Whether each joint comes from above.
     sides: Vec<bool>,
 }
@@ -139,6 +142,7 @@ impl Draft {
             choice: (place.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,
             hoist: at(&poses.hoist),
             temperature: at(&poses.temperature),
+            covariates: poses.covariates_of(row).to_vec(),
             sides,
         }
     }
@@ -152,13 +156,14 @@ struct Table<'a> {
     payload: Vec<f64>,
     hoist: Vec<f64>,
     temperature: Vec<f64>,
+    covariates: Vec<f64>,
     approach: Vec<f64>,
 }
 
 impl<'a> Table<'a> {
     fn new(ranges: &'a PoseRanges, joints: usize) -> Self {
-        let (configurations, payload, hoist, temperature, approach) = Default::default();
-        Self { ranges, joints, configurations, payload, hoist, temperature, approach }
+        let (configurations, payload, hoist, temperature, covariates, approach) = Default::default();
+        Self { ranges, joints, configurations, payload, hoist, temperature, covariates, approach }
     }
 
     fn push(&mut self, problem: &Problem, draft: &Draft) {
@@ -185,6 +190,7 @@ impl<'a> Table<'a> {
         let set = |value: Option<f64>, range: Option<(f64, f64)>| Some(rounded(value?, SETTING_STEP, range?));
         self.hoist.extend(set(draft.hoist, self.ranges.hoist));
         self.temperature.extend(set(draft.temperature, self.ranges.temperature));
+        self.covariates.extend(&draft.covariates);
     }
 
     fn finish(self) -> Measurements {
@@ -198,6 +204,7 @@ impl<'a> Table<'a> {
             payload: (!self.ranges.payloads.is_empty()).then_some(self.payload),
             hoist: self.ranges.hoist.map(|_| self.hoist),
             temperature: self.ranges.temperature.map(|_| self.temperature),
+            covariates: self.covariates,
             time: (0_u32..).take(count).map(f64::from).collect(),
             approach: self.ranges.approach.then_some(self.approach),
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },

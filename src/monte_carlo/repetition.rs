@@ -111,6 +111,7 @@ pub fn table(rows: &[Row]) -> Measurements {
         time: rows.iter().map(|row| row.conditions.time).collect(),
         time_measured: true,
         approach: (!approach.is_empty()).then_some(approach),
+        covariates: rows.iter().flat_map(|row| row.conditions.covariates.iter().copied()).collect(),
         session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
         ..Measurements::default()
     }

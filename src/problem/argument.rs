@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::quoted::quoted;
 use super::section::Section;
-use super::{Joint, JointKind};
+use super::{Joint, JointKind, Problem};
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
 
@@ -207,11 +207,13 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
 /// Examples of the same kinds on an arm, as TOML writes them.
 pub(super) struct Examples<'s> {
     joints: &'s [Joint],
+    covariate: Option<&'s str>,
 }
 
 impl<'s> Examples<'s> {
-    pub fn new(joints: &'s [Joint]) -> Self {
-        Self { joints }
+    pub fn new(problem: &'s Problem) -> Self {
+        let covariate = problem.data.covariates.first().map(|own| own.name.as_str());
+        Self { joints: &problem.joints, covariate }
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
@@ -243,9 +245,8 @@ impl<'s> Examples<'s> {
         self.moving_joint()
     }
 
-    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
     pub fn covariate(&self) -> String {
-        "\"tilt_deg\"".to_owned()
+        quoted(self.covariate.unwrap_or("tilt_deg"))
     }
 
     pub fn beam(&self) -> String {

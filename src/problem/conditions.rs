@@ -85,11 +85,12 @@ pub struct PoseRanges {
 }
 
 impl PoseRanges {
-    /// The same without temperatures and sides on which no declared effect depends: they need not be set.
+    /// The same without temperatures, sides and covariates on which no declared effect depends: they need not be set.
     #[must_use]
     pub fn that_matter(self, problem: &Problem) -> Self {
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let (thermal, sided) = (declared(Effect::is_thermal), declared(Effect::has_sides));
-        Self { temperature: self.temperature.filter(|_| thermal), approach: self.approach && sided, ..self }
+        let covariates = if declared(|effect| effect.covariate().is_some()) { self.covariates } else { Vec::new() };
+        Self { temperature: self.temperature.filter(|_| thermal), approach: self.approach && sided, covariates, ..self }
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::argument::{Argument, Examples, Mount, Reader};
-use super::{Data, Equilibrium, Joint, Statics};
+use super::{Data, Equilibrium, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 
 /// One `[[effect]]` and where it stands in the file.
@@ -79,9 +79,9 @@ macro_rules! effects {
             }
         }
 
-        /// How the effect of that name may be declared on an arm with these joints: `gear-ratio = { joint = 1 }`.
-        pub(crate) fn example(name: &str, joints: &[Joint]) -> String {
-            let examples = Examples::new(joints);
+        /// How the effect of that name may be declared on an arm: `gear-ratio = { joint = 1 }`.
+        pub(crate) fn example(name: &str, problem: &Problem) -> String {
+            let examples = Examples::new(problem);
             let arguments: Vec<(&str, String)> = match name {
                 $($name => vec![$($((key!($field $($key)?), examples.$kind())),+)?],)+
                 _ => Vec::new(),

@@ -58,7 +58,7 @@ pub(super) fn parse(text: &str, named: &Path, problem: &Problem) -> Result<Effec
     written(format!("{text} = true"), named, problem).map_err(|error| {
         let kind = match *error.kind {
             InputErrorKind::MissingKey { .. } => {
-                InputErrorKind::NeedsArguments { write: format!("'{}'", example(text.trim(), &problem.joints)) }
+                InputErrorKind::NeedsArguments { write: format!("'{}'", example(text.trim(), problem)) }
             }
             kind => kind,
         };

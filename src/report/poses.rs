@@ -34,6 +34,11 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         ("sigma_mm", values(&poses.sigma, 1e3)),
     ];
     columns.extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
+    let known = poses.covariates.len() == problem.data.covariates.len() * poses.len();
+    columns.extend(problem.data.covariates.iter().enumerate().filter(|_| known).map(|(which, own)| {
+        let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
+        (own.name.clone(), values.collect())
+    }));
     if let Some(approach) = &poses.approach {
         columns.extend(joints.iter().map(|(joint, ..)| {
             let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));

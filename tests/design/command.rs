@@ -162,7 +162,9 @@ fn a_plan_tells_two_effects_apart() {
 
 #[test]
 fn examples_of_arguments_are_effects_of_the_arm() {
-    let (problem, _) = super::bench::lunar();
+    let (mut problem, _) = super::bench::lunar();
+    let (name, meaning) = ("oil_bar".to_owned(), String::new());
+    problem.data.covariates.push(OwnCovariate { name, meaning, location: problem.data.location.clone() });
     let read = |text: &str| problem.effect(text, Path::new("--separate"));
     let mut written = 0;
     for family in flexcal::model::effect::FAMILIES {
@@ -173,7 +175,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
-    assert_eq!(written, 13);
+    assert_eq!(written, 14);
 }
 
 #[test]
@@ -209,7 +211,7 @@ fn bad_input_names_file_and_key_or_the_option() {
         ("check tests/cases --poses 28 --candidates", &[&three], &["--poses 28", "only 3 rows"]),
         ("plan tests/cases --poses 0", &[], &["--poses"]),
         ("plan tests/cases --poses 9 --criterion Q", &[], &["--criterion", "'Q'"]),
-        ("plan --poses 2 --candidates", &[&three, "--", &sigma], &["no-sigma.toml: data.position_sigma_mm"]),
+        ("plan --poses 2 --candidates", &[&three, "--", &sigma], &["no-sigma.toml:80: data.position_sigma_mm"]),
         ("plan --poses 2 --candidates", &[&three, "--", &fixed], &["fixed.toml: parameters: no parameter is free"]),
     ];
     for (arguments, more, expected) in cases {
