@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use flexcal::problem::OwnCovariate;
 use serde_json::Value;
 
 /// A folder for results, and flexcal run in the package's folder.

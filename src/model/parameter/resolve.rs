@@ -136,7 +136,7 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
         return None;
     }
     let effects: Vec<&str> = effect::NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
-    let write = effect::example(effects.first()?, &problem.joints);
+    let write = effect::example(effects.first()?, problem);
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 
