@@ -13,7 +13,7 @@ from conftest import assert_written, Command, exact, LUNAR, ROOT, timeless, UR10
 
 @pytest.mark.parametrize("strategy", ["joint", "geometry-only", "rigid"])
 def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> None:
-    run, out = command("identify", LUNAR, "--strategy", strategy)
+    run, out = command("identify", LUNAR, "--strategy", strategy, "--verbose")
     result = lunar.identify(strategy=strategy)  # type: ignore[arg-type]
     assert result.trusted == (run.returncode == 0)
     assert timeless(result.to_json()) == timeless((out / "estimate.json").read_text())
@@ -24,7 +24,7 @@ def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> No
 
 def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoop, command: Command) -> None:
     truth = ROOT / "tests" / "cases" / "truth.toml"
-    run, out = command("loop", LUNAR)
+    run, out = command("loop", LUNAR, "--verbose")
     assert timeless(closed.to_json()) == timeless((out / "loop.json").read_text())
     assert run.stdout.startswith(closed.summary())
     assert_written(closed.residuals, out / "residuals.csv")
