@@ -30,7 +30,7 @@ class _Result:
     _core: Any
 
     def summary(self) -> str:
-        """What the command line prints, as text."""
+        """What the command line prints (``identify`` and ``loop`` with ``-v``), as text."""
         return str(self._core.summary())
 
     def to_json(self) -> str:
