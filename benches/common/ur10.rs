@@ -2,8 +2,8 @@
 
 use flexcal::least_squares::LeastSquares as _;
 use flexcal::model::{Model, Pose, PoseResiduals};
-use flexcal::problem::PoseView;
 use flexcal::problem::Problem;
+use flexcal::problem::{Observation, PoseView};
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -72,6 +72,7 @@ impl Ur10 {
             setup: PoseView::of(configuration),
             base: 0,
             target: 0,
+            observation: Observation::default(),
             measured,
             sigma: NOISE,
             orientation: None,

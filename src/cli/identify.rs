@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::estimate_json(&problem, &identification);
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    let residuals = report::residuals_csv(&data.measurements, &identification.residuals(&problem, &data)?);
+    let residuals = report::residuals_csv(&problem, &data.measurements, &identification.residuals(&problem, &data)?);
     results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
     if common.json {
         output::print_json(&json)?;

@@ -59,7 +59,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
         (
             "residuals.csv",
-            &report::residuals_csv(&data.measurements, &closure.after.residuals(&closure.closed, &data)?),
+            &report::residuals_csv(
+                &closure.closed,
+                &data.measurements,
+                &closure.after.residuals(&closure.closed, &data)?,
+            ),
         ),
     ];
     let told = report::loop_report(&problem, &closure, &shown);

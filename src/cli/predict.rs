@@ -55,8 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
     let prediction = identify::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
     let mut texts = vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
-    texts.extend(prediction.residuals.as_ref().map(|all| ("residuals.csv", report::residuals_csv(&rows, all))));
-    let errors = prediction.errors.as_ref().map(report::errors_json);
+    texts.extend(
+        prediction.residuals.as_ref().map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
+    );
+    let errors = prediction.errors.as_ref().map(|errors| report::errors_json(errors, &prediction.spreads));
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let borrowed: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;

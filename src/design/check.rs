@@ -9,7 +9,7 @@ use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
 use crate::identify::Placement;
 use crate::measurement::{Dataset, Labels, Measurements, different};
-use crate::problem::{PoseRanges, Problem};
+use crate::problem::{Observation, PoseRanges, Problem};
 
 /// Poses in which predictions are judged.
 const WORKSPACE: usize = 500;
@@ -70,8 +70,8 @@ pub struct Check {
     pub detection: Detection,
     /// Measured coordinates.
     pub coordinates: usize,
-    /// Of these of each pose: three, or six with its orientation.
-    pub of_pose: usize,
+    /// The same of poses that differ from each other.
+    pub distinct: usize,
     /// How many of the poses differ from each other.
     pub different: usize,
     /// Free parameters without a prior.
@@ -125,6 +125,8 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         _ => None,
     };
     let poses = series.select(&(0..count).collect::<Vec<_>>());
+    // Predictions are of positions, whatever is measured.
+    let workspace = Measurements { observations: Vec::new(), ..workspace };
     let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
     let noise = noise(problem, &series);
     let forecast = Forecast::new(parameters, &told.select(&(0..count).collect::<Vec<_>>()));
@@ -136,8 +138,8 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         noise,
         detection: detectable(problem, &poses)?,
         growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise, count)),
-        coordinates: told.coordinates * count,
-        of_pose: told.coordinates,
+        coordinates: coordinates(&poses, told.coordinates, (0..count).collect()),
+        distinct: coordinates(&poses, told.coordinates, first_of_each(&poses.pose_numbers(problem))),
         different: different(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
@@ -155,7 +157,7 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 impl Check {
     /// Whether the poses decide every parameter as far as poses of their kind can, and measure as many coordinates as parameters have no prior.
     pub fn suffices(&self) -> bool {
-        self.forecast.open <= self.growth.open && self.of_pose * self.different >= self.without_prior
+        self.forecast.open <= self.growth.open && self.distinct >= self.without_prior
     }
 }
 
@@ -173,6 +175,20 @@ pub fn with_known_words(data: &Dataset) -> Vec<usize> {
     };
     let judges = |&row: &usize| known(Placement::base_of, row) && known(Placement::target_of, row);
     split.held_out.iter().copied().filter(judges).collect()
+}
+
+/// Numbers that some rows of a table measure, of which a position has so many.
+fn coordinates(table: &Measurements, of_position: usize, rows: Vec<usize>) -> usize {
+    let of_row = |row: usize| match table.observation(row) {
+        Observation::Position => of_position,
+        other => other.coordinates(),
+    };
+    rows.into_iter().map(of_row).sum()
+}
+
+/// The first row with each number.
+fn first_of_each(numbers: &[usize]) -> Vec<usize> {
+    (0..numbers.len()).filter(|&row| !numbers[..row].contains(&numbers[row])).collect()
 }
 
 fn finite(all: &Sensitivity) -> Sensitivity {

@@ -4,11 +4,11 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::{DesignError, Sensitivity, Workspace};
-use crate::identify::Placement;
+use crate::identify::{Placement, locate};
 use crate::measurement::Measurements;
 use crate::model::parameter::{BeamField, Parameter, Slot};
-use crate::model::{Model, SeenOrientation};
-use crate::problem::Problem;
+use crate::model::{Model, Pose, SeenOrientation};
+use crate::problem::{Observation, Problem};
 use crate::random;
 
 /// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter \[kg\].
@@ -22,6 +22,8 @@ pub struct Site<'a> {
     problem: &'a Problem,
     bases: Vec<String>,
     targets: Vec<String>,
+    /// Where the nominal arm puts the points, anchors and surfaces of which nothing is known: the full parameter vector.
+    about: DVector<f64>,
 }
 
 impl<'a> Site<'a> {
@@ -42,7 +44,7 @@ impl<'a> Site<'a> {
                 add(&mut bases, &placement.bases[placement.base_of(row)]);
                 add(&mut targets, &placement.targets[placement.target_of(row)]);
             }
-            if problem.data.position_sigma.is_none() && table.sigma.is_none() {
+            if !table.noise_is_declared(problem) {
                 return Err(DesignError::no_sigma(problem));
             }
         }
@@ -50,14 +52,24 @@ impl<'a> Site<'a> {
         if model.parameters.is_empty() {
             return Err(DesignError::nothing_free(problem));
         }
-        Ok(Self { model, problem, bases, targets })
+        let about = DVector::zeros(model.parameters.len());
+        let mut site = Self { model, problem, bases, targets, about };
+        for table in tables {
+            let mut poses = site.poses(table, &Placement::of(table));
+            poses.retain(|pose| table.position_measured || !matches!(pose.observation, Observation::Distance(_)));
+            let mut about = std::mem::take(&mut site.about);
+            locate(&site.model, &poses, |_| true, &mut about);
+            site.about = about;
+        }
+        Ok(site)
     }
 
     /// What the poses of a table tell about the nominal arm; `unit` \[m\] stands for σ, if it is given. Words that the site does
     /// not know are taken for its first.
     pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
         let added = |slot| matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. });
-        let about = self.model.parameters.iter().map(|own| if added(own.slot) { PROBE_MASS } else { 0.0 });
+        let own = self.model.parameters.iter().zip(&self.about);
+        let about = own.map(|(own, about)| if added(own.slot) { PROBE_MASS } else { *about });
         self.sensitivity_at(table, unit, &DVector::from_iterator(self.model.parameters.len(), about))
     }
 
@@ -70,26 +82,35 @@ impl<'a> Site<'a> {
             number.clamp(parameter.lower, parameter.upper)
         };
         let n = self.model.parameters.len();
-        let drawn: Vec<DVector<f64>> =
-            (0..count).map(|_| DVector::from_iterator(n, self.model.parameters.iter().map(&mut draw))).collect();
+        let drawn: Vec<DVector<f64>> = (0..count)
+            .map(|_| DVector::from_iterator(n, self.model.parameters.iter().map(&mut draw)) + &self.about)
+            .collect();
         let all = drawn.par_iter().map(|at| self.sensitivity_at(table, None, at));
         all.filter(|arm| (0..arm.len()).all(|row| arm.is_finite(row))).collect()
     }
 
     fn sensitivity_at(&self, table: &Measurements, unit: Option<f64>, at: &DVector<f64>) -> Sensitivity {
-        let placement = Placement::of(table);
+        let mut poses = self.poses(table, &Placement::of(table));
+        for pose in &mut poses {
+            pose.sigma = unit.unwrap_or(pose.sigma);
+            let turn = self.problem.data.orientation_sigma.filter(|_| self.problem.data.fits_orientation);
+            // In a unit of length, what counts are positions.
+            let turn = turn.filter(|_| pose.observation.is_position());
+            pose.orientation = turn.filter(|_| unit.is_none()).map(|sigma| SeenOrientation { axes: None, sigma });
+        }
+        Sensitivity::of(&self.model, &poses, at)
+    }
+
+    /// The rows of a table as poses of the site's model.
+    fn poses<'t>(&self, table: &'t Measurements, placement: &Placement) -> Vec<Pose<'t>> {
         let rows: Vec<usize> = (0..table.len()).collect();
         let mut poses = placement.poses(table, &rows, self.problem.data.position_sigma.unwrap_or(1.0));
         let place = |all: &[String], word: &String| all.iter().position(|known| known == word).unwrap_or(0);
         for pose in &mut poses {
             pose.base = place(&self.bases, &placement.bases[pose.base]);
             pose.target = place(&self.targets, &placement.targets[pose.target]);
-            pose.sigma = unit.unwrap_or(pose.sigma);
-            let turn = self.problem.data.orientation_sigma.filter(|_| self.problem.data.fits_orientation);
-            // In a unit of length, what counts are positions.
-            pose.orientation = turn.filter(|_| unit.is_none()).map(|sigma| SeenOrientation { axes: None, sigma });
         }
-        Sensitivity::of(&self.model, &poses, at)
+        poses
     }
 
     /// Rows of a table in which the nominal target stays in a workspace.

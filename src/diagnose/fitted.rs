@@ -12,8 +12,8 @@ use crate::problem::{Effect, EffectDeclaration, Problem};
 /// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in the choice of effects.
 const WITHOUT_WEIGHT: f64 = 1e6;
 
-/// Median of |r|² of three normal coordinates of unit scatter.
-const MEDIAN: f64 = 2.366;
+/// Median of |r|² of one, two and three normal coordinates of unit scatter.
+const MEDIAN: [f64; 3] = [0.455, 1.386, 2.366];
 /// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
 const TIMES: usize = 5;
 
@@ -140,7 +140,7 @@ impl Fitted {
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.
     pub fn neighbourhood_as_fitted(&self, linearised: &Linearised) -> LinearNeighbourhood {
         let unknowns = self.unknowns_without(linearised, &[], self.found.noise_factor.max(1.0).sqrt());
-        LinearNeighbourhood::new(&linearised.fitted(), linearised.residual(), &unknowns)
+        LinearNeighbourhood::new(&linearised.fitted(), linearised.residual(), &unknowns, linearised.empty())
     }
 
     /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is divided by `weight`.
@@ -181,7 +181,7 @@ impl Fitted {
             columns = columns.resize_horizontally(first + added, 0.0);
             columns.columns_mut(first, added).copy_from(more);
         }
-        LinearNeighbourhood::new(&columns, &residual, &unknowns)
+        LinearNeighbourhood::new(&columns, &residual, &unknowns, linearised.empty())
     }
 
     /// Numbers of an effect's parameters among the unknowns.
@@ -203,12 +203,15 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let rows = data.rows();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
     let most = (data.rules.few * rows.len() as f64) as usize;
+    let numbers: Vec<usize> = rows.iter().map(|&row| data.measurements.observation(row).coordinates()).collect();
     // The worst first.
     let far = |residual: &DVector<f64>| -> Vec<usize> {
         let squares: Vec<f64> = (0..rows.len()).map(|k| residual.fixed_rows::<3>(3 * k).norm_squared()).collect();
         let mut order: Vec<usize> = (0..rows.len()).collect();
         order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
-        let scatter = order.get(rows.len() / 2).map_or(0.0, |&middle| squares[middle] / MEDIAN);
+        let mut ratios: Vec<f64> = (0..rows.len()).map(|k| squares[k] / MEDIAN[numbers[k] - 1]).collect();
+        ratios.sort_by(|a, b| b.total_cmp(a));
+        let scatter = ratios.get(rows.len() / 2).copied().unwrap_or(0.0);
         order.retain(|&k| squares[k] > data.rules.gross * scatter);
         order
     };

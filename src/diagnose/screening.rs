@@ -170,6 +170,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let fit = FitResidual {
         residual: &linear.data_residual(),
         fitted: &linear.fitted(),
+        coordinates: &linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect::<Vec<_>>(),
         sigma_is_declared: fitted.found.noise == Noise::Declared,
         time: &data.time(),
         session: &data.session(),

@@ -111,6 +111,27 @@ pub enum InputErrorKind {
     #[error("another beam is called \"{name}\"; choose another name")]
     RepeatedBeamName { name: String },
 
+    // What is measured against.
+    #[error("\"{name}\" cannot name a fixture, for parameters go by it; leave out . * [ ] and spaces")]
+    NotAFixtureName { name: String },
+    #[error("another {what} is called \"{name}\" (line {line}); choose another name")]
+    RepeatedFixture { what: &'static str, name: String, line: usize },
+    #[error("no {what} is called \"{name}\"{}; {}", meant(name, known), list("there are", known, "none is declared"))]
+    UnknownFixture { what: &'static str, name: String, known: Vec<String> },
+    #[error("a distance is between two different points, found {found}")]
+    NotTwoPoints { found: usize },
+    #[error(
+        "the {what} \"{name}\" is measured by {rows} row{} alone, which says nothing: its own place takes {numbers} numbers; \
+         measure it again in other configurations, or declare where it is", plural(*rows)
+    )]
+    TooFewContacts { what: &'static str, name: String, rows: usize, numbers: usize },
+    #[error("{has} without {lacks}; write both or neither")]
+    HalfObserved { has: &'static str, lacks: &'static str },
+    #[error("nothing is measured in this row: every column that could hold something is empty")]
+    NothingMeasured,
+    #[error("rows of several kinds are weighed against each other; write {write} in [data]")]
+    NoSigmaOfKind { write: String },
+
     // Effects.
     #[error("an effect is one key, as in `payload-mass = {{}}`; found {found}")]
     NotOneEffect { found: usize },

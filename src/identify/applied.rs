@@ -2,12 +2,15 @@
 
 use nalgebra::{DVector, Vector3};
 
+use super::errors::of_kind;
 use super::outliers::outlying;
 use super::placement::UNKNOWN_SIGMA;
-use super::predict::Residual;
+use super::predict::{Residual, in_space};
 use super::registration::register;
 use super::saved::{SavedEstimate, SavedEstimateError};
+use super::spread::{PointSpread, spreads};
 use super::stage::{Stage, StageError};
+use super::surroundings::locate;
 use super::{ErrorSummary, Placement, SolverChoice};
 use crate::error::InputError;
 use crate::least_squares::Loss;
@@ -15,7 +18,7 @@ use crate::least_squares::solver::Settings;
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
 use crate::model::{Model, Pose};
-use crate::problem::Problem;
+use crate::problem::{Observation, Problem};
 
 /// Part of a parameter in a combination that rows leave open, beyond rounding.
 const OPEN: f64 = 1e-6;
@@ -32,6 +35,8 @@ pub struct Prediction {
     pub residuals: Option<Vec<Residual>>,
     /// Their errors; `None` likewise.
     pub errors: Option<ErrorsBySession>,
+    /// The spread of the target at each point that the rows touch.
+    pub spreads: Vec<PointSpread>,
     /// Parameters of bases and tools that the estimate lacks, fitted to their own rows with the arm as it is.
     pub placed: Vec<String>,
 }
@@ -69,13 +74,14 @@ pub enum PredictError {
 impl ErrorsBySession {
     /// Of the errors measured − predicted of every row \[m\].
     pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
+        let kind = rows.leading();
         let session = |(label, name): (usize, &String)| {
-            let own = rows.session.of_row.iter().zip(errors).filter(|(of_row, _)| **of_row == label);
-            let own: Vec<Vector3<f64>> = own.map(|(_, error)| *error).collect();
-            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), ErrorSummary::of(&own)))
+            let own = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
+            let (own, errors): (Vec<usize>, Vec<Vector3<f64>>) = own.map(|row| (row, errors[row])).unzip();
+            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), of_kind(rows, own, &errors, kind)))
         };
         let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
-        Self { all: ErrorSummary::of(errors), sessions }
+        Self { all: of_kind(rows, 0..rows.len(), errors, kind), sessions }
     }
 }
 
@@ -125,17 +131,29 @@ pub fn predict(
     } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
         return Err(lacking(estimate, &model.parameters[k].name));
     }
-    let sigmas: Vec<Option<f64>> =
-        all.iter().map(|&row| rows.sigma.as_ref().map_or(sigma, |own| Some(own[row]))).collect();
+    let sigmas: Vec<Option<f64>> = all.iter().map(|&row| rows.sigma_of(row).or(sigma)).collect();
     let orientations = turn.map(|_| model.orientations(&poses, x.as_slice()));
     let turns = turn.filter(|_| rows.orientations.is_some()).map(|_| model.orientation_residuals(poses.clone(), &x));
+    let targets = model.points(&poses, x.as_slice());
+    let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
+    let spreads = spreads(&model, &problem.fixtures, &poses, &x);
     let errors = model.residuals(poses, &x);
-    let positions = rows.positions.iter().zip(&errors).map(|(measured, error)| measured - error).collect();
-    let residuals = rows.position_measured.then(|| residuals(&errors, &sigmas, turns.as_deref().zip(turn), split));
+    let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
+    let of_row = |(row, error): (usize, &Vector3<f64>)| in_space(rows, row, (&fixtures, &bases), error);
+    let (seen, errors): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = errors.iter().enumerate().map(of_row).unzip();
+    let position = |row: usize| match rows.observation(row) {
+        Observation::Position => seen[row],
+        _ => targets[row].map_or(Vector3::from_element(f64::NAN), |point| bases[base_of[row]].point(&point)),
+    };
+    let positions = all.iter().map(|&row| position(row)).collect();
+    let numbers: Vec<usize> = all.iter().map(|&row| rows.observation(row).coordinates()).collect();
+    let residuals = rows
+        .position_measured
+        .then(|| residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split));
     let errors = rows.position_measured.then(|| ErrorsBySession::of(rows, &errors));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
-    Ok(Prediction { positions, orientations, residuals, errors, placed })
+    Ok(Prediction { positions, orientations, residuals, errors, spreads, placed })
 }
 
 /// The error of an estimate that lacks a parameter; without an estimate all have their nominal values.
@@ -149,6 +167,7 @@ fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
     match model.parameters[k].slot {
         Slot::Base { base, .. } => pose.base == base,
         Slot::Target { target, .. } => pose.target == target,
+        Slot::Fixture { fixture, .. } => pose.observation.fixtures().contains(&Some(fixture)),
         _ => false,
     }
 }
@@ -158,7 +177,8 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     let open: Vec<usize> = missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
     open.iter().copied().find(|&k| {
         let own: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
-        3 * own.len() < open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count()
+        own.iter().map(|pose| pose.coordinates()).sum::<usize>()
+            < open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count()
     })
 }
 
@@ -169,6 +189,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
     let new_base = |pose: &&Pose| missing.iter().any(|&k| of_base(k) && uses(model, pose, k));
     let registrable: Vec<Pose> = own.iter().filter(new_base).copied().collect();
     register(model, &registrable, &mut x);
+    locate(model, &own, |k| missing.contains(&k), &mut x);
     let stage = Stage {
         model,
         declared: own.iter().map(|pose| pose.sigma).collect(),
@@ -193,18 +214,19 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
 /// Residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it is not known, and from those of
 /// orientation and their σ \[rad\].
 fn residuals(
-    errors: &[Vector3<f64>],
-    sigmas: &[Option<f64>],
+    (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
+    (sigmas, coordinates): (&[Option<f64>], &[usize]),
     turns: Option<(&[Vector3<f64>], f64)>,
     split: Option<&Split>,
 ) -> Vec<Residual> {
     let whitened: Vec<Vector3<f64>> =
         errors.iter().zip(sigmas).map(|(error, sigma)| error / sigma.unwrap_or(f64::NAN)).collect();
     let lengths: Vec<f64> = whitened.iter().map(Vector3::norm).collect();
-    let outliers = outlying(&lengths, 3);
+    let outliers = outlying(&lengths, coordinates);
     let held_out = |row: usize| split.is_some_and(|split| split.held_out.binary_search(&row).is_ok());
     let residual = |(row, (&position, &whitened)): (usize, (&Vector3<f64>, &Vector3<f64>))| Residual {
         row,
+        predicted: seen[row],
         held_out: held_out(row),
         position,
         whitened,

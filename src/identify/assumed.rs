@@ -8,7 +8,7 @@ pub(super) const LEAST_NOISE: f64 = 1e-9;
 /// What a fit makes of the σ of each row: √((scale σ)² + e²).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Assumed {
-    /// 1, or less where the declared σ is too large.
+    /// 1, or less where the declared σ is too large; more where rows of several kinds scatter more than declared.
     pub scale: f64,
     /// 1 σ of the model's own error e, beside the noise \[m\].
     pub model_error: f64,
@@ -21,6 +21,14 @@ impl Assumed {
     /// What it makes of a declared σ \[m\].
     pub fn of(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
+    }
+
+    /// The σ scaled together, so that the mean variance becomes larger by `ratio`; as [`raised`](Self::raised) otherwise.
+    pub fn scaled(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
+        let sum: f64 = declared.iter().zip(taken).map(|(own, taken)| (own / taken).powi(2)).sum();
+        let largest = declared.iter().copied().fold(0.0, f64::max);
+        let least = (LEAST_NOISE / largest).min(1.0);
+        Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
     /// What makes the mean variance of poses that a fit weighted by `taken` larger by `ratio`; `declared` are their σ.

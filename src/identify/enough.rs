@@ -7,10 +7,10 @@ use nalgebra::DVector;
 use super::Placement;
 use super::fitting::Fitting;
 use super::quality::{QualityFlag, TooFewPoses};
-use crate::measurement::different;
+use crate::measurement::{Measurements, different};
 use crate::model::Model;
 use crate::model::parameter::{Parameter, Slot};
-use crate::problem::Problem;
+use crate::problem::{Observation, Problem};
 
 /// Coordinates of a rigid body: what any number of targets in one pose of the arm tell of it.
 const BODY: usize = 6;
@@ -34,16 +34,21 @@ impl Enough {
         let numbers = measurements.pose_numbers(problem);
         let of_arm = measurements.arm_pose_numbers(problem);
         let poses = different(&of_arm, split.identification.iter().copied());
-        let of_point = if fitting.turn_sigma.is_some() { BODY } else { 3 };
-        let coordinates = coordinates((&numbers, &of_arm), placement, &split.identification, of_point);
+        let turned = if fitting.turn_sigma.is_some() { 3 } else { 0 };
+        let of_row = |row: usize| match measurements.observation(row) {
+            Observation::Position => 3 + turned,
+            other => other.coordinates(),
+        };
+        let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
+        let coordinates = coordinates((&numbers, &of_arm), (measurements, placement), &split.identification, &of_row);
         let parameters = unknowns.len();
         let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
         let (own, theirs) = (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
         let flag = (coordinates < without_prior)
             .then(|| QualityFlag::TooFewEquations { of: "the fit".to_owned(), coordinates, unknowns: without_prior })
-            .or_else(|| underdetermined((model, placement), (&numbers, of_point), (rows, false), own))
-            .or_else(|| underdetermined((model, placement), (&numbers, of_point), (later, true), theirs))
+            .or_else(|| underdetermined((model, placement), (&numbers, &of_row), (rows, false), own))
+            .or_else(|| underdetermined((model, placement), (&numbers, &of_row), (later, true), theirs))
             .or_else(|| undetermined(fitting, &numbers, rows, at, own))
             .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
         let too_few = (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
@@ -52,23 +57,30 @@ impl Enough {
     }
 }
 
-/// Coordinates that tell of the arm and of its targets: three for each different point, six with its orientation, but no more than
-/// six for a pose of the arm; the shape of its targets is one measurement more.
+/// Coordinates that tell of the arm and of its targets: as many as each different point has, but no more than six for a pose of
+/// the arm, with those of contacts and distances added one by one; the shape of its targets is one measurement more.
 fn coordinates(
     (numbers, of_arm): (&[usize], &[usize]),
-    placement: &Placement,
+    (measurements, placement): (&Measurements, &Placement),
     rows: &[usize],
-    of_point: usize,
+    of_row: &[usize],
 ) -> usize {
-    let mut points: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
-    let mut targets = BTreeSet::new();
-    for &row in rows {
-        points.entry(of_arm[row]).or_default().insert(numbers[row]);
-        targets.insert(placement.target_of(row));
+    let (positions, others): (Vec<usize>, Vec<usize>) =
+        rows.iter().partition(|&&row| measurements.observation(row).is_position());
+    let mut points: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
+    let mut targets = BTreeMap::new();
+    for &row in &positions {
+        points.entry(of_arm[row]).or_default().insert(numbers[row], of_row[row]);
+        targets.insert(placement.target_of(row), of_row[row]);
     }
-    let of_poses: usize = points.values().map(|own| (of_point * own.len()).min(BODY)).sum();
-    let several = points.values().any(|own| of_point * own.len() > BODY);
-    of_poses + if several { (of_point * targets.len()).saturating_sub(BODY) } else { 0 }
+    let of_pose = |own: &BTreeMap<usize, usize>| own.values().sum::<usize>();
+    let of_poses: usize = points.values().map(|own| of_pose(own).min(BODY)).sum();
+    let several = points.values().any(|own| of_pose(own) > BODY);
+    let contacts: BTreeSet<(usize, Observation)> =
+        others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
+    let of_contacts: usize = contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
+    let of_targets = if several { targets.values().sum::<usize>().saturating_sub(BODY) } else { 0 };
+    of_poses + of_targets + of_contacts
 }
 
 /// `base[A]`, or `base` where there is one without a name.
@@ -86,7 +98,9 @@ fn undetermined(
 ) -> Option<QualityFlag> {
     let Fitting { model, placement, .. } = fitting;
     let open = |b: &usize| {
-        let own: Vec<usize> = rows.iter().copied().filter(|&row| placement.base_of(row) == *b).collect();
+        // Contacts may leave the place of a base open, which is then one of the combinations that they do not see.
+        let own = rows.iter().copied().filter(|&row| placement.base_of(row) == *b);
+        let own: Vec<usize> = own.filter(|&row| fitting.measurements.observation(row).is_position()).collect();
         let counts = |k: &usize| {
             let parameter = &model.parameters[*k];
             let of_base = matches!(parameter.slot, Slot::Base { base, .. } if base == *b);
@@ -109,12 +123,14 @@ fn undetermined(
 /// of the poses of all rows. Where `judged`, the rows have to leave something to judge by as well.
 fn underdetermined(
     (model, placement): (&Model, &Placement),
-    (numbers, of_point): (&[usize], usize),
+    (numbers, of_row): (&[usize], &[usize]),
     (rows, judged): (&[usize], bool),
     varied: impl Fn(usize) -> bool,
 ) -> Option<QualityFlag> {
     let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(Slot) -> bool| {
-        let coordinates = of_point * different(numbers, rows.iter().copied().filter(|&row| used(row)));
+        let apart: BTreeMap<usize, usize> =
+            rows.iter().filter(|&&row| used(row)).map(|&row| (numbers[row], of_row[row])).collect();
+        let coordinates = apart.values().sum::<usize>();
         let counts = |k: usize| varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].slot);
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };

@@ -2,6 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::measurement::Measurements;
+use crate::problem::Observation;
+
 /// A value per axis of the measuring frame and for the Euclidean norm \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisValues {
@@ -18,6 +21,9 @@ pub struct AxisValues {
 /// Size of the position errors of some poses \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ErrorSummary {
+    /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)); of others than positions the errors are
+    /// the rows' own residuals, along x where that is one number.
+    pub kind: &'static str,
     /// Number of poses.
     pub n: usize,
     /// How many of them have no equilibrium: their errors, and with them mean, max and rms, are NaN.
@@ -50,9 +56,27 @@ pub struct OrientationErrors {
     pub sigma_taken: f64,
 }
 
+/// The errors of those of some `rows` that measure the same kind of thing.
+pub(super) fn of_kind(
+    measurements: &Measurements,
+    rows: impl IntoIterator<Item = usize>,
+    errors: &[Vector3<f64>],
+    observation: Observation,
+) -> ErrorSummary {
+    let is_of_kind = |row: usize| measurements.observation(row).kind() == observation.kind();
+    let own: Vec<Vector3<f64>> =
+        rows.into_iter().zip(errors).filter(|(row, _)| is_of_kind(*row)).map(|(_, error)| *error).collect();
+    ErrorSummary::of_kind(observation, &own)
+}
+
 impl ErrorSummary {
-    /// Of the errors measured − predicted \[m\].
+    /// Of the errors measured − predicted of positions \[m\].
     pub fn of(errors: &[Vector3<f64>]) -> Self {
+        Self::of_kind(Observation::Position, errors)
+    }
+
+    /// Of the residuals of rows of one kind \[m\].
+    pub fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> = errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();
         let n = values.len().max(1) as f64;
         let over = |fold: &dyn Fn(f64, f64) -> f64, finish: &dyn Fn(f64) -> f64| {
@@ -60,6 +84,7 @@ impl ErrorSummary {
             AxisValues { x: axis(0), y: axis(1), z: axis(2), norm: axis(3) }
         };
         Self {
+            kind: observation.kind(),
             n: errors.len(),
             unpredicted: errors.iter().filter(|error| error.iter().any(|x| x.is_nan())).count(),
             mean: over(&|sum, v| sum + v, &|sum| sum / n),

@@ -3,15 +3,19 @@
 use nalgebra::DVector;
 
 use super::assumed::Assumed;
+use super::errors::of_kind;
 use super::placement::HeldOutOnly;
 use super::registration::register;
+use super::spread::{PointSpread, spreads};
 use super::stage::{Gauge, Stage, StageEnd, StageError};
+use super::surroundings::locate;
 use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Strategy};
 use crate::least_squares::Loss;
 use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
+use crate::problem::{Fixture, Observation};
 
 /// Sweeps after which a sequential strategy is given up.
 const MAX_SWEEPS: usize = 2000;
@@ -146,6 +150,9 @@ impl<'a> Fitting<'a> {
         let held_out = self.poses(&self.held_out_only.rows);
         poses.extend(held_out.into_iter().filter(|pose| !known[pose.base]));
         register(self.model, &poses, &mut x);
+        let later = &self.held_out_only;
+        locate(self.model, &self.poses(&self.split.identification), |k| !later.parameters[k], &mut x);
+        locate(self.model, &self.poses(&later.rows), |k| later.parameters[k], &mut x);
         let placements = self.choose(|parameter| parameter.slot.is_placement());
         if !placements.is_empty() {
             x = self.placing(&self.split.identification, placements).run(&x)?.x;
@@ -208,10 +215,48 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// Errors on both parts of the data with the full parameter vector `x`.
+    /// Errors on both parts of the data with the full parameter vector `x`, of the kind of rows that errors are told of.
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
-        let of = |rows: &[usize]| ErrorSummary::of(&self.position_errors(rows, x));
+        self.errors_of(self.measurements.leading(), x)
+    }
+
+    fn errors_of(&self, kind: Observation, x: &DVector<f64>) -> Errors {
+        let of =
+            |rows: &[usize]| of_kind(self.measurements, rows.iter().copied(), &self.position_errors(rows, x), kind);
         Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
+    }
+
+    /// Errors of every kind of rows at the full parameter vectors of the registered nominal arm and of the fitted one, where there
+    /// are several kinds.
+    pub fn errors_by_kind(&self, registered: &DVector<f64>, fitted: &DVector<f64>) -> Vec<(Errors, Errors)> {
+        let kinds = self.measurements.kinds();
+        let each = kinds.iter().map(|&kind| (self.errors_of(kind, registered), self.errors_of(kind, fitted)));
+        if kinds.len() > 1 { each.collect() } else { Vec::new() }
+    }
+
+    /// The spread of the target at each point that was touched, with the arm at the full parameter vectors of the registered nominal
+    /// arm and of the fitted one, and whether all of the point's rows were held out.
+    pub fn spreads(
+        &self,
+        fixtures: &[Fixture],
+        registered: &DVector<f64>,
+        fitted: &DVector<f64>,
+    ) -> Vec<(PointSpread, PointSpread, bool)> {
+        let (rows, Split { identification, .. }) = ((0..self.measurements.len()).collect::<Vec<_>>(), self.split);
+        let poses = self.poses(&rows);
+        let of = |x: &DVector<f64>| spreads(self.model, fixtures, &poses, x);
+        let was_fitted = |name: &str| {
+            identification.iter().any(|&row| match self.measurements.observation(row) {
+                Observation::Point(point) => fixtures[point].name == name,
+                _ => false,
+            })
+        };
+        let both = of(registered).into_iter().zip(of(fitted));
+        let with_part = |(before, after): (PointSpread, PointSpread)| {
+            let held_out = !was_fitted(&before.point);
+            (before, after, held_out)
+        };
+        both.map(with_part).collect()
     }
 
     /// Errors of orientation on both parts of the data at the full parameter vectors of the registered nominal arm and of the

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::fitting::Fitting;
-use super::outliers::{Outlier, chance};
+use super::outliers::{Outlier, chances, scatter};
 use super::quality::{LEAST_SPREAD, MISSES, QualityFlag};
 use super::{ErrorSummary, Errors};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
@@ -19,8 +19,8 @@ const ABOVE_NOISE: f64 = 5.0;
 
 /// Held-out rows whose errors of position are too long for the fit's σ and its own uncertainty there, in the order of the rows.
 ///
-/// A row is one where P(χ²₃ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J whitened by the σ that the fit
-/// took, C the covariance of its `unknowns` at `x`. The scatter is the median s over 1.538, no less than 1: so a model that
+/// A row is one where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J whitened by the σ that the fit
+/// took, C the covariance of its `unknowns` at `x`. The scatter is the median of s / √(median of χ²ₖ), no less than 1: so a model that
 /// misses some effect everywhere does not turn every row into one.
 pub(super) fn outliers(
     fitting: &Fitting,
@@ -51,22 +51,25 @@ pub(super) fn outliers(
             lengths.push(size * square.max(0.0).sqrt());
         }
     }
-    let known = lengths.iter().copied().filter(|length| length.is_finite());
-    let Some((typical, limit)) = chance(lengths.len(), 3) else { return Vec::new() };
-    let scatter = (median(known).unwrap_or(0.0) / typical).max(1.0);
+    let numbers: Vec<usize> = stage.poses.iter().map(|pose| pose.observation.coordinates()).collect();
+    let chances = chances(&numbers);
+    let scatter = scatter(&lengths, &chances).max(1.0);
     let errors = fitting.position_errors(rows, x);
-    let outlier = |((&row, &length), error): ((&usize, &f64), Vector3<f64>)| {
-        let distance = length / scatter;
-        (distance > limit).then(|| Outlier { row, location: fitting.measurements.location(row), distance, error })
+    let outlier = |place: usize| {
+        let (row, distance) = (rows[place], lengths[place] / scatter);
+        let far = || Outlier { row, location: fitting.measurements.location(row), distance, error: errors[place] };
+        (distance > chances[place].1).then(far)
     };
-    rows.iter().zip(&lengths).zip(errors).filter_map(outlier).collect()
+    (0..rows.len()).filter_map(outlier).collect()
 }
 
 /// Number of held-out rows that are identification rows again: configuration, position and session are the same to the bit.
 pub(super) fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values = measurements.configuration(row).iter().chain(measurements.positions[row].iter());
-        values.map(|value| value.to_bits()).chain([measurements.session.of_row[row] as u64]).collect()
+        let fixtures = measurements.observation(row).fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
+        let words = fixtures.into_iter().chain([measurements.session.of_row[row]]);
+        values.map(|value| value.to_bits()).chain(words.map(|word| word as u64)).collect()
     };
     let known: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();
     held_out.iter().filter(|&&row| known.contains(&key(row))).count()

@@ -171,7 +171,7 @@ fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> R
         if measurements.orientations.is_none() {
             return Err(error(InputErrorKind::NoOrientation));
         }
-        if problem.data.position_sigma.is_none() && measurements.sigma.is_none() {
+        if problem.data.position_sigma.is_none() && !measurements.knows_sigma() {
             return Err(error(InputErrorKind::NoPositionSigma));
         }
     }
@@ -206,14 +206,13 @@ pub fn identify_model(
     if solver != SolverChoice::Bounded && model.is_bounded() {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
-    let declared = problem.data.position_sigma;
-    let noise_is_declared = declared.is_some() || measurements.sigma.is_some();
+    let (declared, noise_is_declared) = (problem.data.position_sigma, measurements.noise_is_declared(problem));
     let mut fitting = Fitting {
         model,
         measurements,
         split,
         placement: &placement,
-        held_out_only: placement.held_out_only(model, split),
+        held_out_only: placement.held_out_only(model, measurements, split),
         strategy,
         solver,
         loss: problem.robust.map_or(Loss::Squares, loss),
@@ -228,7 +227,7 @@ pub fn identify_model(
     let start = fitting.registered()?;
     let registered = fitting.errors(&start);
     if !noise_is_declared {
-        fitting.sigma = (registered.identification.rms.norm / 3.0_f64.sqrt()).max(LEAST_NOISE);
+        fitting.sigma = (registered.identification.rms.norm / measurements.leading().root()).max(LEAST_NOISE);
     }
     let begin = options.begin(model, &start);
     let enough = Enough::of(&fitting, problem, &unknowns, &start);
@@ -249,8 +248,7 @@ pub fn identify_model(
             estimate.std_error = None;
         }
     }
-    let fitted = fitting.errors(&end.x);
-    let whole = fitting.whole();
+    let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let declared_all = together(whole.declared.iter().copied());
     let taken = together(whole.poses.iter().map(|pose| pose.sigma));
     let judgement = Judgement {
@@ -282,10 +280,12 @@ pub fn identify_model(
         chance: statistics.chance.filter(|_| noise_is_declared),
         noise_factor: (taken / declared_all).powi(2),
         sigma_taken: taken,
-        sigma_scale: fitting.assumed.scale,
+        sigma_scale: fitting.assumed.scale.min(1.0),
+        kinds: fitting.errors_by_kind(&start, &end.x),
+        spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
         weak: end.gauge.weak.clone(),
         orientation: fitting.orientation(&start, &end.x),
-        coordinates: whole.coordinates() * split.identification.len(),
+        coordinates: whole.count(),
         identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
         estimates,
         covariance: covariance.finish(),

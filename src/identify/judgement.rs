@@ -35,7 +35,7 @@ impl Judgement<'_> {
         poses: usize,
     ) -> Option<QualityFlag> {
         let Fitting { model, measurements, placement, split, .. } = self.fitting;
-        let rows = &split.identification;
+        let rows = &self.positions();
         let nominal = self.fitting.position_errors(rows, self.start);
         let measured = self.measured();
         let predicted = spread(placement, rows, |place| measurements.positions[rows[place]] - nominal[place]);
@@ -43,7 +43,7 @@ impl Judgement<'_> {
         let fitted = self.fitting.position_errors(rows, &self.end.x);
         // An arm that was near before the fit was driven away by a solver that did not converge.
         let misses = far(&fitted).filter(|_| self.end.termination.converged() || far(&nominal).is_some());
-        let other_size = (poses >= LEAST_POSES).then(|| other_size(measured, predicted)).flatten();
+        let other_size = (poses.min(rows.len()) >= LEAST_POSES).then(|| other_size(measured, predicted)).flatten();
         let least = self.sigma.0.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
         enough
             .or(misses)
@@ -69,20 +69,27 @@ impl Judgement<'_> {
         far_off.into_iter().chain(copies).chain(outliers).collect()
     }
 
-    /// Spread of the identification positions \[m\].
+    /// Identification rows that measure positions.
+    fn positions(&self) -> Vec<usize> {
+        let Fitting { measurements, split, .. } = self.fitting;
+        let is_position = |row: &usize| measurements.observation(*row).is_position();
+        split.identification.iter().copied().filter(is_position).collect()
+    }
+
+    /// Their spread \[m\].
     fn measured(&self) -> f64 {
-        let Fitting { measurements, placement, split, .. } = self.fitting;
-        let rows = &split.identification;
+        let Fitting { measurements, placement, .. } = self.fitting;
+        let rows = &self.positions();
         spread(placement, rows, |place| measurements.positions[rows[place]])
     }
 
-    /// Root mean squared length of errors of the identification rows, those left out that a robust loss sets aside \[m\].
+    /// Root mean squared length of errors of the identification positions, those left out that a robust loss sets aside \[m\].
     fn rms(&self, errors: &[Vector3<f64>]) -> f64 {
         let robust = self.fitting.loss != Loss::Squares;
         let aside = |row: &usize| robust && self.outliers.iter().any(|outlier| outlier.row == *row);
-        let rows = self.fitting.split.identification.iter();
+        let rows = self.positions();
         let kept: Vec<f64> =
-            rows.zip(errors).filter(|(row, _)| !aside(row)).map(|(_, error)| error.norm_squared()).collect();
+            rows.iter().zip(errors).filter(|(row, _)| !aside(row)).map(|(_, error)| error.norm_squared()).collect();
         (kept.iter().sum::<f64>() / kept.len().max(1) as f64).sqrt()
     }
 

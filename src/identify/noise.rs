@@ -11,6 +11,7 @@ use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood, residual_vector};
+use crate::model::Pose;
 
 /// An undeclared σ has settled when it changes by less than this part.
 const NOISE_SETTLED: f64 = 1e-3;
@@ -71,24 +72,25 @@ fn contradicted(
     statistics: &Statistics,
     assumed: (Assumed, Assumed),
 ) -> Result<Option<(Assumed, Assumed)>, StageError> {
-    let counts = |place: &usize| {
-        stage.loss == Loss::Squares || statistics.lengths.outlying(statistics.lengths.values[*place]).is_none()
-    };
+    let counts = |place: &usize| stage.loss == Loss::Squares || statistics.lengths.outlying(*place).is_none();
     let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
-    let poses = places.iter().map(|&place| stage.poses[place]).collect();
+    let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
+    let several_kinds = poses.iter().any(|pose| pose.observation.kind() != poses[0].observation.kind());
+    let count: usize = poses.iter().map(Pose::coordinates).sum();
+    let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
     let residuals = stage.residuals_of(poses, &end.x);
     let x = residuals.reduced(&end.x);
     let data = Fit::new(&residuals).linearise(&x);
     let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
     let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
     let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
-    let rows = (stage.coordinates() * places.len(), 2.0 * data.cost);
+    let rows = (count, 2.0 * data.cost);
     let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
     if !ratio.is_finite() {
         return Ok(None);
     }
     let first = assumed == (Assumed::DECLARED, Assumed::DECLARED);
-    let shares = shares(&residual_vector(&residuals, &x), stage.coordinates());
+    let shares = shares(&residual_vector(&residuals, &x), stage.coordinates(), [count - turned, turned]);
     // Positions and orientations settle each by themselves.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
     let chance = ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE));
@@ -96,8 +98,10 @@ fn contradicted(
         return Ok(None);
     }
     let of = |all: &dyn Fn(usize) -> f64| places.iter().map(|&place| all(place)).collect::<Vec<f64>>();
+    // An error of the model is one length for all only where all measure the same.
+    let raised = if several_kinds { Assumed::scaled } else { Assumed::raised };
     let of_position =
-        Assumed::raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio * shares[0]);
+        raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio * shares[0]);
     let taken = |place: usize| stage.poses[place].orientation.map_or(1.0, |own| own.sigma);
     let of_turn = match stage.declared_turn {
         Some(sigma) => Assumed::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
@@ -108,15 +112,16 @@ fn contradicted(
 }
 
 /// Mean square of the whitened residuals of positions, and of orientations, over that of all: 1 where there are positions alone.
-fn shares(whitened: &DVector<f64>, coordinates: usize) -> [f64; 2] {
+fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
     }
-    let mean = |part: fn(&[f64]) -> &[f64]| {
-        let squares = whitened.as_slice().chunks_exact(coordinates).flat_map(part).map(|r| r * r);
-        squares.sum::<f64>() / (whitened.len() / 2).max(1) as f64
+    let sum = |part: fn(&[f64]) -> &[f64]| -> f64 {
+        whitened.as_slice().chunks_exact(coordinates).flat_map(part).map(|r| r * r).sum()
     };
-    let (position, turn) = (mean(|r| &r[..3]), mean(|r| &r[3..]));
-    let all = 0.5 * (position + turn);
+    let sums = [sum(|r| &r[..3]), sum(|r| &r[3..])];
+    let mean = |sum: f64, count: usize| sum / count.max(1) as f64;
+    let (position, turn) = (mean(sums[0], counts[0]), mean(sums[1], counts[1]));
+    let all = mean(sums[0] + sums[1], counts[0] + counts[1]);
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }

@@ -7,7 +7,8 @@ use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
 use super::{
-    ActiveConstraint, Caution, Errors, OrientationErrors, Outlier, QualityFlag, SolverChoice, Strategy, TooFewPoses,
+    ActiveConstraint, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag, SolverChoice, Strategy,
+    TooFewPoses,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{BlindCombination, Identifiability};
@@ -88,6 +89,11 @@ pub struct Identification {
     pub registered: Errors,
     /// Of the identified arm.
     pub fitted: Errors,
+    /// Of each kind of rows, where there are several: before and after; the first are `registered` and `fitted`.
+    pub kinds: Vec<(Errors, Errors)>,
+    /// At each point that was touched the spread of the target as the nominal and as the identified arm have it, and whether
+    /// all of its rows were held out.
+    pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
     pub orientation: Option<OrientationErrors>,
     /// χ² of the identification data over its degrees of freedom; `None` without any, or with the noise estimated.

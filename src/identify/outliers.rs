@@ -1,5 +1,7 @@
 //! Poses whose residual is too long to be noise.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -20,13 +22,27 @@ pub(super) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
     Some((squares.inverse_cdf(0.5).sqrt(), squares.inverse_cdf(1.0 - BY_CHANCE / count.max(1) as f64).sqrt()))
 }
 
-/// Which of some lengths of whitened residuals of so many `coordinates` are too long to be noise; the scatter is the median one, no
-/// less than the σ that they are in units of.
-pub(super) fn outlying(lengths: &[f64], coordinates: usize) -> Vec<bool> {
-    let Some((typical, limit)) = chance(lengths.len(), coordinates) else { return vec![false; lengths.len()] };
-    let known = lengths.iter().copied().filter(|length| length.is_finite());
-    let scatter = (median(known).unwrap_or(0.0) / typical).max(1.0);
-    lengths.iter().map(|length| *length > limit * scatter).collect()
+/// For each of some residuals, which have so many `coordinates`, what [`chance`] says of it.
+pub(super) fn chances(coordinates: &[usize]) -> Vec<(f64, f64)> {
+    let mut known: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    let of = |&own: &usize| {
+        *known.entry(own).or_insert_with(|| chance(coordinates.len(), own).unwrap_or((1.0, f64::INFINITY)))
+    };
+    coordinates.iter().map(of).collect()
+}
+
+/// The median of some lengths of whitened residuals, each over the one that chance gives it; those that are not finite do not count.
+pub(super) fn scatter(lengths: &[f64], chances: &[(f64, f64)]) -> f64 {
+    let ratios = lengths.iter().zip(chances).map(|(length, (typical, _))| length / typical);
+    median(ratios.filter(|ratio| ratio.is_finite())).unwrap_or(0.0)
+}
+
+/// Which of some lengths of whitened residuals of so many `coordinates` each are too long to be noise; the scatter is the median
+/// one, no less than the σ that they are in units of.
+pub(super) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bool> {
+    let chances = chances(coordinates);
+    let scatter = scatter(lengths, &chances).max(1.0);
+    lengths.iter().zip(&chances).map(|(length, (_, limit))| *length > limit * scatter).collect()
 }
 
 /// A pose whose residual is too long to be noise.
@@ -51,15 +67,16 @@ pub(super) struct Lengths {
     pub weighed: Vec<f64>,
     /// 1 σ of the scatter in units of the assumed one.
     pub scatter: f64,
-    limit: f64,
+    /// Length of each in units of the scatter beyond which it is an outlier.
+    limits: Vec<f64>,
 }
 
 impl Lengths {
     /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that is left to scatter, 0…1, and
     /// `declared` the part of the declared σ that the fit took to be noise, where any σ was declared.
     ///
-    /// A pose is an outlier where P(χ²₃ > s²) < 0.01 / N, with s = ‖r‖ / scatter and N poses \[Bonferroni\]; χ²₆ with orientations. The scatter is
-    /// median ‖r‖ / 1.538 (√ of the median of χ²₃), which gross errors hardly move, over √`freedom`; under a declared σ it
+    /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured numbers and N poses \[Bonferroni\]. The scatter is
+    /// the median of ‖r‖ / √(median of χ²ₖ), 1.538 of positions, which gross errors hardly move, over √`freedom`; under a declared σ it
     /// is no less than that part of it. So a model that misses some effect everywhere does not turn every pose into an outlier.
     pub fn of(stage: &Stage, at: &DVector<f64>, freedom: f64, declared: Option<f64>) -> Self {
         let residuals = stage.residuals(at);
@@ -77,29 +94,24 @@ impl Lengths {
         };
         let values: Vec<f64> = items().zip(stage.poses.iter().zip(&stage.declared)).map(in_declared).collect();
         let least = declared.unwrap_or(0.0);
-        let Some((typical, limit)) = chance(values.len(), stage.coordinates()) else {
-            return Self { values, weighed, scatter: 1.0, limit: f64::INFINITY };
-        };
-        let scatter = median(values.iter().copied()).unwrap_or(0.0) / typical / freedom.clamp(0.01, 1.0).sqrt();
-        Self { values, weighed, scatter: scatter.max(least), limit }
+        let chances = chances(&stage.poses.iter().map(Pose::coordinates).collect::<Vec<_>>());
+        let scatter = scatter(&values, &chances) / freedom.clamp(0.01, 1.0).sqrt();
+        let limits = chances.into_iter().map(|(_, limit)| limit).collect();
+        Self { values, weighed, scatter: scatter.max(least), limits }
     }
 
     /// Length of a residual in units of the scatter, if it is an outlier.
-    pub fn outlying(&self, length: f64) -> Option<f64> {
-        (self.scatter > 0.0 && length > self.limit * self.scatter).then(|| length / self.scatter)
-    }
-
-    /// Number of outliers.
-    pub fn outliers(&self) -> usize {
-        self.values.iter().filter(|&&length| self.outlying(length).is_some()).count()
+    pub fn outlying(&self, place: usize) -> Option<f64> {
+        let (length, limit) = (self.values[place], self.limits[place]);
+        (self.scatter > 0.0 && length > limit * self.scatter).then(|| length / self.scatter)
     }
 
     /// The outliers among `rows`, whose residuals these are, in the order of the rows.
     pub fn list(&self, rows: &[usize], errors: &[Vector3<f64>], measurements: &Measurements) -> Vec<Outlier> {
-        let outlier = |((&row, &length), &error)| {
-            let distance = self.outlying(length)?;
+        let outlier = |((place, &row), &error): ((usize, &usize), &Vector3<f64>)| {
+            let distance = self.outlying(place)?;
             Some(Outlier { row, location: measurements.location(row), distance, error })
         };
-        rows.iter().zip(&self.values).zip(errors).filter_map(outlier).collect()
+        rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
     }
 }

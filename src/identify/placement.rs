@@ -1,5 +1,7 @@
 //! Which base and which target each row uses, and which of them appear in held-out rows only.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 
 use crate::measurement::{Measurements, Split};
@@ -47,21 +49,21 @@ impl Placement {
     /// 1 σ of a coordinate of some rows together, as declared \[m\].
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
-        let squares = rows.iter().map(|&row| measurements.sigma.as_ref().map_or(whole, |all| all[row]).powi(2));
+        let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
     /// Rows as poses; `sigma` \[m\] is that of rows without one of their own.
     pub fn poses<'a>(&self, measurements: &'a Measurements, rows: &[usize], sigma: f64) -> Vec<Pose<'a>> {
-        let at = |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row]);
         let first = measurements.first_time();
         rows.iter()
             .map(|&row| Pose {
                 setup: measurements.setup(row, first),
                 base: self.base_of_row[row],
                 target: self.target_of_row[row],
+                observation: measurements.observation(row),
                 measured: measurements.positions[row],
-                sigma: at(&measurements.sigma, row).unwrap_or(sigma),
+                sigma: measurements.sigma_of(row).unwrap_or(sigma),
                 orientation: None,
             })
             .collect()
@@ -76,7 +78,7 @@ impl Placement {
     ) -> Vec<Pose<'a>> {
         let mut poses = self.poses(measurements, rows, sigma);
         if let (Some(sigma), Some(all)) = (turn, &measurements.orientations) {
-            for (pose, &row) in poses.iter_mut().zip(rows) {
+            for (pose, &row) in poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position()) {
                 pose.orientation = Some(SeenOrientation { axes: Some(axes_of(&all[row])), sigma });
             }
         }
@@ -95,10 +97,10 @@ impl Placement {
         model.residuals(self.poses(measurements, rows, 1.0), x)
     }
 
-    /// Which parameters belong to bases or targets that no identification row uses, and which rows use those.
+    /// Which parameters belong to bases, targets or fixtures that held-out rows alone use, and which rows use those.
     ///
     /// They say nothing about the arm: they are fitted on their held-out rows, alone.
-    pub(super) fn held_out_only(&self, model: &Model, split: &Split) -> HeldOutOnly {
+    pub(super) fn held_out_only(&self, model: &Model, measurements: &Measurements, split: &Split) -> HeldOutOnly {
         let unused = |count: usize, of_row: &[usize]| {
             let mut unused = vec![true; count];
             split.identification.iter().for_each(|&row| unused[of_row[row]] = false);
@@ -106,16 +108,27 @@ impl Placement {
         };
         let bases = unused(self.bases.len(), &self.base_of_row);
         let targets = unused(self.targets.len(), &self.target_of_row);
+        let fixtures_of = |rows: &[usize]| -> BTreeSet<usize> {
+            rows.iter().flat_map(|&row| measurements.observation(row).fixtures()).flatten().collect()
+        };
+        let fitted = fixtures_of(&split.identification);
+        let fixtures: BTreeSet<usize> = fixtures_of(&split.held_out).difference(&fitted).copied().collect();
         let parameters = model
             .parameters
             .iter()
             .map(|parameter| match parameter.slot {
                 Slot::Base { base, .. } => bases[base],
                 Slot::Target { target, .. } => targets[target],
+                Slot::Fixture { fixture, .. } => fixtures.contains(&fixture),
                 _ => false,
             })
             .collect();
-        let uses = |&&row: &&usize| bases[self.base_of_row[row]] || targets[self.target_of_row[row]];
+        let of_fixture = |row: usize| measurements.observation(row).fixtures().into_iter().flatten();
+        let uses = |&&row: &&usize| {
+            bases[self.base_of_row[row]]
+                || targets[self.target_of_row[row]]
+                || of_fixture(row).any(|fixture| fixtures.contains(&fixture))
+        };
         HeldOutOnly { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
     }
 }
@@ -125,7 +138,7 @@ pub(super) fn axes_of(orientation: &UnitQuaternion<f64>) -> [Vector3<f64>; 3] {
     [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| orientation * axis)
 }
 
-/// Bases and targets that appear in held-out rows only.
+/// Bases, targets and fixtures that appear in held-out rows only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct HeldOutOnly {
     /// Whether each parameter of the model belongs to one.

@@ -9,8 +9,9 @@ use super::identification::IdentifyError;
 use super::outcome::Identification;
 use super::placement::Placement;
 use crate::measurement::{Dataset, Measurements};
-use crate::model::{Model, Pose};
-use crate::problem::Problem;
+use crate::model::{FixtureAt, Model, Pose};
+use crate::problem::{Observation, Problem};
+use crate::spatial::Frame;
 
 /// A measured pose and what a fit leaves of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,9 @@ pub struct Residual {
     pub row: usize,
     /// Whether the row was held out.
     pub held_out: bool,
-    /// Measured − predicted position, measuring frame \[m\]; NaN where the identified arm has no equilibrium.
+    /// What was predicted \[m\]: the position of the target in the measuring frame, also where that was at a point; a distance.
+    pub predicted: Vector3<f64>,
+    /// Measured − predicted position, measuring frame, or distance \[m\]; NaN where the identified arm has no equilibrium.
     pub position: Vector3<f64>,
     /// The same over 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
@@ -75,16 +78,19 @@ impl Identification {
         let errors = self.errors(&model, measurements)?;
         let turns = self.turns(problem, &model, measurements)?;
         let turn_sigma = problem.data.orientation_sigma.unwrap_or(f64::NAN);
-        let sigma = |row: usize| measurements.sigma.as_ref().map_or(self.sigma, |own| own[row]);
+        let sigma = |row: usize| measurements.sigma_of(row).unwrap_or(self.sigma);
         let held_out = self.cautions.iter().flat_map(|caution| match caution {
             Caution::HeldOutOutliers { rows, .. } => rows.as_slice(),
             _ => &[],
         });
         let outliers: HashSet<usize> = self.outliers.iter().chain(held_out).map(|outlier| outlier.row).collect();
+        let x = self.vector(&model)?;
+        let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
         let residual = |(row, position): (usize, Vector3<f64>)| Residual {
             row,
+            predicted: in_space(measurements, row, (&fixtures, &bases), &position).0,
             held_out: split.held_out.binary_search(&row).is_ok(),
-            position,
+            position: in_space(measurements, row, (&fixtures, &bases), &position).1,
             whitened: position / sigma(row),
             orientation: turns.as_ref().map(|all| all[row]),
             whitened_orientation: turns.as_ref().map(|all| all[row] / turn_sigma),
@@ -139,5 +145,21 @@ impl Identification {
             return Err(IdentifyError::NotInModel { name: lost.name.clone() });
         }
         Ok(DVector::from_vec(x))
+    }
+}
+
+/// What was predicted of a row, and what is left of it, measuring frame: of a contact with a point the position of the target.
+pub(super) fn in_space(
+    rows: &Measurements,
+    row: usize,
+    (fixtures, bases): (&[FixtureAt<f64>], &[Frame<f64>]),
+    residual: &Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    match rows.observation(row) {
+        Observation::Point(point) => {
+            let residual = bases[rows.session.of_row[row]].vector(residual);
+            (fixtures[point].place() - residual, residual)
+        }
+        _ => (rows.positions[row] - residual, *residual),
     }
 }

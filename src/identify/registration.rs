@@ -10,11 +10,13 @@ use crate::spatial::{Frame, rotate};
 const ON_A_LINE: f64 = 1e-12;
 
 /// Sets every base that is wholly free and has no prior to the best rigid motion from the arm's own frame to the
-/// measured points of `poses`, in the full parameter vector `x`, and then every orientation of a target that is wholly free and has
+/// measured positions of `poses`, in the full parameter vector `x`, and then every orientation of a target that is wholly free and has
 /// no prior to the best one. What no pose uses stays as it is.
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4 × 4 matrix  [Horn 1987].
 pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
+    let poses: Vec<Pose> = poses.iter().filter(|pose| pose.observation.is_position()).copied().collect();
+    let poses = &poses[..];
     let points = model.points(poses, x.as_slice());
     let has_orientation = poses.iter().any(|pose| pose.orientation.is_some());
     let frames = if has_orientation { model.frames(poses, x.as_slice()) } else { Vec::new() };

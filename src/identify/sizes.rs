@@ -14,7 +14,7 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 /// How far a parameter without a prior may plausibly deviate: a length by the arm's own size, an angle by 1 rad, a stiffness by
 /// a factor of 100. `None` for those with a prior, and for what may be anywhere or has no size of its own.
 pub(super) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
-    if parameter.sigma.is_some() || matches!(parameter.slot, Slot::Base { axis: 0..3, .. }) {
+    if parameter.sigma.is_some() || matches!(parameter.slot, Slot::Base { axis: 0..3, .. } | Slot::Fixture { .. }) {
         return None;
     }
     match parameter.unit() {
@@ -27,7 +27,7 @@ pub(super) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
 /// What no parameter of the arm exceeds, with a prior or without: as [`plausible`], angles by half a turn.
 pub(super) fn largest(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.slot, parameter.unit()) {
-        (Slot::Base { .. } | Slot::Target { axis: 3.., .. }, _) => None,
+        (Slot::Base { .. } | Slot::Fixture { .. } | Slot::Target { axis: 3.., .. }, _) => None,
         (_, Unit::Length) => Some(model.size()),
         (_, Unit::Angle) => Some(HALF_TURN),
         (_, unit) => unit.is_relative().then_some(LN_STIFFNESS),

@@ -92,7 +92,12 @@ impl<'a> Stage<'a> {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
 
-    /// Measured coordinates of a pose: three, or six with its orientation.
+    /// Measured numbers of all poses.
+    pub fn count(&self) -> usize {
+        self.poses.iter().map(Pose::coordinates).sum()
+    }
+
+    /// Rows of the residual for each pose: three, or six with its orientation; 0 behind what is measured.
     pub fn coordinates(&self) -> usize {
         if self.declared_turn.is_some() { 6 } else { 3 }
     }

@@ -50,16 +50,17 @@ impl Statistics {
         let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
         let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
         let mut uncertainty = of(1.0);
-        let of_pose = stage.coordinates();
-        let coordinates = of_pose as f64 * stage.poses.len() as f64;
+        let coordinates = stage.count() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
         let lengths = Lengths::of(stage, &end.x, freedom / coordinates, assumed.map(|assumed| assumed.scale));
         let robust = stage.loss != Loss::Squares;
-        let counts = |length: f64| !robust || lengths.outlying(length).is_none();
-        let chi2: f64 = lengths.values.iter().filter(|&&s| counts(s)).map(|s| s * s).sum();
-        let left_out = if robust { of_pose as f64 * lengths.outliers() as f64 } else { 0.0 };
+        let counts = |place: usize| !robust || lengths.outlying(place).is_none();
+        let kept = (0..lengths.values.len()).filter(|&place| counts(place));
+        let chi2: f64 = kept.map(|place| lengths.values[place].powi(2)).sum();
+        let aside = (0..lengths.values.len()).filter(|&place| !counts(place));
+        let left_out = aside.map(|place| stage.poses[place].coordinates() as f64).sum::<f64>();
         if robust {
-            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, of_pose, freedom));
+            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, stage.coordinates(), freedom));
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();

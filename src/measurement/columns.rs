@@ -4,73 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
 use super::mapped::Names;
+use super::role::{MEASURED, PLAIN, Role};
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
 use crate::problem::{HeldOut, Joint, JointKind, JointSource, Problem};
 use crate::quantity::Unit;
 
-/// What a column stands for; joints and axes count from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Role {
-    Joint(usize),
-    /// What a joint's encoder read.
-    Reading(usize),
-    Position(usize),
-    Sigma,
-    Payload,
-    Hoist,
-    Temperature,
-    Time,
-    Approach(usize),
-    Orientation(usize),
-    Quaternion(usize),
-    Split,
-    Session,
-    Target,
-    Pose,
-    /// Which fixed point a row without an arm measures.
-    Nest,
-    /// One of the problem's own covariates.
-    Covariate(usize),
-}
-
-impl Role {
-    /// Whether it is what a joint's encoder read.
-    pub fn is_reading(self) -> bool {
-        matches!(self, Self::Reading(_))
-    }
-}
-
 /// Unknown columns of which is asked what they are meant to be; who has more means none.
 const ASKED: usize = 100;
-
-/// Columns without a unit.
-const PLAIN: [(&str, Role); 9] = [
-    ("nest", Role::Nest),
-    ("split", Role::Split),
-    ("session", Role::Session),
-    ("target", Role::Target),
-    ("pose", Role::Pose),
-    ("qx", Role::Quaternion(0)),
-    ("qy", Role::Quaternion(1)),
-    ("qz", Role::Quaternion(2)),
-    ("qw", Role::Quaternion(3)),
-];
-
-/// Columns with a unit, and whether they need one: a column such as `time` may be about something else.
-const MEASURED: [(&str, Role, Unit, bool); 11] = [
-    ("x", Role::Position(0), Unit::Length, true),
-    ("y", Role::Position(1), Unit::Length, true),
-    ("z", Role::Position(2), Unit::Length, true),
-    ("sigma", Role::Sigma, Unit::Length, true),
-    ("rx", Role::Orientation(0), Unit::Angle, true),
-    ("ry", Role::Orientation(1), Unit::Angle, true),
-    ("rz", Role::Orientation(2), Unit::Angle, true),
-    ("payload", Role::Payload, Unit::Mass, false),
-    ("hoist", Role::Hoist, Unit::Force, false),
-    ("temperature", Role::Temperature, Unit::Temperature, false),
-    ("time", Role::Time, Unit::Time, false),
-];
 
 /// A column that is read.
 #[derive(Clone, Copy)]
@@ -224,9 +165,22 @@ impl Columns {
                     .error(InputErrorKind::MissingColumn { write, near: near(&own.name) }));
             }
         }
+        for (has, lacks, write) in [
+            (Role::Distance, Role::Anchor, "anchor"),
+            (Role::Offset, Role::Surface, "surface"),
+            (Role::Anchor, Role::Distance, "distance_mm"),
+            (Role::Tilt(0), Role::Tilt(1), "tilt_y_deg"),
+            (Role::Tilt(1), Role::Tilt(0), "tilt_x_deg"),
+        ] {
+            if self.has(has) && !self.has(lacks) && (measured || has != Role::Anchor) {
+                let write = write.to_owned();
+                return Err(table.column(&write).error(InputErrorKind::MissingColumn { near: near(&write), write }));
+            }
+        }
         // One coordinate alone is no position.
-        if !measured && !(0..3).any(|axis| self.has(Role::Position(axis))) {
-            return Ok(());
+        let has_position = (0..3).any(|axis| self.has(Role::Position(axis)));
+        if !has_position && (!measured || self.observes()) {
+            return self.require_marked(table, problem, measured, near);
         }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             if !self.has(Role::Position(axis)) {
@@ -236,6 +190,17 @@ impl Columns {
         if let (true, true) = self.orientations() {
             return Err(table.column("qx").error(InputErrorKind::RepeatedColumn { first: "rx".to_owned() }));
         }
+        self.require_marked(table, problem, measured, near)
+    }
+
+    /// Whether the column of held-out rows is there that the problem names.
+    fn require_marked(
+        &self,
+        table: &Table,
+        problem: &Problem,
+        measured: bool,
+        near: impl Fn(&str) -> Option<String>,
+    ) -> Result<(), InputError> {
         if let Some(HeldOut::Column(name)) = problem.data.held_out.as_ref().filter(|_| measured)
             && self.marked.is_none()
         {
@@ -243,6 +208,25 @@ impl Columns {
             return Err(table.column(name).error(InputErrorKind::MissingColumn { write, near: near(name) }));
         }
         Ok(())
+    }
+
+    /// Whether a row may measure something else than a position.
+    pub fn observes(&self) -> bool {
+        [Role::Point, Role::Anchor, Role::Distance, Role::Surface, Role::Tilt(0), Role::Frame]
+            .into_iter()
+            .any(|role| self.has(role))
+    }
+
+    /// The number of the row that the table is at in the column of a role \[SI\]; 0 where there is no such column.
+    pub fn length(&self, table: &Table, role: Role) -> Result<f64, InputError> {
+        let column = self.read.iter().find(|column| column.role == role);
+        column.map_or(Ok(0.0), |column| table.number(column.place).map(column.to_si))
+    }
+
+    /// Place of the column of a role.
+    pub fn place(&self, role: Role) -> Option<usize> {
+        let index = self.read.binary_search_by_key(&role, |column| column.role).ok()?;
+        self.read.get(index).map(|column| column.place)
     }
 
     /// A column `time` without a unit holds dates, or else nothing that is known: it is left out with a warning.
@@ -318,9 +302,10 @@ impl Numbering {
             || problem.joints.iter().enumerate().filter_map(|(k, own)| Some((k, own, unit_of(own.commanded())?)));
         let joints = moving().map(|(index, _, unit)| (self.number(index), unit));
         let named = moving().map(|(_, joint, unit)| (joint.name.clone(), unit));
-        let plain = PLAIN.iter().map(|(name, _)| (*name).to_owned());
+        let plain = PLAIN.iter().filter(|(_, role)| role.is_known_to(problem)).map(|(name, _)| (*name).to_owned());
         let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
-        let measured = MEASURED.iter().map(|&(base, _, unit, _)| (base.to_owned(), unit));
+        let measured = MEASURED.iter().filter(|(_, role, ..)| role.is_known_to(problem));
+        let measured = measured.map(|&(base, _, unit, _)| (base.to_owned(), unit));
         let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
         let measured = measured.chain(named).flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
         let lacking = |name: &String| !there.contains(split_unit(name).0);
@@ -333,7 +318,7 @@ impl Numbering {
             return meaning;
         }
         let plain = |role| Ok(Meaning::Read(role, identity));
-        if let Some((_, role)) = PLAIN.iter().find(|(known, _)| *known == name) {
+        if let Some((_, role)) = PLAIN.iter().find(|(known, role)| *known == name && role.is_known_to(problem)) {
             return plain(*role);
         }
         if let Some(number) = numbered(name, "approach") {
@@ -344,10 +329,20 @@ impl Numbering {
                 None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
             };
         }
+        if let Some((tilt, suffix)) = [("tilt_x", 0), ("tilt_y", 1)]
+            .into_iter()
+            .filter(|&(_, axis)| Role::Tilt(axis).is_known_to(problem))
+            .find_map(|(base, axis)| Some((Role::Tilt(axis), (base, name.strip_prefix(base)?))))
+        {
+            let (base, suffix) = suffix;
+            let unit = suffix.strip_prefix('_').and_then(|suffix| Unit::Angle.suffix(suffix));
+            let needed = || InputErrorKind::NeedsUnit { noun: Unit::Angle.noun(), write: Unit::Angle.spelled(base) };
+            return unit.map(|unit| Meaning::Read(tilt, unit.to_si)).ok_or_else(needed);
+        }
         let (base, suffix) = split_unit(name);
         let reading = suffix.and_then(|suffix| suffix.strip_prefix("read_")).filter(|_| numbered(base, "q").is_some());
         let suffix = reading.or(suffix);
-        let measured = MEASURED.iter().find(|(known, ..)| *known == base);
+        let measured = MEASURED.iter().find(|(known, role, ..)| *known == base && role.is_known_to(problem));
         let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
             (role, unit, strict)
         } else {
@@ -379,7 +374,7 @@ impl Numbering {
 /// What the name of the file may stand for: a word.
 fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
-        Role::Session | Role::Target => Ok(role),
+        Role::Session | Role::Target | Role::Point => Ok(role),
         _ => Err(InputErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }),
     }
 }

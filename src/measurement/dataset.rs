@@ -35,8 +35,10 @@ impl Dataset {
     /// Measurements divided as the problem says (`held_out` of `[data]`, or their column `split`).
     ///
     /// # Errors
-    /// An empty part, a session that nobody measured, or no word on what is held out.
+    /// An empty part, a session that nobody measured, no word on what is held out, or an unknown point, anchor or surface with too
+    /// few rows to say more than where it is.
     pub fn of(problem: &Problem, measurements: Measurements) -> Result<Self, InputError> {
+        measurements.enough_contacts(problem)?;
         let split = Split::new(problem, &measurements)?;
         Ok(Self { measurements, split })
     }

@@ -2,6 +2,8 @@
 
 mod builder;
 #[deny(clippy::indexing_slicing)]
+mod cells;
+#[deny(clippy::indexing_slicing)]
 mod column_table;
 #[deny(clippy::indexing_slicing)]
 mod columns;
@@ -18,10 +20,14 @@ mod lines;
 #[deny(clippy::indexing_slicing)]
 mod mapped;
 #[deny(clippy::indexing_slicing)]
+mod observed;
+#[deny(clippy::indexing_slicing)]
 mod orientation;
 #[deny(clippy::indexing_slicing)]
 mod read;
 mod repeats;
+#[deny(clippy::indexing_slicing)]
+mod role;
 mod split;
 #[deny(clippy::indexing_slicing)]
 mod table;
@@ -34,7 +40,7 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
-use crate::problem::{PoseConditions, PoseView};
+use crate::problem::{Observation, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
@@ -57,13 +63,16 @@ pub struct Measurements {
     pub other_configurations: Option<Vec<f64>>,
     /// Fixed points that were measured in between; they take no part in fits.
     pub nests: Vec<NestReading>,
-    /// Measured positions in the measuring frame \[m\].
+    /// What each row measures; empty where all of them measure positions.
+    pub observations: Vec<Observation>,
+    /// The measured numbers of each row, zeros behind them \[m\]: positions in the measuring frame, distances, 0 of a contact.
     pub positions: Vec<Vector3<f64>>,
-    /// Whether the positions were measured; 0 otherwise, in poses that are still to be measured.
+    /// Whether they were measured; 0 otherwise, in poses that are still to be measured.
     pub position_measured: bool,
     /// Measured orientations of the target in the measuring frame, where there are all of their columns.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
-    /// 1 σ of each coordinate from the column `sigma_mm` \[m\].
+    /// 1 σ of each coordinate from the column `sigma_mm`, or of the row's kind where there are several; NaN where it is not
+    /// known \[m\].
     pub sigma: Option<Vec<f64>>,
     /// Payload \[kg\].
     pub payload: Option<Vec<f64>>,
@@ -162,6 +171,39 @@ impl Measurements {
         self.positions.is_empty()
     }
 
+    /// What a row measures.
+    pub fn observation(&self, row: usize) -> Observation {
+        self.observations.get(row).copied().unwrap_or_default()
+    }
+
+    /// What rows measure, one observation of each kind that there is, positions first.
+    pub fn kinds(&self) -> Vec<Observation> {
+        let mut kinds: Vec<Observation> = (0..self.len()).map(|row| self.observation(row)).collect();
+        kinds.sort_unstable();
+        kinds.dedup_by_key(|own| own.kind());
+        kinds
+    }
+
+    /// The first of them: what errors are told of.
+    pub fn leading(&self) -> Observation {
+        self.kinds().first().copied().unwrap_or_default()
+    }
+
+    /// 1 σ of a row that has one of its own \[m\].
+    pub fn sigma_of(&self, row: usize) -> Option<f64> {
+        self.sigma.as_ref().map(|all| all[row]).filter(|sigma| !sigma.is_nan())
+    }
+
+    /// Whether every row has a σ of its own.
+    pub fn knows_sigma(&self) -> bool {
+        self.sigma.as_ref().is_some_and(|all| all.iter().all(|sigma| !sigma.is_nan()))
+    }
+
+    /// Whether the σ of every row is known, from columns or from `[data]`.
+    pub fn noise_is_declared(&self, problem: &Problem) -> bool {
+        self.knows_sigma() || (self.observations.is_empty() && problem.data.position_sigma.is_some())
+    }
+
     /// File and line of a row, for messages.
     pub fn location(&self, row: usize) -> Location {
         let (file, line) = self.origin[row];
@@ -235,6 +277,10 @@ impl Measurements {
             configurations: each(&self.configurations),
             other_configurations: self.other_configurations.as_deref().map(each),
             nests: self.nests.clone(),
+            observations: match &self.observations[..] {
+                [] => Vec::new(),
+                all => rows.iter().map(|&row| all[row]).collect(),
+            },
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
             position_measured: self.position_measured,
             orientations: self.orientations.as_ref().map(|all| rows.iter().map(|&row| all[row]).collect()),
@@ -265,6 +311,10 @@ impl Measurements {
         all.origin.extend(&other.origin);
         all.configurations.extend(&other.configurations);
         all.other_configurations = both(&self.other_configurations, &other.other_configurations);
+        if !self.observations.is_empty() || !other.observations.is_empty() {
+            let each = |of: &Self| (0..of.len()).map(|row| of.observation(row)).collect::<Vec<_>>();
+            all.observations = [each(self), each(other)].concat();
+        }
         all.positions.extend(&other.positions);
         all.orientations =
             self.orientations.as_ref().and_then(|own| Some([own.as_slice(), other.orientations.as_deref()?].concat()));

@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
-use super::columns::{Column, Columns, Role};
+use super::cells::{above_zero, direction, is_validation, not_negative};
+use super::columns::{Column, Columns};
 use super::labels::{LabelsBuilder, PoseNames};
 use super::limits::Commands;
+use super::observed::{self, Observed};
 use super::orientation::Cells;
-use super::table::{Table, shortened};
+use super::role::Role;
+use super::table::Table;
 use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, one_line};
 use crate::files::same_file;
@@ -100,12 +103,19 @@ impl<'a> Tables<'a> {
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.seen(), LeftOut::default());
         loop {
-            if dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns)) {
+            if dialect
+                .missing
+                .as_ref()
+                .is_some_and(|missing| !columns.observes() && is_missing(missing, &table, &columns))
+            {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
-                rows.push(index, &table, &columns)?;
+                let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
+                for observed in observed::of_row(&table, &columns, (self.problem, self.measured), in_point)? {
+                    rows.push(index, &table, &columns, &observed)?;
+                }
             }
             if !table.next_row()? {
                 break;
@@ -128,6 +138,7 @@ impl<'a> Tables<'a> {
                     let file = measurements.files.first().cloned().unwrap_or_default();
                     return Err(Location::file(&file).error(InputErrorKind::NestsAlone));
                 }
+                observed::complete(&mut measurements, problem)?;
                 if measured {
                     warnings.extend(measurements.beyond_limits(problem, &commands(&columns)));
                 }
@@ -229,6 +240,8 @@ struct Builder {
     poses: PoseNames,
     /// Whether readings are the configurations.
     uses: bool,
+    /// Whether rows may measure something else than positions.
+    mixed: bool,
     /// What rx, ry and rz are.
     rotation: RotationKind,
     /// What the files are called, where that stands for something.
@@ -240,6 +253,7 @@ struct Builder {
 impl Builder {
     fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
         let list = |role| columns.has(role).then(Vec::new);
+        let mixed = !problem.fixtures.is_empty() || problem.data.tilt_sigma.is_some();
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
             files: files.to_vec(),
@@ -248,10 +262,11 @@ impl Builder {
             configurations: Vec::new(),
             other_configurations: both_joints(columns).then(Vec::new),
             nests: Vec::new(),
+            observations: Vec::new(),
             positions: Vec::new(),
-            position_measured: columns.has(Role::Position(0)),
+            position_measured: true,
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
-            sigma: list(Role::Sigma),
+            sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
             payload: list(Role::Payload),
             hoist: list(Role::Hoist),
             temperature: list(Role::Temperature),
@@ -276,6 +291,7 @@ impl Builder {
             target,
             poses,
             uses: problem.data.joints == JointSource::Read,
+            mixed,
             rotation: problem.data.dialect.rotation,
             stems: stems(files),
             columns,
@@ -287,18 +303,26 @@ impl Builder {
         self.measurements.len() + self.measurements.nests.len()
     }
 
-    /// Whether a file has the columns of the first one; `pose` alone may come and go.
+    /// What a file is called, where that stands for something.
+    fn stem(&self, file: usize) -> &str {
+        self.stems.get(file).map_or("", String::as_str)
+    }
+
+    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is measured where that may be
+    /// something else than positions.
     fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
             Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
         };
-        for (column, name) in self.columns.iter().filter(|(column, _)| column.role != Role::Pose) {
+        let comes_and_goes =
+            |role: Role| role == Role::Pose || (self.mixed && (role.is_observed() || role == Role::Sigma));
+        for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role)) {
             if !columns.has(column.role) {
                 return differ(name, true);
             }
         }
-        for column in columns.read.iter().filter(|column| column.role != Role::Pose) {
+        for column in columns.read.iter().filter(|column| !comes_and_goes(column.role)) {
             if !self.columns.iter().any(|(own, _)| own.role == column.role) {
                 return differ(table.name_of(column.place), false);
             }
@@ -338,8 +362,9 @@ impl Builder {
         Ok(())
     }
 
-    /// Adds the row that the table is at.
-    fn push(&mut self, file: usize, table: &Table, columns: &Columns) -> Result<(), InputError> {
+    /// Adds what is `observed` in the row that the table is at.
+    fn push(&mut self, file: usize, table: &Table, columns: &Columns, observed: &Observed) -> Result<(), InputError> {
+        let Observed { observation, numbers, measured } = *observed;
         let measurements = &mut self.measurements;
         let joints = measurements.joints;
         let row = measurements.len();
@@ -355,8 +380,8 @@ impl Builder {
         if !measurements.time_measured {
             measurements.time.push(row as f64);
         }
-        let (mut position, mut pose, mut turned) = (Vector3::zeros(), None, Cells::default());
-        for column in &columns.read {
+        let (mut position, mut pose, mut turned) = (numbers, None, Cells::default());
+        for column in columns.read.iter().filter(|column| observation.is_position() || !column.role.is_observed()) {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
                 Role::Joint(joint) | Role::Reading(joint) => {
@@ -368,6 +393,7 @@ impl Builder {
                     }
                 }
                 Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
+                Role::Sigma if self.mixed && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
                 Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
                 Role::Hoist => add(&mut measurements.hoist, number()?),
@@ -386,22 +412,35 @@ impl Builder {
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
                 Role::Target => self.target.push(table.name(column.place)?),
-                // Rows of the arm name none.
-                Role::Nest => {}
+                // Rows of the arm name none, and what they measure is known already.
+                Role::Nest
+                | Role::Point
+                | Role::Anchor
+                | Role::Distance
+                | Role::Surface
+                | Role::Offset
+                | Role::Frame
+                | Role::Tilt(_) => {}
                 Role::Pose => pose = Some(table.text(column.place)?),
             }
         }
         match columns.file {
-            Some(Role::Session) => self.session.push(&self.stems.get(file).cloned().unwrap_or_default()),
-            Some(Role::Target) => self.target.push(&self.stems.get(file).cloned().unwrap_or_default()),
+            Some(Role::Session) => self.session.push(self.stems.get(file).map_or("", String::as_str)),
+            Some(Role::Target) => self.target.push(self.stems.get(file).map_or("", String::as_str)),
             _ => {}
         }
         if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
             marked.push(is_validation(table, place)?);
         }
         measurements.positions.push(position);
+        measurements.position_measured &= measured;
+        if self.mixed {
+            measurements.observations.push(observation);
+            measurements.sigma.iter_mut().for_each(|all| all.resize(row + 1, f64::NAN));
+        }
         if let Some(orientations) = &mut measurements.orientations {
             orientations.push(match columns.orientations() {
+                _ if !observation.is_position() => UnitQuaternion::identity(),
                 (true, _) => turned.of_angles(self.rotation),
                 _ => turned.of_quaternion().ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
             });
@@ -445,43 +484,5 @@ fn set(list: &mut [f64], place: usize, value: f64) {
 fn add(list: &mut Option<Vec<f64>>, value: f64) {
     if let Some(list) = list {
         list.push(value);
-    }
-}
-
-fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
-    let value = table.number(column.place)?;
-    // A tiny length in millimetres may become 0 in metres.
-    let converted = (column.to_si)(value);
-    if converted > 0.0 {
-        Ok(converted)
-    } else {
-        Err(table.cell_error(column.place, InputErrorKind::NotPositive { value }))
-    }
-}
-
-fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
-    let value = table.number(column.place)?;
-    if value < 0.0 {
-        Err(table.cell_error(column.place, InputErrorKind::Negative { value }))
-    } else {
-        Ok((column.to_si)(value))
-    }
-}
-
-fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
-    let value = table.number(column.place)?;
-    if [-1.0, 0.0, 1.0].contains(&value) {
-        Ok(value)
-    } else {
-        Err(table.cell_error(column.place, InputErrorKind::NotADirection { value }))
-    }
-}
-
-/// Whether a cell says `validation`; the other word is `identification`.
-fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
-    match table.word(place)? {
-        "validation" => Ok(true),
-        "identification" => Ok(false),
-        word => Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) })),
     }
 }

@@ -1,10 +1,10 @@
 //! Rows that repeat a pose.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::Measurements;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, JointKind, Observation, Problem};
 
 /// Configurations agree where each angle does to this \[rad\].
 const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
@@ -36,7 +36,8 @@ impl Measurements {
         let session = self.session.names.get(self.session.of_row[row]).map_or("", String::as_str);
         let pose = self.pose.as_ref().map(|poses| poses[row]);
         let time = self.time_measured.then(|| self.time[row]);
-        let measured = self.configuration(row).iter().chain(&self.positions[row]).copied();
+        let fixture = self.observation(row).fixture().map(|fixture| fixture as f64);
+        let measured = self.configuration(row).iter().chain(&self.positions[row]).copied().chain(fixture);
         (session, pose.into_iter().chain(time).chain(measured).collect())
     }
 
@@ -58,6 +59,14 @@ impl Measurements {
         let words = |of_row: &[usize]| Column { values: of_row.iter().map(|&word| word as f64).collect(), step: SAME };
         columns.push(words(&self.session.of_row));
         columns.extend(self.target.iter().filter(|_| by_target).map(|target| words(&target.of_row)));
+        if by_target && !self.observations.is_empty() {
+            let mut kinds: BTreeMap<Observation, usize> = BTreeMap::new();
+            let number = |row: usize| {
+                let next = kinds.len();
+                *kinds.entry(self.observation(row)).or_insert(next)
+            };
+            columns.push(words(&(0..self.len()).map(number).collect::<Vec<_>>()));
+        }
         let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let gives_way = problem.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.is_some());
         if gives_way || !problem.effects.is_empty() {

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::Measurements;
 use crate::error::{InputError, InputErrorKind, NoRows};
-use crate::problem::{HeldOut, Problem};
+use crate::problem::{HeldOut, Observation, Problem};
 
 /// Rows to identify with and rows held out, each in ascending order.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +30,7 @@ impl Split {
             Some(HeldOut::Session(session)) => of_session(session, measurements).map_err(error)?,
             Some(HeldOut::Fraction { fraction, seed }) => at_random(*fraction, *seed, problem, measurements),
         };
+        let held_out = with_known_distances(held_out, measurements);
         let (held_out, identification): (Vec<_>, Vec<_>) = (0..measurements.len()).partition(|&row| held_out[row]);
         let cause = |word| match &problem.data.held_out {
             None => NoRows::Column { column: "split".to_owned(), word },
@@ -49,6 +50,21 @@ impl Split {
         }
         Ok(Self { identification, held_out })
     }
+}
+
+/// The same, with a known distance among the fitted rows where both of its points are touched there, else held out.
+fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) -> Vec<bool> {
+    let touched = |point: usize| {
+        (0..measurements.len()).any(|row| !held_out[row] && measurements.observation(row) == Observation::Point(point))
+    };
+    let known = |row: usize| match measurements.observation(row) {
+        Observation::Between(first, second) => Some((row, !(touched(first) && touched(second)))),
+        _ => None,
+    };
+    for (row, is_held_out) in (0..measurements.len()).filter_map(known).collect::<Vec<_>>() {
+        held_out[row] = is_held_out;
+    }
+    held_out
 }
 
 /// Marks the rows of one session.

@@ -137,6 +137,8 @@ impl<S: Scalar> Arm<S> {
         if let Some(mounting) = &self.mounting {
             walk.tilt(mounting, Segment::Mounting, ws);
         }
+        ws.frames.clear();
+        ws.keep(&walk.frame);
         for (i, joint) in self.joints.iter().enumerate() {
             joint.begin(&mut walk.frame);
             if matches!(bend, Bend::Rigid) {
@@ -165,6 +167,7 @@ impl<S: Scalar> Arm<S> {
             }
             joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
             ws.trail.push(walk.frame.origin);
+            ws.keep(&walk.frame);
             walk.cut(Segment::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
             if walk.records() {
                 for body in &joint.bodies {

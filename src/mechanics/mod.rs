@@ -6,6 +6,7 @@ mod arm;
 mod beam;
 mod element;
 mod forward;
+mod frames;
 mod imperfection;
 mod joint;
 mod link;

@@ -264,7 +264,7 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Gathers forces again where ropes lean with the unknowns.
-    fn lean_ropes(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
+    pub(super) fn lean_ropes(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
         if self.rope.is_some() {
             self.gather_forces(setup, state, ws);
         }

@@ -34,6 +34,9 @@ pub struct Workspace<S> {
     pub(super) hooks: Vec<[S; 2]>,
     /// Where the segments of the arm end, if it is walked segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
+    /// Frame behind the mounting and behind each joint in the last walk, where they are kept.
+    pub(super) frames: Vec<Frame<S>>,
+    pub(super) keeps_frames: bool,
     /// Force of each link's rope \[N\], zero without one.
     pub(super) ropes: Vec<Vector3<S>>,
     /// Force of everything beyond each joint's link \[N\].
@@ -56,6 +59,8 @@ impl<S> Default for Workspace<S> {
             next_moments: Vec::new(),
             hooks: Vec::new(),
             cuts: Vec::new(),
+            frames: Vec::new(),
+            keeps_frames: false,
             ropes: Vec::new(),
             beyond: Vec::new(),
             rigid_roots: Vec::new(),
@@ -79,6 +84,14 @@ impl Workspace<f64> {
 }
 
 impl<S: Scalar> Workspace<S> {
+    /// Keeps a frame that the walk passes, if frames are kept.
+    #[inline]
+    pub(super) fn keep(&mut self, frame: &Frame<S>) {
+        if self.keeps_frames {
+            self.frames.push(*frame);
+        }
+    }
+
     /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where something bends [N·m].
     pub(super) fn sum_moments(&mut self) {
         let Self { events, next_moments, hooks, .. } = self;

@@ -107,7 +107,7 @@ fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Segment> {
 }
 
 /// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
-fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
+pub(super) fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
     let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
     for input in inputs {

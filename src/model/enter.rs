@@ -43,7 +43,12 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
             ArmField::Mixing => _ = arm.mixing.get_or_insert(0.0),
             ArmField::Payload | ArmField::GravityX | ArmField::GravityY => {}
         },
-        Slot::Base { .. } | Slot::Target { .. } | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale => {}
+        Slot::Base { .. }
+        | Slot::Target { .. }
+        | Slot::Fixture { .. }
+        | Slot::Shift { .. }
+        | Slot::Turn { .. }
+        | Slot::Scale => {}
     }
 }
 
@@ -98,7 +103,12 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
             }
         }
         Slot::Arm(field) => enter_arm(arm, field, x, tilt),
-        Slot::Base { .. } | Slot::Target { .. } | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale => {}
+        Slot::Base { .. }
+        | Slot::Target { .. }
+        | Slot::Fixture { .. }
+        | Slot::Shift { .. }
+        | Slot::Turn { .. }
+        | Slot::Scale => {}
     }
 }
 

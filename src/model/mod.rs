@@ -11,6 +11,7 @@ mod elastic;
 mod enter;
 mod inputs;
 mod instrument;
+mod observation;
 pub mod parameter;
 mod parts;
 mod pose;
@@ -18,6 +19,7 @@ mod poses;
 mod rigid;
 mod rows;
 mod terms;
+mod tilt;
 mod turn;
 
 pub use crate::mechanics::Shape;
@@ -35,6 +37,7 @@ use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use driven::{Commands, Driven};
 use instrument::Instrument;
+pub(crate) use observation::FixtureAt;
 
 /// What predicts positions, as a function of the free parameters.
 #[derive(Debug, Clone)]
@@ -47,6 +50,8 @@ pub struct Model {
     targets: Vec<Vector3<f64>>,
     /// Orientation of each target in the last frame, a rotation vector \[rad\].
     turned: Vec<Vector3<f64>>,
+    /// Points, anchors and surfaces, as declared; 0 where nothing is known.
+    fixtures: Vec<FixtureAt<f64>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
     /// Linear inequalities between them.
@@ -74,6 +79,7 @@ impl Model {
             bases: vec![problem.base.clone(); bases.len()],
             targets: vec![problem.tool.target; targets.len()],
             turned: vec![problem.tool.rotation; targets.len()],
+            fixtures: problem.fixtures.iter().map(FixtureAt::declared).collect(),
             parameters,
         })
     }
@@ -178,6 +184,17 @@ impl Model {
             }
         }
         targets
+    }
+
+    /// Points, anchors and surfaces in the measuring frame.
+    pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureAt<f64>> {
+        let mut fixtures = self.fixtures.clone();
+        for (parameter, x) in self.parameters.iter().zip(x) {
+            if let Slot::Fixture { fixture, axis, .. } = parameter.slot {
+                fixtures[fixture].numbers[axis] += x;
+            }
+        }
+        fixtures
     }
 
     /// Orientations of the targets in the last frame, rotation vectors \[rad\].

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::problem::PoseView;
+use crate::problem::{Observation, PoseView};
 
 /// One measured pose as the model sees it.
 #[derive(Debug, Clone, Copy)]
@@ -13,12 +13,21 @@ pub struct Pose<'a> {
     pub base: usize,
     /// Which target.
     pub target: usize,
-    /// Measured position, measuring frame \[m\].
+    /// What is measured of it.
+    pub observation: Observation,
+    /// The measured numbers, zeros behind them \[m\]: the position, measuring frame; a distance; 0 of a contact.
     pub measured: Vector3<f64>,
-    /// 1 σ of each coordinate \[m\].
+    /// 1 σ of each of them \[m\].
     pub sigma: f64,
     /// The orientation of the target, where it counts.
     pub orientation: Option<SeenOrientation>,
+}
+
+impl Pose<'_> {
+    /// How many numbers are measured: those of the observation, and three of an orientation that counts.
+    pub fn coordinates(&self) -> usize {
+        self.observation.coordinates() + if self.orientation.is_some() { 3 } else { 0 }
+    }
 }
 
 /// A measured orientation of a target.

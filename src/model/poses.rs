@@ -8,9 +8,12 @@ use rayon::prelude::*;
 use super::Model;
 use super::derivative::Linearised;
 use super::driven::Commands;
+use super::observation::between;
 use super::pose::Pose;
+use super::tilt::Tilts;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::mechanics::{Equilibrated, Shape, Workspace};
+use crate::problem::Observation;
 use crate::spatial::{Frame, rotation_axes, turn_between};
 
 /// Coordinates of a position, and of a position with an orientation.
@@ -19,7 +22,7 @@ const POSE: usize = 6;
 
 /// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the parameters.
 ///
-/// Three rows a pose; six where any has an orientation that counts, the last three log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
+/// Three rows a pose, 0 behind the numbers that it measures; six where any has an orientation that counts, the last three log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
 /// measuring frame, and 0 for poses without.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
@@ -29,6 +32,8 @@ pub struct PoseResiduals<'a> {
     /// Full parameter vector; the unknowns' entries are overwritten.
     at: DVector<f64>,
     rows: usize,
+    /// Whether some poses measure tilts.
+    tilted: bool,
 }
 
 /// What is seen of a pose.
@@ -42,7 +47,8 @@ impl<'a> PoseResiduals<'a> {
     /// Residuals of `poses`; the parameters listed in `unknowns` vary, the others stay as in `at`.
     pub fn new(model: &'a Model, poses: Vec<Pose<'a>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
         let rows = if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
-        Self { model, poses, unknowns, at, rows }
+        let tilted = poses.iter().any(|pose| pose.observation.is_angle());
+        Self { model, poses, unknowns, at, rows, tilted }
     }
 
     /// The full parameter vector for unknowns `x`.
@@ -108,10 +114,23 @@ impl<'a> PoseResiduals<'a> {
         let turned: Vec<_> = turned.iter().map(rotation_axes).collect();
         let instrument = self.model.instrument_at(full.as_slice());
         let mut commands = self.model.commands(full.as_slice());
+        let fixtures = self.model.fixtures(full.as_slice());
         let mut ws = Workspace::default();
         let mut rest = Equilibrated::default();
+        let mut tilts = None;
         for pose in &self.poses[items] {
+            if let Observation::Between(first, second) = pose.observation {
+                let seen = between(&fixtures[first], &fixtures[second]).seen;
+                use_it(pose, Seen { position: seen, turn: None });
+                continue;
+            }
             let lost = Vector3::from_element(f64::NAN);
+            if let Observation::Tilt(frame) = pose.observation {
+                let tilts = tilts.get_or_insert_with(|| Tilts::new(self.model, &full, arm.clone(), Vec::new()));
+                let seen = tilts.at(&commands.apply(&pose.setup), frame).unwrap_or(lost);
+                use_it(pose, Seen { position: seen, turn: None });
+                continue;
+            }
             let seen = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
                 Ok(()) => {
                     let base = instrument.base(&bases[pose.base], &pose.setup);
@@ -120,7 +139,14 @@ impl<'a> PoseResiduals<'a> {
                         let axes = turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
                         own.axes.map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
                     });
-                    Seen { position: instrument.of(&position, &pose.setup), turn }
+                    let seen = match pose.observation.fixture() {
+                        Some(fixture) if pose.observation.is_point() => {
+                            base.resolve(&fixtures[fixture].seen(&position))
+                        }
+                        Some(fixture) => fixtures[fixture].seen(&position),
+                        None => instrument.of(&position, &pose.setup),
+                    };
+                    Seen { position: seen, turn }
                 }
                 Err(_) => Seen { position: lost, turn: pose.orientation.map(|_| lost) },
             };
@@ -241,7 +267,7 @@ impl LeastSquares for PoseResiduals<'_> {
 
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let full = self.full(x);
-        let mut linearised = Linearised::new(self.model, &full, &self.unknowns, self.rows == POSE);
+        let mut linearised = Linearised::new(self.model, &full, &self.unknowns, (self.rows == POSE, self.tilted));
         for (k, pose) in self.poses[items].iter().enumerate() {
             linearised.write(pose, block, self.rows * k);
         }

@@ -106,6 +106,9 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
             }),
             Slot::Base { base, axis } => base < bases && axis < 6,
             Slot::Target { target, axis } => target < targets && axis < 3,
+            Slot::Fixture { fixture, kind, axis } => {
+                problem.fixtures.get(fixture).is_some_and(|own| own.kind == kind && axis < kind.fields().len())
+            }
             Slot::Shift { axis } | Slot::Turn { axis } => axis < 3,
             Slot::Arm(_) | Slot::Scale => true,
         }
@@ -116,7 +119,7 @@ fn is_declared(slot: Slot) -> bool {
     match slot {
         Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
         Slot::Beam { field, .. } => field.is_rigidity() && field != BeamField::Flexibility,
-        Slot::Base { .. } | Slot::Target { .. } => true,
+        Slot::Base { .. } | Slot::Target { .. } | Slot::Fixture { .. } => true,
         Slot::Arm(_) | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale => false,
     }
 }

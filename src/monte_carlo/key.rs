@@ -31,8 +31,19 @@ pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
 /// `effect`, its declaration (`bump` or `step` and the joint where no catalogue has it), values; `poses`, ranges of joints,
 /// payloads, hoist, temperature, `sides` or `-`; `rows`, time step, held-out share or number of the others, σ, segments.
 fn canonical(truth: &Truth) -> String {
-    let Truth { parameters, random, effects, noise_sigma, orientation_sigma: _, poses, time_step, held_out, segments } =
-        truth;
+    let Truth {
+        parameters,
+        random,
+        effects,
+        noise_sigma,
+        orientation_sigma: _,
+        poses,
+        time_step,
+        held_out,
+        segments,
+        contact_sigmas: _,
+        positions: _,
+    } = truth;
     let optional = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:e}"));
     let range = |(from, to): (f64, f64)| format!("{from:e} {to:e}");
     let mut text = String::new();

@@ -47,7 +47,7 @@ pub(super) fn fit(study: &Study, problem: &Problem, cell: &Cell, repetition: usi
 /// Held-out poses come first, so that they are the same for every number of poses; noise of another σ is the same
 /// noise scaled.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
-    let truth = Truth { noise_sigma: cell.sigma, ..study.truth.clone() };
+    let truth = Truth { noise_sigma: cell.sigma, contact_sigmas: [cell.sigma; 3], ..study.truth.clone() };
     let seed = seed_of(study, repetition);
     let Draw { arm, parameters, mut rows } = simulate::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
     let strengths = Strengths::draw(study, seed);

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::dialect::{self, Dialect};
+use super::fixture::Observation;
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
@@ -20,6 +21,14 @@ pub struct Data {
     pub files: Vec<PathBuf>,
     /// 1 σ of a measured coordinate \[m\]; `None`: not known.
     pub position_sigma: Option<f64>,
+    /// The same of a target at a point, of a measured distance, and of a distance from a surface \[m\].
+    pub point_sigma: Option<f64>,
+    /// See [`point_sigma`](Self::point_sigma).
+    pub distance_sigma: Option<f64>,
+    /// See [`point_sigma`](Self::point_sigma).
+    pub surface_sigma: Option<f64>,
+    /// 1 σ of a measured tilt \[rad\]; `None`: tilts are not read.
+    pub tilt_sigma: Option<f64>,
     /// Which rows never take part in fitting or choosing; `None` where the file says nothing.
     pub held_out: Option<HeldOut>,
     /// T₀ [°C].
@@ -90,6 +99,20 @@ pub enum HeldOut {
     Session(String),
 }
 
+impl Data {
+    /// 1 σ of what a row measures, as declared \[m\].
+    pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
+        match observation {
+            Observation::Position => self.position_sigma,
+            Observation::Point(_) => self.point_sigma,
+            Observation::Distance(_) => self.distance_sigma,
+            Observation::Surface(_) => self.surface_sigma,
+            Observation::Tilt(_) => self.tilt_sigma,
+            Observation::Between(..) => None,
+        }
+    }
+}
+
 /// The section; empty where it is not there.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let file = root.location();
@@ -98,6 +121,10 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         return Ok(Data {
             files: Vec::new(),
             position_sigma: None,
+            point_sigma: None,
+            distance_sigma: None,
+            surface_sigma: None,
+            tilt_sigma: None,
             held_out: None,
             reference_temperature: None,
             joints: JointSource::Commanded,
@@ -122,8 +149,10 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         }
         files_location = item.location();
     }
-    let position_sigma =
-        section.positive("position_sigma", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
+    let mut sigma = |base| section.positive(base, Unit::Length, |value| InputErrorKind::NotPositive { value });
+    let (position_sigma, point_sigma) = (sigma("position_sigma")?, sigma("point_sigma")?);
+    let (distance_sigma, surface_sigma) = (sigma("distance_sigma")?, sigma("surface_sigma")?);
+    let tilt_sigma = section.positive("tilt_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
     let mut held_out = None;
     let mut held_out_location = location.clone();
     if let Some(item) = section.get("held_out") {
@@ -141,6 +170,10 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     Ok(Data {
         files,
         position_sigma,
+        point_sigma,
+        distance_sigma,
+        surface_sigma,
+        tilt_sigma,
         held_out,
         reference_temperature,
         joints,

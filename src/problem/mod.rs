@@ -12,6 +12,7 @@ mod dialect;
 pub(crate) mod digest;
 pub(crate) mod effect;
 pub(crate) mod effects;
+pub(crate) mod fixture;
 pub(crate) mod item;
 mod joint;
 mod parameters;
@@ -30,6 +31,7 @@ pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, HeldOut, JointSource, OwnCovariate};
 pub use dialect::{ColumnOf, ColumnRule, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
+pub use fixture::{Fixture, FixtureKind, KnownDistance, Observation};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub use robust::{Robust, RobustLoss};
@@ -55,6 +57,10 @@ pub struct Problem {
     pub urdf: Option<UrdfEnds>,
     /// Effects that the model declares.
     pub effects: Vec<EffectDeclaration>,
+    /// What is touched or measured against: points, anchors, surfaces.
+    pub fixtures: Vec<Fixture>,
+    /// Known distances between points.
+    pub distances: Vec<KnownDistance>,
     /// What is free, in the order of the file: a later rule wins.
     pub parameters: Vec<ParameterRule>,
     /// Linear inequalities between parameters.

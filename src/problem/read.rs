@@ -9,7 +9,7 @@ use super::item::Document;
 use super::section::Section;
 use super::{
     BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, Tool, UrdfEnds, arm, constraints,
-    data, effects, parameters, robust,
+    data, effects, fixture, parameters, robust,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -83,6 +83,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
     let effects = effects::read(&mut root, &joints)?;
+    let (fixtures, distances) = fixture::read(&mut root)?;
     let parameters = parameters::read(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
@@ -99,6 +100,8 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         base,
         urdf,
         effects,
+        fixtures,
+        distances,
         parameters,
         constraints,
         data,

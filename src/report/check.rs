@@ -112,7 +112,7 @@ pub fn why_not_sufficient(check: &Check) -> String {
     format!(
         "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters without \
          a prior: more poses are needed",
-        3 * different
+        check.distinct
     )
 }
 

@@ -6,6 +6,18 @@ use crate::identify::{ErrorSummary, Errors};
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
 
+/// What errors of a kind of rows are, and in which unit they are shown.
+pub(super) fn measure(of: &ErrorSummary) -> &'static str {
+    match of.kind {
+        "point" => "missed point, mm",
+        "distance" => "distance, mm",
+        "surface" => "distance from the surface, mm",
+        "tilt" => "tilt, mrad",
+        "known distance" => "known distance, mm",
+        _ => "error, mm",
+    }
+}
+
 /// Cells of a table of errors: whose, on which poses, mean, rms and largest distance \[mm\].
 pub(super) fn row(poses: &str, arm: &str, of: &ErrorSummary) -> Vec<String> {
     let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| mm(value, 4));

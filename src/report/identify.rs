@@ -1,18 +1,20 @@
 //! What `identify` says and writes: `estimate.json`, its text, and the report on one fit.
 
+use std::collections::BTreeMap;
+
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::document::{Block, Headline, Table, first_of};
-use super::errors::{NOMINAL, row, unpredicted};
+use super::errors::{NOMINAL, measure, row, unpredicted};
 use super::figures::{Figure, PlotData};
 use super::findings;
-use super::json::{Both, Conditioning, Unidentified, object, to_text, unidentified};
+use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
 use super::quantity::{decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
-    ActiveConstraint, AxisValues, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise,
-    OrientationErrors, Outlier, QualityFlag,
+    ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors, Outlier,
+    QualityFlag,
 };
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
@@ -36,6 +38,12 @@ object! {
         registered: Both = Both::of(&found.registered),
         #[serde(flatten)]
         fitted: Both = Both::of(&found.fitted),
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        kinds: Vec<Kind> = found.kinds.iter().map(Kind::of).collect(),
+        /// At each point that was touched.
+        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+        spread: BTreeMap<&'a str, SpreadChange> =
+            found.spreads.iter().map(|own| (own.0.point.as_str(), SpreadChange::of(own))).collect(),
         reduced_chi2: Option<f64> = found.reduced_chi2,
         first_time_s: f64 = found.first_time,
         estimated_sigma_mm: Option<f64> = match found.noise {
@@ -69,15 +77,6 @@ object! {
         at_bound: Option<&'a str> = estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
         identified: f64 = estimate.identified,
         fitted: bool = estimate.fitted,
-    }
-}
-object! {
-    /// Of each axis and of the length \[°\].
-    Degrees(values: &AxisValues) {
-        x: f64 = values.x.to_degrees(),
-        y: f64 = values.y.to_degrees(),
-        z: f64 = values.z.to_degrees(),
-        norm: f64 = values.norm.to_degrees(),
     }
 }
 object! {
@@ -141,6 +140,7 @@ pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks =
         vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    blocks.extend(around(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
@@ -172,6 +172,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(beware(found, plots));
     blocks.extend(errors(found));
     blocks.extend(orientation(found));
+    blocks.extend(around(found));
     blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(remainder(problem, found, plots, FILE));
@@ -248,11 +249,45 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
         row("held out", "before", &before.held_out),
         row("", "after", &after.held_out),
     ];
-    let header = ["error, mm", "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
+    let header =
+        [measure(&found.fitted.held_out), "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
     let mut table = Table::new(&header, rows, &[0, 1]);
     table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
+}
+
+/// Errors of every kind of rows where there are several, and the spread of the target at points.
+fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
+    let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
+        let values = [before.rms.norm, after.rms.norm].map(|value| mm(value, 4));
+        [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()
+    };
+    let mut blocks = Vec::new();
+    let kinds = found.kinds.iter().flat_map(|(before, after)| {
+        let kind = measure(&after.held_out);
+        [
+            row(kind, "held out", &before.held_out, &after.held_out),
+            row("", "identification", &before.identification, &after.identification),
+        ]
+    });
+    let rows: Vec<Vec<String>> = kinds.collect();
+    if !rows.is_empty() {
+        let header = ["rms of the rows' own residuals", "", "rows", "before", "after"];
+        blocks.push(Block::Table(Table::new(&header, rows, &[0, 1])));
+    }
+    let spreads = found.spreads.iter().map(|(before, after, held_out)| {
+        let words = if *held_out { "held out" } else { "" };
+        vec![after.point.clone(), words.to_owned(), after.n.to_string(), mm(before.mean, 4), mm(after.mean, 4)]
+    });
+    let rows: Vec<Vec<String>> = spreads.collect();
+    if !rows.is_empty() {
+        let header = ["spread at points, mm", "", "rows", "before", "after"];
+        let mut table = Table::new(&header, rows, &[0, 1]);
+        table.notes.push("mean distance of the predicted target from its mean over the rows at one point".to_owned());
+        blocks.push(Block::Table(table));
+    }
+    blocks
 }
 
 /// Errors of orientation before and after, where it is fitted.
@@ -280,7 +315,7 @@ pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
         row("identification", NOMINAL, &before.identification),
         row("", "as identified", &after.identification),
     ];
-    let table = Block::Table(Table::new(&["error, mm", "", "mean", "rms", "max"], rows, &[0, 1]));
+    let table = Block::Table(Table::new(&[measure(&after.held_out), "", "mean", "rms", "max"], rows, &[0, 1]));
     std::iter::once(table).chain(no_errors(found).map(Block::Note)).collect()
 }
 

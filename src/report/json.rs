@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::identify::{AxisValues, ErrorSummary, Errors};
+use crate::identify::{AxisValues, ErrorSummary, Errors, PointSpread};
 use crate::least_squares::{BlindCombination, Identifiability};
 
 /// Declares a JSON object: its keys with their types and what each is made of, in the order of the file.
@@ -36,12 +36,63 @@ object! {
     }
 }
 object! {
-    /// An error summary.
-    Summary(summary: &ErrorSummary) {
-        n: usize = summary.n,
+    /// Of each axis and of the length \[°\].
+    Degrees(values: &AxisValues) {
+        x: f64 = values.x.to_degrees(),
+        y: f64 = values.y.to_degrees(),
+        z: f64 = values.z.to_degrees(),
+        norm: f64 = values.norm.to_degrees(),
+    }
+}
+object! {
+    Lengths(summary: &ErrorSummary) {
         mean_mm: Axes = Axes::of(&summary.mean),
         max_mm: Axes = Axes::of(&summary.max),
         rms_mm: Axes = Axes::of(&summary.rms),
+    }
+}
+object! {
+    Angles(summary: &ErrorSummary) {
+        mean_deg: Degrees = Degrees::of(&summary.mean),
+        max_deg: Degrees = Degrees::of(&summary.max),
+        rms_deg: Degrees = Degrees::of(&summary.rms),
+    }
+}
+object! {
+    /// An error summary.
+    Summary(summary: &ErrorSummary) {
+        /// Left out where it is that of positions.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        kind: Option<&'static str> = Some(summary.kind).filter(|kind| !matches!(*kind, "" | "position")),
+        n: usize = summary.n,
+        #[serde(flatten)]
+        lengths: Option<Lengths> = (summary.kind != "tilt").then(|| Lengths::of(summary)),
+        #[serde(flatten)]
+        angles: Option<Angles> = (summary.kind == "tilt").then(|| Angles::of(summary)),
+    }
+}
+object! {
+    /// The spread of the target at a point.
+    Spread(point: &PointSpread) {
+        n: usize = point.n,
+        mean_mm: f64 = point.mean * 1e3,
+    }
+}
+object! {
+    /// The same with the nominal and with the identified arm.
+    SpreadChange(of: &(PointSpread, PointSpread, bool)) {
+        n: usize = of.0.n,
+        held_out: bool = of.2,
+        registered_mm: f64 = of.0.mean * 1e3,
+        mean_mm: f64 = of.1.mean * 1e3,
+    }
+}
+object! {
+    /// Errors of one kind of rows before and after.
+    Kind(of: &(Errors, Errors)) {
+        registered: Both = Both::of(&of.0),
+        #[serde(flatten)]
+        fitted: Both = Both::of(&of.1),
     }
 }
 object! {

@@ -178,7 +178,39 @@ pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str
         blind.len(),
         unknowns.len()
     );
-    Block::Lines(words, first_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN, file))
+    let mut points = first_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN, file);
+    points.extend(without_tracker(blind, unknowns).into_iter().map(str::to_owned));
+    Block::Lines(words, points)
+}
+
+/// What contacts and distances leave open for want of a reference, in words.
+fn without_tracker(blind: &[BlindCombination], unknowns: &[String]) -> Vec<&'static str> {
+    let of = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
+    let is_around = |name: &str| of(name, &["point", "anchor", "surface"]);
+    let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
+    let is_length = |name: &str| {
+        let geometry = name.starts_with("joint") && ["a", "d"].contains(&&*field(name));
+        geometry || of(name, &["tool"]) || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
+    };
+    let holds = |own: &BlindCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().any(|&(k, _)| is(&unknowns[k]));
+    let all = |own: &BlindCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().all(|&(k, _)| is(&unknowns[k]));
+    let place = |own: &BlindCombination| {
+        holds(own, &|name| name.starts_with("base")) && all(own, &|name| name.starts_with("base") || is_around(name))
+    };
+    let size = |own: &BlindCombination| {
+        all(own, &is_length) && holds(own, &is_around) && holds(own, &|name| name.starts_with("joint"))
+    };
+    let mut words = Vec::new();
+    if blind.iter().any(place) {
+        words.push(
+            "where the base stands: nothing is measured against a place that is known in the measuring frame; hold base.* \
+             (fixed = true), or declare where a point or an anchor is (at_m)",
+        );
+    }
+    if blind.iter().any(size) {
+        words.push("the scale: no length is known; declare a [[distance]], or measure one");
+    }
+    words
 }
 
 /// The combinations that are seen too weakly; nothing to say without any.

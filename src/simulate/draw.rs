@@ -10,7 +10,7 @@ use super::parameters::{self, TrueParameter};
 use super::truth::Truth;
 use super::{NoRest, Rig};
 use crate::problem::pattern::matches;
-use crate::problem::{HeldOut, Joint, JointKind, PoseConditions, Problem};
+use crate::problem::{Fixture, HeldOut, Joint, JointKind, Observation, PoseConditions, Problem};
 use crate::random::{normal, stream};
 
 /// Streams of random numbers of one seed, so that none shifts when another is used more.
@@ -20,13 +20,17 @@ const NOISE: u64 = 2;
 const SPLIT: u64 = 3;
 const EFFECTS: u64 = 4;
 const TURNS: u64 = 5;
+/// The first of as many as there are poses.
+const CONTACTS: u64 = 1000;
 
 /// A simulated measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// What was set.
     pub conditions: PoseConditions,
-    /// What the tracker read, measuring frame \[m\].
+    /// What is measured.
+    pub observation: Observation,
+    /// What the tracker read, measuring frame, or a distance; 0 of a contact \[m\].
     pub position: Vector3<f64>,
     /// The orientation that it read, measuring frame, where it reads any.
     pub orientation: Option<UnitQuaternion<f64>>,
@@ -41,6 +45,8 @@ pub struct Simulation {
     pub problem: String,
     /// The declared joints.
     pub joints: Vec<Joint>,
+    /// What the rows measure against.
+    pub fixtures: Vec<Fixture>,
     /// Seed of every random number.
     pub seed: u64,
     /// What was true.
@@ -69,6 +75,14 @@ pub enum SimulationError {
         /// Why.
         source: NoRest,
     },
+    /// The arm does not come to what it is to touch.
+    #[error(
+        "pose {pose} of the simulation: the arm does not come to what it is to touch; check its true place and the ranges"
+    )]
+    OutOfReach {
+        /// Number of the pose, from 1.
+        pose: usize,
+    },
 }
 
 /// What chance decides, before anything is measured.
@@ -93,8 +107,11 @@ pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
 fn drawn(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Draw {
     let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
     let mut noise = stream(seed, NOISE);
-    for row in &mut rows {
-        row.position = Vector3::from_fn(|_, _| normal(&mut noise) * truth.noise_sigma);
+    let kinds = truth.observations(&problem.fixtures, rows.len());
+    for (row, observation) in rows.iter_mut().zip(kinds) {
+        row.observation = observation;
+        let sigma = truth.sigma_of(observation);
+        row.position = Vector3::from_fn(|_, _| normal(&mut noise) * sigma);
     }
     if let Some(sigma) = truth.orientation_sigma {
         let mut noise = stream(seed, TURNS);
@@ -145,11 +162,12 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
     let poses = rows.len();
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
-    let seen: Vec<_> = rows.par_iter().map(|row| rig.pose(&row.conditions)).collect();
-    for (index, (row, seen)) in rows.iter_mut().zip(seen).enumerate() {
-        let (position, orientation) = seen.map_err(|source| SimulationError::NoRest { pose: index + 1, source })?;
-        row.position += position;
-        row.orientation = row.orientation.map(|noise| noise * orientation);
+    let measure = |(row, stream_of): (&mut Row, u64)| rig.measure(row, truth, &mut stream(seed, stream_of));
+    let seen: Vec<_> = rows.par_iter_mut().zip((CONTACTS..).take(poses).collect::<Vec<_>>()).map(measure).collect();
+    for (index, seen) in seen.into_iter().enumerate() {
+        let pose = index + 1;
+        let found = seen.map_err(|source| SimulationError::NoRest { pose, source })?;
+        found.ok_or(SimulationError::OutOfReach { pose })?;
     }
     let known = rows.first().is_some_and(|row| !row.conditions.covariates.is_empty());
     let names = problem.data.covariates.iter().filter(|_| known).map(|own| own.name.clone()).collect();
@@ -160,6 +178,7 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
     Ok(Simulation {
         problem: problem.name.clone(),
         joints: problem.joints.clone(),
+        fixtures: problem.fixtures.clone(),
         seed,
         truth: truth.clone(),
         parameters,
@@ -176,7 +195,15 @@ pub(crate) fn standard_normals(count: usize, seed: u64) -> Vec<f64> {
     (0..count).map(|_| normal(&mut random)).collect()
 }
 
-fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
+/// A command as the file of measurements will hold it.
+pub(super) fn rounded_command(kind: JointKind, q: f64) -> f64 {
+    match kind {
+        JointKind::Revolute => rounded(q.to_degrees(), 6).to_radians(),
+        _ => rounded(q, 9),
+    }
+}
+
+pub(super) fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
     from + (to - from) * random.random::<f64>()
 }
 
@@ -209,10 +236,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
             let q = if joint.commanded() == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
-            conditions.configuration.push(match joint.kind {
-                JointKind::Revolute => rounded(q.to_degrees(), 6).to_radians(),
-                _ => rounded(q, 9),
-            });
+            conditions.configuration.push(rounded_command(joint.kind, q));
         }
         let choice = random.random::<f64>() * ranges.payloads.len() as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down to an index")]
@@ -230,7 +254,13 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
             conditions.approach = Some(signed.collect());
         }
         conditions.covariates = ranges.covariates.iter().map(|&range| between(&mut random, range)).collect();
-        rows.push(Row { conditions, position: Vector3::zeros(), orientation: None, held_out: false });
+        rows.push(Row {
+            conditions,
+            observation: Observation::Position,
+            position: Vector3::zeros(),
+            orientation: None,
+            held_out: false,
+        });
     }
     rows
 }

@@ -11,6 +11,7 @@
 mod build;
 mod chain;
 mod command;
+mod contact;
 mod draw;
 mod effect;
 mod equilibrium;
@@ -80,6 +81,12 @@ impl Rig {
     /// # Errors
     /// The arm is too soft for its loads.
     pub fn pose(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
+        let (seen, orientation) = self.placed(conditions)?;
+        Ok((self.track(seen, conditions), orientation))
+    }
+
+    /// Where the target is, measuring frame \[m\], and its orientation there.
+    fn placed(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
         let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
         let base = self.mounted(conditions).seen(&base);
@@ -88,7 +95,7 @@ impl Rig {
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(self.arm.tool.rotation);
         let finite = seen.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());
-        if finite { Ok((self.track(seen, conditions), orientation)) } else { Err(NoRest) }
+        if finite { Ok((seen, orientation)) } else { Err(NoRest) }
     }
 
     /// Where the floor is, as covariates move it, measuring frame.

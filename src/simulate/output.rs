@@ -48,10 +48,15 @@ impl Simulation {
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
         let unit = |turns| if turns { "deg" } else { "m" };
         names.extend(self.moving().map(|(index, turns)| format!("q{}_{}", index + 1, unit(turns))));
+        let there = |word| self.rows.iter().any(|row| self.word(row) == word);
         let columns = [
-            (true, "x_mm"),
-            (true, "y_mm"),
-            (true, "z_mm"),
+            (there(""), "x_mm"),
+            (there(""), "y_mm"),
+            (there(""), "z_mm"),
+            (there("point"), "point"),
+            (there("anchor"), "anchor"),
+            (there("anchor"), "distance_mm"),
+            (there("surface"), "surface"),
             (self.truth.orientation_sigma.is_some(), "rx_deg"),
             (self.truth.orientation_sigma.is_some(), "ry_deg"),
             (self.truth.orientation_sigma.is_some(), "rz_deg"),
@@ -76,9 +81,11 @@ impl Simulation {
             q if turns => format!("{:.6}", q.to_degrees()),
             q => format!("{q:.9}"),
         }));
-        cells.extend(row.position.iter().map(|x| format!("{:.6}", x * 1e3)));
+        self.observed(row, &mut cells);
         let turn = row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
-        cells.extend(turn.iter().flatten().map(|angle| format!("{angle:.7}")));
+        let turned = self.truth.orientation_sigma.is_some();
+        let angles = turn.map_or([const { String::new() }; 3], |turn| turn.map(|angle| format!("{angle:.7}")).into());
+        cells.extend(angles.into_iter().filter(|_| turned));
         cells.extend(set.payload.map(|mass| mass.to_string()));
         cells.extend(set.hoist.map(|force| format!("{force:.3}")));
         cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
@@ -88,6 +95,28 @@ impl Simulation {
             cells.extend(self.moving().map(|(index, _)| approach.get(index).unwrap_or(&0.0).to_string()));
         }
         cells
+    }
+
+    /// The word of what a row measures against, none of a position.
+    fn word(&self, row: &Row) -> &'static str {
+        row.observation.fixture().and_then(|own| self.fixtures.get(own)).map_or("", |own| own.kind.word())
+    }
+
+    /// What is measured, in the columns of all kinds that there are.
+    fn observed(&self, row: &Row, cells: &mut Vec<String>) {
+        let there = |word| self.rows.iter().any(|row| self.word(row) == word);
+        let name = row.observation.fixture().and_then(|own| self.fixtures.get(own)).map_or("", |own| own.name.as_str());
+        let own = self.word(row);
+        let cell = |word: &str, text: String| if own == word { text } else { String::new() };
+        if there("") {
+            cells.extend(row.position.iter().map(|x| cell("", format!("{:.6}", x * 1e3))));
+        }
+        for word in ["point", "anchor", "surface"].into_iter().filter(|word| there(word)) {
+            cells.push(cell(word, name.to_owned()));
+            if word == "anchor" {
+                cells.push(cell(word, format!("{:.6}", row.position.x * 1e3)));
+            }
+        }
     }
 
     /// `truth.json`.

@@ -1,6 +1,6 @@
 //! The parameters of an arm by name, to be given true values.
 
-use crate::problem::{Placement, Problem};
+use crate::problem::{Fixture, Placement, Problem};
 use crate::quantity::Unit;
 
 /// A parameter with its nominal and its true value, SI.
@@ -80,6 +80,18 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
     if problem.data.orientation_sigma.is_some() {
         for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(problem.tool.rotation.iter_mut()) {
             see(format!("tool.{axis}"), Angle, value);
+        }
+    }
+    visit_fixtures(&mut problem.fixtures, see);
+}
+
+/// What is touched or measured against, behind all others as well.
+fn visit_fixtures(fixtures: &mut [Fixture], mut see: impl FnMut(String, Unit, &mut f64)) {
+    for Fixture { name, kind, known, .. } in fixtures {
+        for (axis, (field, number)) in kind.fields().iter().zip(known).enumerate() {
+            let mut value = number.unwrap_or(0.0);
+            see(format!("{}[{name}].{field}", kind.word()), kind.unit(axis), &mut value);
+            *number = Some(value);
         }
     }
 }

@@ -12,11 +12,11 @@ const HELD_OUT: f64 = 0.3;
 /// Seconds between poses where the file says nothing.
 const TIME_STEP: f64 = 60.0;
 
-/// Ranges, the time from one pose to the next \[s\], and which rows are held out.
+/// Ranges, the time from one pose to the next \[s\], which rows are held out, and how many measure positions.
 pub(super) fn read(
     mut section: Section<'_, '_>,
     problem: &Problem,
-) -> Result<(PoseRanges, (f64, f64), HeldOutRows), InputError> {
+) -> Result<(PoseRanges, (f64, f64), HeldOutRows, usize), InputError> {
     let joints = problem.joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.commanded()));
     let joints = joints.collect::<Result<_, _>>()?;
@@ -27,8 +27,10 @@ pub(super) fn read(
     let covariates = section.section("covariates")?.map_or(Ok(Vec::new()), |own| covariates(own, problem))?;
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
+    let positions = section.get("positions").map_or(Ok(0), |item| item.small().map(usize::from))?;
     section.finish()?;
-    Ok((PoseRanges { joints, payloads, hoist, temperature, approach, covariates }, time_step, held_out))
+    let ranges = PoseRanges { joints, payloads, hoist, temperature, approach, covariates };
+    Ok((ranges, time_step, held_out, positions))
 }
 
 fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {

@@ -41,7 +41,8 @@ impl Truth {
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
-    let (noise_sigma, turn) = root.section("noise")?.map_or(Ok((0.0, None)), noise)?;
+    let Noise { position: noise_sigma, contacts: contact_sigmas, turn } =
+        root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
@@ -49,7 +50,7 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
     }
     let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
-    Ok(Truth { noise_sigma, orientation_sigma, ..truth })
+    Ok(Truth { noise_sigma, contact_sigmas, orientation_sigma, ..truth })
 }
 
 /// The sections that say what is true, without noise.
@@ -65,13 +66,15 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     }?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
-    let (poses, time_step, held_out) = ranges::read(section, problem)?;
+    let (poses, time_step, held_out, positions) = ranges::read(section, problem)?;
     let effects = strengths::read(root, problem, &poses)?;
     Ok(Truth {
         parameters,
         random,
         effects,
         noise_sigma: 0.0,
+        contact_sigmas: [0.0; 3],
+        positions,
         orientation_sigma: None,
         poses,
         time_step,
@@ -91,13 +94,31 @@ fn example(joints: &[Joint]) -> String {
     format!("[poses] with the range of each joint: {}", ranges.join(", "))
 }
 
-/// 1 σ of a position \[m\], and of an orientation if it is given \[rad\].
-fn noise(mut section: Section<'_, '_>) -> Result<(f64, Option<f64>), InputError> {
+/// `[noise]`.
+#[derive(Default)]
+struct Noise {
+    /// 1 σ of a position \[m\].
+    position: f64,
+    /// The same of a contact with a point, of a distance, and of a contact with a surface.
+    contacts: [f64; 3],
+    /// 1 σ of an orientation \[rad\], if it is given.
+    turn: Option<f64>,
+}
+
+/// The section; contacts scatter as positions do where it says nothing else.
+fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let sigma = section.not_negative("position_sigma", Unit::Length)?;
+    let contact = |section: &mut Section<'_, '_>, base| section.not_negative(base, Unit::Length);
+    let contacts = [
+        contact(&mut section, "point_sigma")?,
+        contact(&mut section, "distance_sigma")?,
+        contact(&mut section, "surface_sigma")?,
+    ];
     let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
     section.finish()?;
     let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
-    Ok((sigma.ok_or_else(missing)?, turn))
+    let position = sigma.ok_or_else(missing)?;
+    Ok(Noise { position, contacts: contacts.map(|own| own.unwrap_or(position)), turn })
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {

@@ -1,7 +1,7 @@
 //! What is true on the test bench, as plain data in SI units.
 
 use super::effect::TrueEffect;
-use crate::problem::PoseRanges;
+use crate::problem::{Fixture, FixtureKind, Observation, PoseRanges};
 use crate::quantity::Unit;
 
 /// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
@@ -15,6 +15,10 @@ pub struct Truth {
     pub effects: Vec<TrueEffect>,
     /// 1 σ of a measured coordinate \[m\].
     pub noise_sigma: f64,
+    /// The same of a contact with a point, of a measured distance, and of a contact with a surface \[m\].
+    pub contact_sigmas: [f64; 3],
+    /// How many rows measure positions, the first ones, where there are points, anchors or surfaces to measure against.
+    pub positions: usize,
     /// 1 σ of a measured orientation about each axis, where orientations are measured \[rad\].
     pub orientation_sigma: Option<f64>,
     /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
@@ -57,6 +61,34 @@ pub enum HeldOutRows {
     Share(f64),
     /// All but this many.
     AllBut(usize),
+}
+
+impl Truth {
+    /// What rows measure: first the positions, then one fixture after the other; positions alone where there are no fixtures.
+    pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
+        let of = |(index, kind): (usize, FixtureKind)| match kind {
+            FixtureKind::Point => Observation::Point(index),
+            FixtureKind::Anchor => Observation::Distance(index),
+            FixtureKind::Plane | FixtureKind::Sphere => Observation::Surface(index),
+        };
+        let fixtures: Vec<Observation> = fixtures.iter().map(|own| own.kind).enumerate().map(of).collect();
+        let of_row = |row: usize| match row.checked_sub(self.positions) {
+            Some(place) if !fixtures.is_empty() => fixtures[place % fixtures.len()],
+            _ => Observation::Position,
+        };
+        (0..rows).map(of_row).collect()
+    }
+
+    /// 1 σ of what a row measures \[m\].
+    pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
+        let [point, distance, surface] = self.contact_sigmas;
+        match observation {
+            Observation::Point(_) => point,
+            Observation::Distance(_) => distance,
+            Observation::Surface(_) => surface,
+            _ => self.noise_sigma,
+        }
+    }
 }
 
 impl RandomRule {

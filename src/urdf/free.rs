@@ -7,7 +7,7 @@ use crate::error::{InputError, Location};
 use crate::least_squares::jacobian;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
-use crate::problem::{Freedom, JointKind, ParameterRule, PoseView, Problem, Quantities};
+use crate::problem::{Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities};
 use crate::random::stream;
 
 /// A column adds something if that much of it is left beside those before \[1\].
@@ -44,7 +44,15 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut poses = Vec::with_capacity(count);
     for configuration in &configurations {
         let (setup, measured) = (PoseView::of(configuration), Vector3::zeros());
-        poses.push(Pose { setup, base: 0, target: 0, measured, sigma: 1.0, orientation: None });
+        poses.push(Pose {
+            setup,
+            base: 0,
+            target: 0,
+            observation: Observation::default(),
+            measured,
+            sigma: 1.0,
+            orientation: None,
+        });
     }
     let zero = DVector::zeros(count);
     let columns = jacobian(&PoseResiduals::new(&model, poses, (0..count).collect(), zero.clone()), &zero);

@@ -82,6 +82,7 @@ impl Linear {
 
     pub fn fit<'a>(&'a self, residual: &'a DVector<f64>) -> FitResidual<'a> {
         FitResidual {
+            coordinates: &[],
             residual,
             fitted: &self.fitted,
             sigma_is_declared: self.sigma_is_declared,

@@ -4,7 +4,7 @@ use flexcal::least_squares::jacobian;
 use flexcal::model::parameter::Parameter;
 use flexcal::model::{Model, Pose, PoseResiduals};
 use flexcal::paper::{EndPoint, Mdh, Parameters, Reading};
-use flexcal::problem::{Equilibrium, Freedom, PoseView, Problem, Quantities};
+use flexcal::problem::{Equilibrium, Freedom, Observation, PoseView, Problem, Quantities};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
@@ -112,8 +112,15 @@ pub fn model(problem: &Problem) -> Model {
 
 /// ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
 pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
-    let pose =
-        Pose { setup: row.setup(), base: 0, target: 0, measured: Vector3::zeros(), sigma: 1.0, orientation: None };
+    let pose = Pose {
+        setup: row.setup(),
+        base: 0,
+        target: 0,
+        observation: Observation::default(),
+        measured: Vector3::zeros(),
+        sigma: 1.0,
+        orientation: None,
+    };
     let residuals = PoseResiduals::new(model, vec![pose], (0..x.len()).collect(), x.clone());
     -jacobian(&residuals, x)
 }

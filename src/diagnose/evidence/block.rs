@@ -190,7 +190,7 @@ mod tests {
         let (jacobian, residual) = (matrix(36, 4), matrix(36, 6).column(5) * 4.0);
         let unknowns =
             Unknowns { x: vec![0.0; 4], priors: vec![None, Some(0.3), None, None], active: DMatrix::zeros(0, 4) };
-        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns);
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
         let (within, grid) =
             (fit.left_of(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2, [(0.0, 0.5), (-1.0, 0.2)]);
         let taken = &within * fit.residual();

@@ -45,7 +45,7 @@ impl Part {
             }
             Slot::Base { .. } | Slot::Turn { .. } => Self::Base,
             Slot::Target { .. } => Self::Payload,
-            Slot::Shift { .. } | Slot::Scale => Self::Measurement,
+            Slot::Fixture { .. } | Slot::Shift { .. } | Slot::Scale => Self::Measurement,
         }
     }
 }

@@ -324,7 +324,9 @@ fn blocks(
     let rows = data.thinned(data.rules.weighed_poses);
     let is_declared = fitted.found.noise == Noise::Declared;
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
-    let without_weight = 3 * (left_out.len() + rows.iter().enumerate().filter(is_aside).count());
+    let numbers = |row: usize| data.measurements.observation(row).coordinates();
+    let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
+        + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
     let noise = marginal::Noise {
         freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
         trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },

@@ -41,6 +41,8 @@ pub(crate) struct LinearNeighbourhood {
     step: DVector<f64>,
     /// Rows that are data.
     rows: usize,
+    /// Those of them that are 0 because nothing is measured there.
+    empty: usize,
     /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
     sums: Sums,
 }
@@ -55,8 +57,9 @@ pub(crate) struct Share {
 }
 
 impl LinearNeighbourhood {
-    /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given.
-    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns) -> Self {
+    /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given; so many rows are
+    /// `empty`: 0, since poses measure fewer numbers than three.
+    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
@@ -85,6 +88,7 @@ impl LinearNeighbourhood {
             optimum: DVector::from_column_slice(&unknowns.x),
             step: DVector::zeros(n),
             rows,
+            empty,
             sums: Sums::default(),
         };
         fit.settle(0);
@@ -99,7 +103,7 @@ impl LinearNeighbourhood {
         let step = -(self.root.columns_range(first..) * along);
         self.optimum += &step;
         self.step += step;
-        let before = if first == 0 { self.rows as f64 } else { self.sums.data_freedom };
+        let before = if first == 0 { (self.rows - self.empty) as f64 } else { self.sums.data_freedom };
         let taken = new.rows(0, self.rows).norm_squared();
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
@@ -171,7 +175,7 @@ impl LinearNeighbourhood {
 
     /// What the degrees of freedom are to be expected to be where the priors are true: rows, priors included, less rank.
     pub fn expected_freedom(&self) -> f64 {
-        (self.basis.nrows() - self.basis.ncols()) as f64
+        (self.basis.nrows() - self.empty - self.basis.ncols()) as f64
     }
 
     /// What some unknowns x alone give the fit; `None` where the fit does not tell them from others.
@@ -307,7 +311,7 @@ mod tests {
     #[test]
     fn a_share_is_what_the_fit_loses_without_its_unknowns() {
         let (columns, residual, unknowns) = fit(5);
-        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns);
+        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
         let share = whole.share(&[3, 4]).unwrap();
         let fewer = Unknowns {
             x: unknowns.x[..3].to_vec(),
@@ -315,7 +319,7 @@ mod tests {
             active: DMatrix::zeros(0, 3),
         };
         let without = residual - columns.columns(3, 2) * DVector::from_column_slice(&unknowns.x[3..]);
-        let rest = LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer);
+        let rest = LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer, 0);
         let (lost, expected) = (whole.sums_without(&share), rest.sums());
         assert!((lost.squares - expected.squares).abs() < 1e-10 && share.part.norm() > 0.1);
         assert!((lost.data_freedom - expected.data_freedom).abs() < 1e-10);
@@ -327,14 +331,14 @@ mod tests {
     #[test]
     fn what_other_columns_take_up_or_what_is_not_finite_changes_nothing() {
         let (columns, residual, unknowns) = fit(5);
-        let plain = LinearNeighbourhood::new(&columns, &residual, &unknowns);
+        let plain = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
         let mut odd = columns.clone().resize_horizontally(7, 0.0);
         odd.set_column(5, &(columns.column(0) * 3.0 - columns.column(2) * (1.0 + 1e-9)));
         odd[(4, 6)] = f64::NAN;
         let mut more = unknowns.clone();
         more.x.extend([0.0; 2]);
         more.priors.extend([None; 2]);
-        let odd = LinearNeighbourhood::new(&odd, &residual, &more);
+        let odd = LinearNeighbourhood::new(&odd, &residual, &more, 0);
         assert!((odd.sums().squares - plain.sums().squares).abs() < 1e-9);
         assert_eq!(odd.fitted().ncols(), 5);
         assert!(odd.share(&[5]).is_none());

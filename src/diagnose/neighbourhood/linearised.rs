@@ -107,6 +107,11 @@ impl<'a> Linearised<'a> {
         &self.residual
     }
 
+    /// Rows that are 0 because their poses measure fewer numbers than three.
+    pub fn empty(&self) -> usize {
+        self.poses.iter().map(|pose| 3 - pose.observation.coordinates()).sum()
+    }
+
     /// The poses.
     pub fn poses(&self) -> &[Pose<'a>] {
         &self.poses

@@ -18,12 +18,15 @@ pub struct CovariateValues {
 /// What a fit leaves, as the tests see it: N poses, p fitted directions.
 #[derive(Debug, Clone, Copy)]
 pub struct FitResidual<'a> {
-    /// Whitened residuals (measured − predicted) / σ, measuring frame, pose after pose, shape = (3 N).
+    /// Whitened residuals (measured − predicted) / σ, measuring frame, pose after pose, shape = (3 N); 0 behind the last of the
+    /// numbers that a pose measures.
     pub residual: &'a DVector<f64>,
     /// Q, shape = (3 N, p): H = Q Qᵀ takes data to fitted values.
     ///
     /// The data's rows of the thin orthonormal factor of [J; prior rows]: with priors, H has eigenvalues between 0 and 1.
     pub fitted: &'a DMatrix<f64>,
+    /// How many numbers each pose measures, 1…3; empty where all measure three.
+    pub coordinates: &'a [usize],
     /// Whether σ was declared; one that was estimated from the residuals says nothing about their size.
     pub sigma_is_declared: bool,
     /// Time of each pose, any unit and origin.
@@ -37,6 +40,11 @@ pub struct FitResidual<'a> {
 }
 
 impl FitResidual<'_> {
+    /// How many numbers a pose measures.
+    pub(super) fn coordinates_of(&self, pose: usize) -> usize {
+        self.coordinates.get(pose).copied().unwrap_or(3)
+    }
+
     /// Whether the input makes sense.
     pub(super) fn testable(&self) -> Result<(), Untestable> {
         let rows = self.residual.len();

@@ -28,18 +28,20 @@ pub(super) struct Leverage {
     pub squared_freedom: f64,
     /// (I − H)ᵦᵦ^(−½) of each pose b.
     pub whiteners: Vec<Matrix3<f64>>,
+    /// How many numbers each pose measures.
+    pub coordinates: Vec<usize>,
 }
 
 impl Leverage {
-    /// Of Q, shape = (3 N, p).
+    /// Of Q, shape = (3 N, p), of poses that measure so many numbers each: the rows behind these are 0.
     ///
     /// # Errors
     /// The fit leaves too few degrees of freedom.
-    pub fn of(fitted: &DMatrix<f64>) -> Result<Self, Untestable> {
+    pub fn of(fitted: &DMatrix<f64>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let p = fitted.ncols();
         let transposed = fitted.transpose();
         let gram = &transposed * fitted;
-        let freedom = fitted.nrows() as f64 - gram.trace();
+        let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
         if freedom < LEAST_FREEDOM {
             return Err(Untestable::NoFreedom);
         }
@@ -50,7 +52,15 @@ impl Leverage {
             let taken = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
             inverse_root(Matrix3::identity() - taken)
         });
-        Ok(Self { fitted: fitted.clone(), prior, freedom, squared_freedom, whiteners: whiteners.collect(), transposed })
+        Ok(Self {
+            fitted: fitted.clone(),
+            prior,
+            freedom,
+            squared_freedom,
+            whiteners: whiteners.collect(),
+            transposed,
+            coordinates,
+        })
     }
 
     /// (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals with unit covariance, if the noise has it [Cook and Weisberg 1982].
@@ -107,6 +117,7 @@ impl Kept {
         let p = fit.fitted.ncols();
         let (gone, poses): (Vec<usize>, Vec<usize>) = (0..out.len()).partition(|&pose| out[pose]);
         let rows_of = |poses: &[usize]| -> Vec<usize> { poses.iter().flat_map(|&b| 3 * b..3 * b + 3).collect() };
+        let coordinates = poses.iter().map(|&pose| fit.coordinates_of(pose)).collect();
         let (gone, kept) = (rows_of(&gone), rows_of(&poses));
         let fitted_gone = fit.fitted.select_rows(&gone);
         let fitted = fit.fitted.select_rows(&kept);
@@ -117,7 +128,7 @@ impl Kept {
         let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
         let residual = fit.residual.select_rows(&kept) + &fitted * pull;
         let fitted = decided.l().solve_lower_triangular(&fitted.transpose())?.transpose();
-        Some(Self { poses, residual, leverage: Leverage::of(&fitted).ok()? })
+        Some(Self { poses, residual, leverage: Leverage::of(&fitted, coordinates).ok()? })
     }
 }
 
@@ -152,7 +163,7 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
         let change = 2.0 * pull.dot(&(again - taken * own)) + pull.dot(&(more * pull));
         Others {
             squares: total - own.norm_squared() + change,
-            freedom: leverage.freedom - 3.0 + taken.trace() - (inverse * more).trace(),
+            freedom: leverage.freedom - leverage.coordinates[pose] as f64 + taken.trace() - (inverse * more).trace(),
         }
     });
     others.collect()

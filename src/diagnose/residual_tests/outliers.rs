@@ -24,8 +24,8 @@ pub(super) struct Found {
 
 /// Leaves out poses that are too far off, the farthest first.
 ///
-/// Of pose b with studentised residual e_b, F = |e_b|² / 3 s², where s² is the variance of what a fit without b leaves of its ν
-/// degrees of freedom: it has the F distribution with 3 and ν of them, whatever σ is (nearly so with priors). The pose is
+/// Of pose b with studentised residual e_b, F = |e_b|² / k s² with its k numbers, where s² is the variance of what a fit without b leaves of its ν
+/// degrees of freedom: it has the F distribution with k and ν of them, whatever σ is (nearly so with priors). The pose is
 /// too far off where N P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. Where more than one pose in five is, the
 /// rest stays in: that is no outlier, but what the noise is like.
 pub(super) fn find(fit: &FitResidual, leverage: &Leverage, level: f64) -> Found {
@@ -63,13 +63,14 @@ struct Distance {
 fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distance>> {
     let studentised = leverage.studentise(residual.as_slice());
     let rounding = f64::EPSILON * residual.norm_squared();
-    let distance = |(own, others): (Vector3<f64>, Others)| {
-        let distribution = FisherSnedecor::new(3.0, others.freedom).ok()?;
+    let distance = |((own, others), &numbers): ((Vector3<f64>, Others), &usize)| {
+        let numbers = numbers as f64;
+        let distribution = FisherSnedecor::new(numbers, others.freedom).ok()?;
         let own = own.norm_squared();
         let variance = others.squares.max(rounding) / others.freedom;
-        Some(Distance { ratio: if own > 0.0 { own / 3.0 / variance } else { 0.0 }, distribution })
+        Some(Distance { ratio: if own > 0.0 { own / numbers / variance } else { 0.0 }, distribution })
     };
-    studentised.into_iter().zip(each_left_out(leverage, residual)).map(distance).collect()
+    studentised.into_iter().zip(each_left_out(leverage, residual)).zip(&leverage.coordinates).map(distance).collect()
 }
 
 /// The test of the pose that is farthest off.

@@ -45,15 +45,16 @@ pub(super) fn lack_of_fit(fit: &FitResidual, kept: &Kept) -> Tried {
 }
 
 fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
-    let mut setups = BTreeMap::<usize, Vec<Vector3<f64>>>::new();
+    let mut setups = BTreeMap::<usize, (usize, Vec<Vector3<f64>>)>::new();
     for (&pose, residual) in kept.poses.iter().zip(kept.residual.as_slice().chunks_exact(3)) {
-        setups.entry(fit.setup[pose]).or_default().push(Vector3::from_column_slice(residual));
+        let (_, own) = setups.entry(fit.setup[pose]).or_insert_with(|| (fit.coordinates_of(pose), Vec::new()));
+        own.push(Vector3::from_column_slice(residual));
     }
     let (mut pure, mut pure_freedom) = (0.0, 0.0);
-    for repeats in setups.values() {
+    for (numbers, repeats) in setups.values() {
         let mean = repeats.iter().sum::<Vector3<f64>>() / repeats.len() as f64;
         pure += repeats.iter().map(|residual| (residual - mean).norm_squared()).sum::<f64>();
-        pure_freedom += 3.0 * (repeats.len() as f64 - 1.0);
+        pure_freedom += *numbers as f64 * (repeats.len() as f64 - 1.0);
     }
     if pure_freedom == 0.0 {
         return Err(Untestable::NoRepeats);

@@ -17,12 +17,14 @@ use super::statistic::{Cumulative, Sample, Statistic, sequences};
 /// but are not structure, since no effect explains them.
 pub fn test_residual(fit: &FitResidual, seed: u64) -> Findings {
     let poses = fit.residual.len() / 3;
-    let leverage =
-        match fit.testable().and_then(|()| Leverage::of(fit.fitted)).and_then(|all| fit.above_rounding().map(|()| all))
-        {
-            Ok(leverage) => leverage,
-            Err(why) => return judge(all_untestable(fit, &why), Vec::new()),
-        };
+    let leverage = match fit
+        .testable()
+        .and_then(|()| Leverage::of(fit.fitted, (0..poses).map(|pose| fit.coordinates_of(pose)).collect()))
+        .and_then(|all| fit.above_rounding().map(|()| all))
+    {
+        Ok(leverage) => leverage,
+        Err(why) => return judge(all_untestable(fit, &why), Vec::new()),
+    };
     let studentised = leverage.studentise(fit.residual.as_slice());
     // At most so many tests: what is left out fails in the judgement, too.
     let most = fit.covariates.len() + 8;

@@ -1,5 +1,6 @@
 //! Where a parameter enters the model, and what it is called.
 
+use crate::problem::FixtureKind;
 use crate::quantity::Unit;
 
 /// Where a parameter enters the model; joints are counted from 0, [`Slot::of_joint`] takes the numbers of files.
@@ -34,6 +35,15 @@ pub enum Slot {
         /// Index of the target.
         target: usize,
         /// 0..6.
+        axis: usize,
+    },
+    /// A number of a fixture, in the order of [`FixtureKind::fields`].
+    Fixture {
+        /// Index of the fixture.
+        fixture: usize,
+        /// What it is.
+        kind: FixtureKind,
+        /// Which number.
         axis: usize,
     },
     /// A displacement of every measured position, measuring frame.
@@ -263,6 +273,7 @@ impl Slot {
             Self::Base { axis, .. } | Self::Target { axis, .. } if axis >= 3 => Unit::Angle,
             Self::Turn { .. } => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
+            Self::Fixture { kind, axis, .. } => kind.unit(axis),
             Self::Scale => Unit::Ratio,
         }
     }
@@ -277,7 +288,12 @@ impl Slot {
                 !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)
             }
             Self::Arm(_) => true,
-            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } | Self::Turn { .. } | Self::Scale => false,
+            Self::Base { .. }
+            | Self::Target { .. }
+            | Self::Fixture { .. }
+            | Self::Shift { .. }
+            | Self::Turn { .. }
+            | Self::Scale => false,
         }
     }
 
@@ -286,8 +302,8 @@ impl Slot {
         matches!(self, Self::Target { axis: 3.., .. })
     }
 
-    /// Whether the slot belongs to a session's set-up (base or target) rather than to the arm.
+    /// Whether the slot belongs to the set-up (base, target, fixture) rather than to the arm.
     pub fn is_placement(self) -> bool {
-        matches!(self, Self::Base { .. } | Self::Target { .. })
+        matches!(self, Self::Base { .. } | Self::Target { .. } | Self::Fixture { .. })
     }
 }

@@ -4,7 +4,7 @@ use super::{BeamField, Driver, JointField, Parameter, Slot, unit};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::effect;
 use crate::problem::pattern::matches;
-use crate::problem::{Freedom, ParameterRule, Placement, Problem, Quantities};
+use crate::problem::{Fixture, Freedom, ParameterRule, Placement, Problem, Quantities};
 use crate::quantity::Unit;
 
 /// A scalar of the model that a rule may free.
@@ -17,6 +17,8 @@ pub(super) struct Candidate {
     pub(super) nominal: f64,
     /// For a parameter of an effect, which is free with this prior where no rule speaks of it.
     of_effect: Option<f64>,
+    /// Whether nothing is known of it, so that it is free where no rule speaks of it.
+    unknown: bool,
 }
 
 impl Candidate {
@@ -102,6 +104,7 @@ pub fn resolve(
             (Some(Freedom::Free { sigma, min, max }), _) => (of_kind(sigma, candidate.unit()), min, max),
             // Of a unit that nobody knows there is no size that is too great.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
+            (None, None) if candidate.unknown => (None, &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
         };
         if candidate.slot.turns_target() && !problem.data.fits_orientation {
@@ -154,7 +157,7 @@ pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
 
-/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, effects.
+/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, fixtures, effects.
 pub(super) fn candidates(
     problem: &Problem,
     bases: &[String],
@@ -169,6 +172,7 @@ pub(super) fn candidates(
         driver: Driver::Constant,
         nominal,
         of_effect: None,
+        unknown: false,
     };
     for (joint, own) in problem.joints.iter().enumerate() {
         let geometry: Vec<(JointField, f64)> = match &own.placement {
@@ -213,6 +217,14 @@ pub(super) fn candidates(
             out.push(declared(name, format!("tool.{suffix}"), Slot::Target { target, axis }, nominal));
         }
     }
+    for (fixture, Fixture { name, kind, known, .. }) in problem.fixtures.iter().enumerate() {
+        for (axis, (field, known)) in kind.fields().iter().zip(known).enumerate() {
+            let slot = Slot::Fixture { fixture, kind: *kind, axis };
+            let (word, nominal) = (kind.word(), known.unwrap_or(0.0));
+            let own = declared(format!("{word}[{name}].{field}"), format!("{word}.{field}"), slot, nominal);
+            out.push(Candidate { unknown: known.is_none(), ..own });
+        }
+    }
     out.extend(effects.iter().cloned().map(|effect| Candidate {
         name: effect.name,
         plain: effect.plain,
@@ -220,6 +232,7 @@ pub(super) fn candidates(
         driver: effect.driver,
         nominal: effect.nominal,
         of_effect: Some(effect.sigma),
+        unknown: false,
     }));
     out
 }

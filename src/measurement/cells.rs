@@ -1,0 +1,46 @@
+//! Cells of a table that take some values only.
+
+use super::columns::Column;
+use super::table::{Table, shortened};
+use crate::error::{InputError, InputErrorKind};
+
+/// A number above zero \[SI\].
+pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    // A tiny length in millimetres may become 0 in metres.
+    let converted = (column.to_si)(value);
+    if converted > 0.0 {
+        Ok(converted)
+    } else {
+        Err(table.cell_error(column.place, InputErrorKind::NotPositive { value }))
+    }
+}
+
+/// A number that is not below zero \[SI\].
+pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    if value < 0.0 {
+        Err(table.cell_error(column.place, InputErrorKind::Negative { value }))
+    } else {
+        Ok((column.to_si)(value))
+    }
+}
+
+/// A direction: −1, 0 or +1.
+pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    if [-1.0, 0.0, 1.0].contains(&value) {
+        Ok(value)
+    } else {
+        Err(table.cell_error(column.place, InputErrorKind::NotADirection { value }))
+    }
+}
+
+/// Whether a cell says `validation`; the other word is `identification`.
+pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
+    match table.word(place)? {
+        "validation" => Ok(true),
+        "identification" => Ok(false),
+        word => Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) })),
+    }
+}

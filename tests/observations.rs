@@ -1,0 +1,14 @@
+//! Rows that measure something else than positions: contacts with points and surfaces, distances to anchors.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+mod common;
+
+#[path = "observations/bad.rs"]
+mod bad;
+#[path = "observations/bench.rs"]
+mod bench;
+#[path = "observations/derivatives.rs"]
+mod derivatives;
+#[path = "observations/recovery.rs"]
+mod recovery;

@@ -1,0 +1,86 @@
+//! Mistakes in what is measured against, and what such rows cannot tell.
+
+use std::path::Path;
+
+use flexcal::identify::{Options, identify};
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+
+use crate::bench::{ARM, AROUND, Bench, problem, read, true_arm};
+
+fn table(more: &str, rows: &str) -> String {
+    let problem = problem(more);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rows.csv");
+    std::fs::write(&file, rows).unwrap();
+    Dataset::read_files(&[file], &problem).map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn sections() {
+    for (more, words) in [
+        ("[[point]]\n", "point[1].name: missing"),
+        ("[[point]]\nname = \"a b\"\n", "cannot name a fixture"),
+        ("[[point]]\nname = \"a\"\n[[point]]\nname = \"a\"\n", "another point is called \"a\""),
+        ("[[point]]\nname = \"a\"\nat_mm = [1, 2]\n", "a vector has 3 numbers"),
+        ("[[anchor]]\nname = \"a\"\nat = [1, 2, 3]\n", "needs a unit"),
+        ("[[surface]]\nname = \"a\"\n", "surface[1].kind: missing"),
+        ("[[surface]]\nname = \"a\"\nkind = \"cone\"\n", "none of plane, sphere"),
+        ("[[surface]]\nname = \"a\"\nkind = \"plane\"\nnormal = [0, 0, 0]\n", "a direction has a length"),
+        ("[[surface]]\nname = \"a\"\nkind = \"sphere\"\nradius_mm = 0\n", "not above zero"),
+        ("[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\n", "no point is called \"b\""),
+        ("[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"a\"]\nmm = 50\n", "two different points"),
+        (
+            "[[point]]\nname = \"a\"\n[[point]]\nname = \"b\"\n[[distance]]\nbetween = [\"a\", \"b\"]\n",
+            "distance[1].mm: missing",
+        ),
+    ] {
+        let text = format!("{ARM}{more}");
+        let error = Problem::parse(&text, Path::new("problem.toml")).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("problem.toml:"), "{more}: {error}");
+    }
+}
+
+#[test]
+fn rows() {
+    let q = "0.1,0.2,0.3,0.4,0.5,0.6";
+    for (columns, cells, words) in [
+        ("point", "middle", ":2: column point: no point is called \"middle\"; there are left, right, top"),
+        ("anchor,distance_mm", "C,800", ":2: column anchor: no anchor is called \"C\""),
+        ("surface", "wall", ":2: column surface: no surface is called \"wall\""),
+        ("anchor,distance_mm", "A,", ":2: column anchor: an anchor without a distance"),
+        ("anchor,distance_mm", ",800", ":2: column distance_mm: a distance without an anchor"),
+        ("anchor,distance_mm", "A,-3", ":2: column distance_mm: -0.003 is not above zero"),
+        ("distance_mm", "800", ":1: column anchor: missing"),
+        ("offset_mm", "800", ":1: column surface: missing"),
+        ("point", "", ":2: nothing is measured in this row"),
+        ("point,x_mm,y_mm,z_mm", ",1,2,", ":2: column z_mm: the cell is empty"),
+        ("point", "left", ":2: column point: the point \"left\" is measured by 1 row alone"),
+        ("anchor,distance_mm", "A,800", ":2: column anchor: the anchor \"A\" is measured by 1 row alone"),
+    ] {
+        let text = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,{columns}\n{q},{cells}\n");
+        let around =
+            AROUND.replace("[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n", "");
+        let error = table(&around, &text);
+        assert!(error.contains(words), "{columns} {cells}: {error}");
+    }
+    let two = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm\n{q},left,A,800\n");
+    let error = table(&AROUND.replace("distance_sigma_mm = 0.05\n", ""), &two);
+    assert!(error.contains("write distance_sigma_mm in [data]"), "{error}");
+}
+
+/// Without a known length the size of everything is open, and without a tracker the place of the base: both are named.
+#[test]
+fn what_contacts_cannot_tell_is_named() {
+    let free = AROUND.replace("[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n", "");
+    let own = format!("\"base.*\" = {{ free = true }}\n{free}");
+    let problem = problem(&own);
+    let (arm, _) = true_arm(&problem, 2);
+    let found =
+        identify(&problem, &read(&problem, &Bench::new(arm, 7).table(&["point"], 90)), &Options::default()).unwrap();
+    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    for name in ["base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"] {
+        assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
+    }
+    assert_eq!(found.identifiability.blind.len(), 6);
+}

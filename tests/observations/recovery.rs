@@ -1,0 +1,76 @@
+//! The truth is found from rows of every kind, within its standard errors.
+
+use flexcal::identify::{Identification, Options, identify};
+
+use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, read, true_arm};
+
+/// Deviations from the truth in standard errors.
+fn deviations(found: &Identification, truth: &[(String, f64)]) -> Vec<(String, f64)> {
+    let one = |(name, value): &(String, f64)| {
+        let estimate = found.estimate(name)?;
+        Some((name.clone(), (estimate.estimate - value) / estimate.std_error?))
+    };
+    truth.iter().filter_map(one).collect()
+}
+
+fn fixtures() -> Vec<(String, f64)> {
+    let of = |word: &'static str, (name, place): (&'static str, [f64; 3])| {
+        ["x", "y", "z"].into_iter().zip(place).map(move |(axis, value)| (format!("{word}[{name}].{axis}"), value))
+    };
+    let points = POINTS.into_iter().flat_map(|own| of("point", own));
+    let anchors = ANCHORS.into_iter().flat_map(|own| of("anchor", own));
+    points.chain(anchors).chain(of("surface", ("ball", CENTRE))).collect()
+}
+
+#[test]
+fn each_kind_and_all_together_find_the_arm() {
+    let problem = problem(AROUND);
+    for (kinds, least) in [
+        (&["point"][..], 25),
+        (&["distance"], 20),
+        (&["plane", "sphere"], 15),
+        (&["tilt"], 8),
+        (&["position", "point", "distance", "plane", "sphere", "tilt"], 35),
+    ] {
+        let mut all = Vec::new();
+        for seed in 1..=3 {
+            let (arm, mut truth) = true_arm(&problem, seed);
+            truth.extend(fixtures());
+            let data = read(&problem, &Bench::new(arm, 100 + seed).table(kinds, 150 / kinds.len()));
+            let found = identify(&problem, &data, &Options::default()).unwrap();
+            assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.quality_flag);
+            let chi2 = found.reduced_chi2.unwrap();
+            assert!((0.6..1.5).contains(&chi2), "{kinds:?}, seed {seed}: {chi2}");
+            all.extend(deviations(&found, &truth));
+        }
+        let worst = all.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
+        let rms = (all.iter().map(|(_, z)| z * z).sum::<f64>() / all.len() as f64).sqrt();
+        println!("{kinds:?}: {} deviations, rms {rms:.2} σ, worst {:.1} σ at {}", all.len(), worst.1, worst.0);
+        assert!(all.len() >= 3 * least, "{kinds:?}: {}", all.len());
+        assert!((0.7..1.35).contains(&rms) && worst.1.abs() < 4.5, "{kinds:?}: rms {rms}, worst {worst:?}");
+    }
+}
+
+#[test]
+fn a_point_of_held_out_rows_alone_is_found_on_them() {
+    let text = AROUND.replace("{ fraction = 0.2, seed = 1 }", "{ column = \"split\" }");
+    let problem = problem(&text);
+    let (arm, _) = true_arm(&problem, 4);
+    let table = Bench::new(arm, 9).table(&["point"], 90);
+    let marked: Vec<String> = table
+        .lines()
+        .enumerate()
+        .map(|(k, line)| match k {
+            0 => format!("{line},split"),
+            _ if line.contains("top") => format!("{line},validation"),
+            _ => format!("{line},identification"),
+        })
+        .collect();
+    let found = identify(&problem, &read(&problem, &(marked.join("\n") + "\n")), &Options::default()).unwrap();
+    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    assert_eq!((found.fitted.held_out.n, found.fitted.held_out.kind), (30, "point"));
+    assert!(found.fitted.held_out.rms.norm < 0.3e-3, "{:?}", found.fitted.held_out);
+    let top = found.spreads.iter().find(|(before, ..)| before.point == "top").unwrap();
+    println!("top: {:.3} mm before, {:.3} mm after", top.0.mean * 1e3, top.1.mean * 1e3);
+    assert!(top.2 && top.0.mean > 5.0 * top.1.mean && top.1.mean < 0.2e-3);
+}
