@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::value::{RawValue, to_raw_value};
 
+use super::around::around;
 use super::document::{Block, Headline, Table, first_of};
 use super::errors::{NOMINAL, measure, row, unpredicted};
 use super::figures::{Figure, PlotData};
@@ -255,39 +256,6 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
-}
-
-/// Errors of every kind of rows where there are several, and the spread of the target at points.
-fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
-    let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
-        let values = [before.rms.norm, after.rms.norm].map(|value| mm(value, 4));
-        [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()
-    };
-    let mut blocks = Vec::new();
-    let kinds = found.kinds.iter().flat_map(|(before, after)| {
-        let kind = measure(&after.held_out);
-        [
-            row(kind, "held out", &before.held_out, &after.held_out),
-            row("", "identification", &before.identification, &after.identification),
-        ]
-    });
-    let rows: Vec<Vec<String>> = kinds.collect();
-    if !rows.is_empty() {
-        let header = ["rms of the rows' own residuals", "", "rows", "before", "after"];
-        blocks.push(Block::Table(Table::new(&header, rows, &[0, 1])));
-    }
-    let spreads = found.spreads.iter().map(|(before, after, held_out)| {
-        let words = if *held_out { "held out" } else { "" };
-        vec![after.point.clone(), words.to_owned(), after.n.to_string(), mm(before.mean, 4), mm(after.mean, 4)]
-    });
-    let rows: Vec<Vec<String>> = spreads.collect();
-    if !rows.is_empty() {
-        let header = ["spread at points, mm", "", "rows", "before", "after"];
-        let mut table = Table::new(&header, rows, &[0, 1]);
-        table.notes.push("mean distance of the predicted target from its mean over the rows at one point".to_owned());
-        blocks.push(Block::Table(table));
-    }
-    blocks
 }
 
 /// Errors of orientation before and after, where it is fitted.

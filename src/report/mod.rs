@@ -4,6 +4,7 @@
 //! as a page. `figures` draws what only a page shows.
 
 mod acceptance;
+mod around;
 mod brief;
 mod check;
 mod closed_loop;

@@ -23,7 +23,7 @@ fn derivatives_of_every_kind() {
     rigid.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
     for (what, problem) in [("elastic", elastic), ("rigid", rigid)] {
         let table =
-            Bench::new(problem.clone(), 3).table(&["position", "point", "distance", "plane", "sphere", "tilt"], 6);
+            Bench::new(problem.clone(), 3).table(&["position", "point", "distance", "plane", "sphere", "tilt"], 8);
         let rows = read(&problem, &table).measurements;
         // Tilts of every frame, the base among them.
         let mut rows = rows;

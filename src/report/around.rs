@@ -1,0 +1,39 @@
+//! What is told of rows that measure against points, anchors and surfaces.
+
+use super::document::{Block, Table};
+use super::errors::measure;
+use super::quantity::mm;
+use crate::identify::{ErrorSummary, Identification};
+
+/// Errors of every kind of rows where there are several, and the spread of the target at points.
+pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
+    let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
+        let values = [before.rms.norm, after.rms.norm].map(|value| mm(value, 4));
+        [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()
+    };
+    let mut blocks = Vec::new();
+    let kinds = found.kinds.iter().flat_map(|(before, after)| {
+        let kind = measure(&after.held_out);
+        [
+            row(kind, "held out", &before.held_out, &after.held_out),
+            row("", "identification", &before.identification, &after.identification),
+        ]
+    });
+    let rows: Vec<Vec<String>> = kinds.collect();
+    if !rows.is_empty() {
+        let header = ["rms of the rows' own residuals", "", "rows", "before", "after"];
+        blocks.push(Block::Table(Table::new(&header, rows, &[0, 1])));
+    }
+    let spreads = found.spreads.iter().map(|(before, after, held_out)| {
+        let words = if *held_out { "held out" } else { "" };
+        vec![after.point.clone(), words.to_owned(), after.n.to_string(), mm(before.mean, 4), mm(after.mean, 4)]
+    });
+    let rows: Vec<Vec<String>> = spreads.collect();
+    if !rows.is_empty() {
+        let header = ["spread at points, mm", "", "rows", "before", "after"];
+        let mut table = Table::new(&header, rows, &[0, 1]);
+        table.notes.push("mean distance of the predicted target from its mean over the rows at one point".to_owned());
+        blocks.push(Block::Table(table));
+    }
+    blocks
+}
