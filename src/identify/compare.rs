@@ -6,6 +6,7 @@ use super::baseline::{Baseline, baselines};
 use super::identification::identify_model;
 use super::procedure::Procedure;
 use super::{Identification, IdentifyError, Options, Placement, ProgressSink, SolverChoice, Strategy};
+use crate::least_squares::solver::Within;
 use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::paper::StiffnessStage;
@@ -65,12 +66,14 @@ pub fn compare(problem: &Problem, data: &Dataset, options: &CompareOptions) -> R
         let options = Options { strategy, solver, progress: options.progress.clone(), ..Options::default() };
         identify_model(model, problem, data, &options)
     };
-    let (elastic, bounded) = (problem.is_elastic(), model.is_bounded());
-    let solvers = SolverChoice::EACH.iter().filter(|&&solver| !bounded || solver == SolverChoice::Bounded);
+    let elastic = problem.is_elastic();
+    // Without bounds those that keep them all take the same steps; one of them is enough.
+    let tells = |solver: &SolverChoice| model.is_bounded() || matches!(solver.within(), None | Some(Within::ActiveSet));
+    let solvers = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&model) && tells(solver));
     let mut strategies = Vec::new();
     for strategy in Strategy::EACH.into_iter().filter(|&strategy| elastic || strategy != Strategy::Rigid) {
         let model = strategy.model(model.clone());
-        for &solver in solvers.clone() {
+        for solver in solvers.clone() {
             match run(&model, strategy, solver) {
                 Ok(identification) => strategies.push(identification),
                 Err(IdentifyError::NothingToFit { .. }) => {}

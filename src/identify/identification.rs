@@ -107,7 +107,7 @@ pub enum IdentifyError {
     Stage(#[from] StageError),
     /// Bounds or constraints were declared for a solver that cannot keep them.
     #[error(
-        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded or auto, or leave out \
+        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded, interior-point or auto, or leave out \
          min, max and [[constraint]]"
     )]
     BoundsIgnored {
@@ -203,7 +203,7 @@ pub fn identify_model(
     check_data(problem, data)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
-    if solver != SolverChoice::Bounded && model.is_bounded() {
+    if !solver.keeps(model) {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
     let (declared, noise_is_declared) = (problem.data.position_sigma, measurements.noise_is_declared(problem));

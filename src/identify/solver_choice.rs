@@ -1,5 +1,6 @@
 //! By which solver parameters are fitted.
 
+use crate::least_squares::solver::Within;
 use crate::model::Model;
 
 /// A solver by name.
@@ -15,16 +16,38 @@ pub enum SolverChoice {
     GaussNewton,
     /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
     PseudoInverse,
-    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`.
+    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`: faces that hold are guessed and corrected.
     Bounded,
+    /// The same, every step by an interior-point method.
+    InteriorPoint,
+    /// Levenberg–Marquardt within bounds by reflections [Branch, Coleman & Li 1999].
+    Reflective,
+    /// Levenberg–Marquardt whose steps are moved to the nearest point within bounds.
+    Clamped,
 }
 
 impl SolverChoice {
+    /// Every choice: what fits the problem, or a solver.
+    pub const CHOICES: [Self; 8] = [
+        Self::Auto,
+        Self::LevenbergMarquardt,
+        Self::GaussNewton,
+        Self::PseudoInverse,
+        Self::Bounded,
+        Self::InteriorPoint,
+        Self::Reflective,
+        Self::Clamped,
+    ];
     /// Every solver.
-    pub const EACH: [Self; 4] = [Self::LevenbergMarquardt, Self::GaussNewton, Self::PseudoInverse, Self::Bounded];
-    /// Every choice: a solver, or what fits the problem.
-    pub const CHOICES: [Self; 5] =
-        [Self::Auto, Self::LevenbergMarquardt, Self::GaussNewton, Self::PseudoInverse, Self::Bounded];
+    pub const EACH: [Self; Self::CHOICES.len() - 1] = {
+        let mut each = [Self::Auto; Self::CHOICES.len() - 1];
+        let mut k = 0;
+        while k < each.len() {
+            each[k] = Self::CHOICES[k + 1];
+            k += 1;
+        }
+        each
+    };
 
     /// Their names.
     pub const NAMES: [&str; Self::CHOICES.len()] = {
@@ -47,6 +70,9 @@ impl SolverChoice {
             Self::Bounded => {
                 ("bounded", "Levenberg-Marquardt within the bounds of [parameters] and every [[constraint]]")
             }
+            Self::InteriorPoint => ("interior-point", "The same, each step by an interior-point method"),
+            Self::Reflective => ("reflective", "Levenberg-Marquardt within bounds by reflections; no constraints"),
+            Self::Clamped => ("clamped", "Levenberg-Marquardt with steps cut at the bounds; no constraints"),
         }
     }
 
@@ -58,6 +84,26 @@ impl SolverChoice {
     /// What it does, in a few words.
     pub const fn summary(self) -> &'static str {
         self.words().1
+    }
+
+    /// How it keeps bounds, if it does.
+    pub fn within(self) -> Option<Within> {
+        match self {
+            Self::Bounded => Some(Within::ActiveSet),
+            Self::InteriorPoint => Some(Within::InteriorPoint),
+            Self::Reflective => Some(Within::Reflective),
+            Self::Clamped => Some(Within::Clamped),
+            Self::Auto | Self::LevenbergMarquardt | Self::GaussNewton | Self::PseudoInverse => None,
+        }
+    }
+
+    /// Whether it keeps the bounds and constraints of a model.
+    pub fn keeps(self, model: &Model) -> bool {
+        match self.within() {
+            None => !model.is_bounded(),
+            Some(Within::Reflective | Within::Clamped) => model.constraints.is_empty(),
+            Some(_) => true,
+        }
     }
 
     /// The solver that `auto` stands for with this model.

@@ -184,7 +184,7 @@ impl<'a> Stage<'a> {
         let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
         let bounds = Bounds::new(lower, upper)?;
         let (_, rows) = self.constraints(start)?;
-        if self.solver == SolverChoice::Bounded {
+        if self.solver.within().is_some() {
             begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
         }
         let hold = begin.clone();
@@ -234,11 +234,10 @@ impl<'a> Stage<'a> {
             unknowns: self.unknowns.len(),
             poses: self.poses.len(),
         });
+        if let Some(within) = self.solver.within() {
+            return Ok(solver::minimise_within(within, fit, begin, (bounds, rows), &settings, reporter));
+        }
         Ok(match (self.solver, reporter) {
-            (SolverChoice::Bounded, Some(reporter)) => {
-                solver::minimise_constrained_observed(fit, begin, bounds, rows, &settings, reporter)
-            }
-            (SolverChoice::Bounded, None) => solver::minimise_constrained(fit, begin, bounds, rows, &settings),
             (SolverChoice::GaussNewton, _) => {
                 let max_iterations = self.max_steps.min(GaussNewtonSettings::default().max_iterations);
                 let settings = GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
@@ -252,10 +251,8 @@ impl<'a> Stage<'a> {
                     None => solver::minimise_pseudo_inverse(fit, begin, &settings),
                 }
             }
-            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, Some(reporter)) => {
-                solver::minimise_observed(fit, begin, &settings, reporter)
-            }
-            (SolverChoice::Auto | SolverChoice::LevenbergMarquardt, None) => solver::minimise(fit, begin, &settings),
+            (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
+            (_, None) => solver::minimise(fit, begin, &settings),
         })
     }
 

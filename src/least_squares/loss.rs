@@ -80,6 +80,12 @@ impl Loss {
         residuals.chunks_exact(rows.max(1)).map(|item| self.rho(norm(item))).sum()
     }
 
+    /// ρ′ of the item of each row of `residuals`, `rows` values an item.
+    pub(super) fn weights(self, residuals: &[f64], rows: usize) -> Vec<f64> {
+        let items = residuals.chunks_exact(rows.max(1));
+        items.flat_map(|item| std::iter::repeat_n(self.weight(norm(item)), item.len())).collect()
+    }
+
     /// Scales the rows of each item by √ρ′ and returns Σ ρ; nothing is done for squares.
     pub(super) fn weigh(self, block: &mut Block, rows: usize) -> Option<f64> {
         if self == Self::Squares {

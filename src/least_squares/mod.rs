@@ -3,6 +3,7 @@
 //! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see the m × n Jacobian:
 //! it is reduced, block by block, to the triangular factor of its QR decomposition.
 
+mod curvature;
 mod derivative;
 mod identifiability;
 mod kernel;
@@ -110,6 +111,20 @@ pub trait Objective {
 
     /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
     fn linearise(&self, x: &DVector<f64>) -> Linearisation;
+
+    /// S = ∂(Jᵀr)/∂x − JᵀJ at x, what the linearised problem leaves out of the second derivatives of the cost.
+    ///
+    /// By differences of the gradient unless an objective knows better; evaluated only where `within` allows. Nothing where
+    /// derivatives are not finite.
+    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+        curvature::by_differences(self, x, within)
+    }
+
+    /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or not finite.
+    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        let _ = (x, step);
+        None
+    }
 }
 
 impl<O: Objective + ?Sized> Objective for &O {
@@ -123,6 +138,14 @@ impl<O: Objective + ?Sized> Objective for &O {
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
         (**self).linearise(x)
+    }
+
+    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+        (**self).curvature(x, within)
+    }
+
+    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        (**self).bend(x, step)
     }
 }
 

@@ -5,11 +5,14 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::kernel::sum_of_squares;
+use super::kernel::{dot, sum_of_squares};
 use super::{Block, LeastSquares, Linearisation, Loss, Objective, Triangle};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
+
+/// Part of a step over which the second derivative along it is taken.
+const BEND_STEP: f64 = 0.1;
 
 /// Chunks whose factors exist at the same time.
 const GROUP_CHUNKS: usize = 64;
@@ -125,6 +128,24 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         }
     }
 
+    /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
+    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &mut Block) -> DVector<f64> {
+        let items = self.chunk(index);
+        let rows = items.len() * self.problem.rows_per_item();
+        let mut moved = vec![0.0; rows];
+        self.problem.residuals(&(x + BEND_STEP * step), items.clone(), &mut moved);
+        block.reshape(rows);
+        self.problem.linearise(x, items, block);
+        let n = block.parameters();
+        for (i, moved) in moved.iter_mut().enumerate() {
+            let straight: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
+            *moved = 2.0 * ((*moved - block.column(n)[i]) / BEND_STEP - straight) / BEND_STEP;
+        }
+        let weights = self.loss.weights(block.column(n), self.problem.rows_per_item());
+        moved.iter_mut().zip(&weights).for_each(|(bend, weight)| *bend *= weight);
+        DVector::from_fn(n, |j, _| dot(block.column(j), &moved))
+    }
+
     /// Maps every chunk, in parallel when there are several, and hands the results on in order.
     fn in_order<B, T: Send>(
         &self,
@@ -180,6 +201,13 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         let mut linearisation = total.into_linearisation();
         linearisation.cost = half_if_finite(2.0 * linearisation.cost);
         linearisation
+    }
+
+    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        let mut total = DVector::zeros(x.len());
+        let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);
+        self.in_order(|| self.empty_block(), map, |bend| total += bend);
+        total.iter().all(|value| value.is_finite()).then_some(total)
     }
 }
 

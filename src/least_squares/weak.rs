@@ -110,6 +110,14 @@ impl<O: Objective> Objective for Steadied<'_, O> {
             None => found,
         }
     }
+
+    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+        self.objective.curvature(x, within)
+    }
+
+    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        self.objective.bend(x, step)
+    }
 }
 
 #[cfg(test)]

@@ -182,7 +182,7 @@ fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> 
 
 fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
     let solver = word(item, &SolverChoice::NAMES, &SolverChoice::CHOICES)?.decide(model);
-    if solver != SolverChoice::Bounded && model.is_bounded() {
+    if !solver.keeps(model) {
         return Err(item.error(InputErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
     }
     Ok(solver)

@@ -1,10 +1,11 @@
-//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a polyhedron.
+//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a polyhedron; three ways to solve it.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::interior::interior_point;
 use super::levenberg_marquardt::Model;
 use super::polyhedron::{Faces, Polyhedron};
-use super::polyhedron_step::{PolyhedronProblem, PolyhedronSolution};
+use super::polyhedron_step::{NEAR, PolyhedronProblem, PolyhedronSolution};
 use super::settings::RADIUS_SLACK;
 use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
@@ -25,7 +26,8 @@ pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustR
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
 ///
 /// The unconstrained step is tried first, then the one in the polyhedron (a box without inequalities), each without damping
-/// if that respects the radius. The problem is never evaluated outside (inequalities: beyond rounding);
+/// if that respects the radius: on a guess of the faces that hold, corrected until the optimality conditions do. The problem is
+/// never evaluated outside (inequalities: beyond rounding);
 /// a start outside is moved to the [`nearest`] point within. Converged when the gradient vanishes along all directions that
 /// bounds and inequalities leave open.
 pub fn constrained_levenberg_marquardt(
@@ -33,7 +35,24 @@ pub fn constrained_levenberg_marquardt(
     rows: Inequalities,
     settings: Settings,
 ) -> TrustRegion<Constrained> {
-    TrustRegion::new(Constrained { bounds, rows, model: None, guess: None }, settings)
+    Constrained::solver(Steps::ActiveSet, bounds, rows, settings)
+}
+
+/// The same with every step that leaves the polyhedron by Clarabel's interior-point method, ‖D p‖ ≤ Δ as a second-order cone.
+pub fn interior_point_levenberg_marquardt(
+    bounds: Bounds,
+    rows: Inequalities,
+    settings: Settings,
+) -> TrustRegion<Constrained> {
+    Constrained::solver(Steps::InteriorPoint, bounds, rows, settings)
+}
+
+/// Levenberg–Marquardt whose unbounded steps are moved to the nearest point within the bounds: what one would write first.
+///
+/// It may stop where a bound keeps it from a lower cost: a clamped step need not lead downhill.
+pub fn clamped_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
+    let rows = Inequalities::none(bounds.lower().len());
+    Constrained::solver(Steps::Clamped, bounds, rows, settings)
 }
 
 /// The point nearest to `x` that keeps bounds and inequalities, if there is one.
@@ -56,9 +75,18 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     (0..rows.len()).all(kept).then_some(point)
 }
 
+/// How a step within bounds is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Steps {
+    ActiveSet,
+    InteriorPoint,
+    Clamped,
+}
+
 /// The step within a sphere ‖D p‖ ≤ Δ, a box and inequalities.
 #[derive(Debug, Clone)]
 pub struct Constrained {
+    steps: Steps,
     bounds: Bounds,
     rows: Inequalities,
     model: Option<Model>,
@@ -66,9 +94,19 @@ pub struct Constrained {
     guess: Option<Faces>,
 }
 
+impl Constrained {
+    fn solver(steps: Steps, bounds: Bounds, rows: Inequalities, settings: Settings) -> TrustRegion<Self> {
+        TrustRegion::new(Self { steps, bounds, rows, model: None, guess: None }, settings)
+    }
+}
+
 impl Subproblem for Constrained {
     fn name(&self) -> &'static str {
-        "bounded Levenberg–Marquardt"
+        match self.steps {
+            Steps::ActiveSet => "bounded Levenberg–Marquardt",
+            Steps::InteriorPoint => "interior-point Levenberg–Marquardt",
+            Steps::Clamped => "clamped Levenberg–Marquardt",
+        }
     }
 
     fn admit(&self, start: &mut DVector<f64>) -> bool {
@@ -96,17 +134,51 @@ impl Subproblem for Constrained {
         }
     }
 
+    fn admits(&self, x: &DVector<f64>) -> bool {
+        self.bounds.contain(x) && self.rows.contain(x)
+    }
+
+    fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
+        let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, scale);
+        polyhedron.normals_of(&polyhedron.pressed(gradient).0)
+    }
+
+    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+        let model = self.model.as_ref().filter(|_| self.steps == Steps::ActiveSet)?;
+        let factor = model.bent(bend)?;
+        let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
+        let guess = self.guess.clone().unwrap_or_else(|| polyhedron.touched.clone());
+        let PolyhedronSolution { q, faces } = PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping);
+        let mut point = x + q.component_div(&model.scale);
+        self.bounds.hold(&mut point, &faces.bounds);
+        Some(point)
+    }
+
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let Some(model) = &mut self.model else { return Step::none(x) };
         let step = model.unbounded_step(x, radius);
-        if self.bounds.contain(&step.point) && self.rows.contain(&step.point) {
+        let inside = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
+        if inside && self.steps != Steps::InteriorPoint {
             return step;
         }
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let guess = self.guess.take().unwrap_or_else(|| polyhedron.touched.clone());
-        let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, guess);
-        let size = problem.gradient_norm();
-        let (PolyhedronSolution { q, faces }, damping) = limited(|lambda| problem.solve(lambda), size, radius);
+        let (PolyhedronSolution { q, faces }, damping) = match self.steps {
+            Steps::ActiveSet => {
+                let guess = self.guess.take().unwrap_or_else(|| polyhedron.touched.clone());
+                let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, guess);
+                let size = problem.gradient_norm();
+                limited(|lambda| problem.solve(lambda), size, radius)
+            }
+            Steps::InteriorPoint => {
+                let found = interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
+                let (q, damping) = found.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
+                (polyhedron.within(q, NEAR), damping)
+            }
+            Steps::Clamped => {
+                let q = (step.point - x).component_mul(&model.scale);
+                (polyhedron.within(q, 0.0), step.damping)
+            }
+        };
         // Exactly on the bounds that hold.
         let mut point = x + q.component_div(&model.scale);
         self.bounds.hold(&mut point, &faces.bounds);

@@ -1,7 +1,9 @@
 //! Linear least squares under linear inequalities by Clarabel's interior-point method.
 
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SupportedConeT, ZeroConeT};
+use clarabel::solver::{
+    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SupportedConeT, ZeroConeT,
+};
 use nalgebra::DVector;
 
 use super::Factor;
@@ -16,10 +18,15 @@ pub(super) struct HalfSpace {
     pub(super) least: f64,
 }
 
-/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces, in unknowns whose columns have length one.
+/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, ‖q‖ ≤ Δ; and the damping that stands for Δ.
 ///
-/// Unknowns are z = S q and y = B q + c, so that `BᵀB` is never formed; normals are brought to length one.
-pub(super) fn interior_point(factor: &Factor, lambda: f64, spaces: &[HalfSpace]) -> Option<DVector<f64>> {
+/// In unknowns whose columns have length one: z = S q and y = B q + c, so that `BᵀB` is never formed; normals are brought to length one.
+pub(super) fn interior_point(
+    factor: &Factor,
+    lambda: f64,
+    spaces: &[HalfSpace],
+    radius: Option<f64>,
+) -> Option<(DVector<f64>, f64)> {
     let matrix = factor.matrix();
     let (rows, n) = matrix.shape();
     let sizes: Vec<f64> = matrix
@@ -50,11 +57,19 @@ pub(super) fn interior_point(factor: &Factor, lambda: f64, spaces: &[HalfSpace])
         space.normal.iter().for_each(|&(j, g)| put(right.len(), j, -g / sizes[j] / length));
         right.push(-space.least / scale / length);
     }
+    if let Some(radius) = radius {
+        right.push(radius / scale);
+        for (j, size) in sizes.iter().enumerate() {
+            put(right.len(), j, -size.recip());
+            right.push(0.0);
+        }
+    }
     let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
     let diagonal: Vec<f64> = sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
     let indices: Vec<usize> = (0..n + rows).collect();
     let quadratic = CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
-    let cones: [SupportedConeT<f64>; 2] = [ZeroConeT(rows), NonnegativeConeT(spaces.len())];
+    let mut cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(rows), NonnegativeConeT(spaces.len())];
+    cones.extend(radius.map(|_| SecondOrderConeT(n + 1)));
     let settings = DefaultSettings {
         verbose: false,
         presolve_enable: false,
@@ -68,5 +83,8 @@ pub(super) fn interior_point(factor: &Factor, lambda: f64, spaces: &[HalfSpace])
     solver.solve();
     let z = solver.solution.x.get(..n)?;
     let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
-    q.iter().all(|v| v.is_finite()).then_some(q)
+    // The multiplier of the cone is λ q, in length λ Δ.
+    let damping = radius.and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));
+    let damping = damping.filter(|lambda| *lambda > TOLERANCE).unwrap_or(0.0);
+    q.iter().all(|v| v.is_finite()).then_some((q, damping))
 }

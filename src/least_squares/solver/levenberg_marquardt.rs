@@ -35,6 +35,13 @@ impl Model {
         Self { factor, scale: scale.clone() }
     }
 
+    /// The problem whose gradient is larger by ½ `bend`.
+    pub(super) fn bent(&self, bend: &DVector<f64>) -> Option<Factor> {
+        let bend = 0.5 * bend.component_div(&self.scale);
+        let shift = self.factor.matrix().tr_solve_upper_triangular(&bend)?;
+        Some(Factor::new(self.factor.matrix().clone(), self.factor.constant() + shift, self.factor.tolerance()))
+    }
+
     /// p = D⁻¹ q from x, with what the linearised problem says of it.
     ///
     /// With `(BᵀB + λ) q = −Bᵀc`: −gᵀp = ‖B q‖² + λ‖q‖², free of cancellation.
@@ -71,6 +78,11 @@ impl Subproblem for Unconstrained {
 
     fn free_gradient(&self, _x: &DVector<f64>, _j: usize, gradient: f64) -> f64 {
         gradient
+    }
+
+    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+        let model = self.model.as_ref()?;
+        Some(x + model.bent(bend)?.damped(damping).component_div(&model.scale))
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {

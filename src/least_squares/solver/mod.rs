@@ -15,14 +15,19 @@ mod pivoted;
 mod polyhedron;
 mod polyhedron_step;
 mod pseudo_inverse;
+mod reflective;
 mod run;
+mod second_order;
 mod settings;
 mod solution;
 mod spectrum;
 mod termination;
 mod trust_region;
 
-pub use bounded::{Constrained, bounded_levenberg_marquardt, constrained_levenberg_marquardt, nearest};
+pub use bounded::{
+    Constrained, bounded_levenberg_marquardt, clamped_levenberg_marquardt, constrained_levenberg_marquardt,
+    interior_point_levenberg_marquardt, nearest,
+};
 pub use bounds::{AtBound, Bounds, BoundsError};
 pub use divergence::Divergence;
 pub use factor::Factor;
@@ -32,10 +37,8 @@ pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use pseudo_inverse::{
     PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed, minimum_norm_step,
 };
-pub use run::{
-    minimise, minimise_bounded, minimise_bounded_observed, minimise_constrained, minimise_constrained_observed,
-    minimise_observed,
-};
+pub use reflective::{Reflective, reflective_levenberg_marquardt};
+pub use run::{Within, minimise, minimise_bounded, minimise_constrained, minimise_observed, minimise_within};
 pub use settings::Settings;
 pub use solution::Solution;
 pub use termination::Termination;

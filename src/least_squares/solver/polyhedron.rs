@@ -32,6 +32,13 @@ pub(super) struct Faces {
     pub(super) rows: Vec<bool>,
 }
 
+/// A step and the faces it lies on.
+#[derive(Debug, Clone)]
+pub(super) struct PolyhedronSolution {
+    pub(super) q: DVector<f64>,
+    pub(super) faces: Faces,
+}
+
 impl Faces {
     /// Unknowns at no bound.
     pub(super) fn free(&self) -> Vec<usize> {
@@ -78,16 +85,32 @@ impl Polyhedron {
     ///
     /// γ − Gᵀμ with μ ≥ 0 of the touched faces; those that would pull inwards are left.
     pub(super) fn free_part(&self, gradient: &DVector<f64>) -> DVector<f64> {
+        let (faces, mut left) = self.pressed(gradient);
+        (0..left.len()).filter(|&j| faces.bounds[j].is_some()).for_each(|j| left[j] = 0.0);
+        left
+    }
+
+    /// The touched faces that a step against `gradient` at q = 0 would leave, and the gradient without the half-spaces among them.
+    pub(super) fn pressed(&self, gradient: &DVector<f64>) -> (Faces, DVector<f64>) {
         let mut faces = self.touched.clone();
         loop {
-            let (mut left, multipliers) = self.multipliers(&faces, gradient);
+            let (left, multipliers) = self.multipliers(&faces, gradient);
             let kept = self.kept(&faces, &left, &multipliers, 0.0);
             if kept == faces {
-                (0..left.len()).filter(|&j| faces.bounds[j].is_some()).for_each(|j| left[j] = 0.0);
-                return left;
+                return (faces, left);
             }
             faces = kept;
         }
+    }
+
+    /// Normals of some faces, one a row.
+    pub(super) fn normals_of(&self, faces: &Faces) -> DMatrix<f64> {
+        let n = faces.bounds.len();
+        let (chosen, held) = (faces.chosen(), (0..n).filter(|&j| faces.bounds[j].is_some()).collect::<Vec<_>>());
+        let bounds = DMatrix::from_fn(held.len(), n, |i, j| f64::from(u8::from(held[i] == j)));
+        let mut rows = bounds.insert_rows(held.len(), chosen.len(), 0.0);
+        rows.rows_mut(held.len(), chosen.len()).copy_from(&self.normals.select_rows(&chosen));
+        rows
     }
 
     /// μ of the half-spaces among `faces`, the shortest where several do, and what they leave of `force`: the multipliers of
@@ -157,5 +180,37 @@ impl Polyhedron {
         let normal = |i: usize| self.normals.row(i).iter().copied().enumerate().filter(|&(_, g)| g != 0.0).collect();
         let rows = (0..self.least.len()).map(|i| HalfSpace { normal: normal(i), least: self.least[i] }).collect();
         [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
+    }
+
+    /// The faces no farther from `q` than `near`, relative to its size.
+    pub(super) fn faces_near(&self, q: &DVector<f64>, near: f64) -> Faces {
+        let distance = near * q.amax().max(f64::MIN_POSITIVE);
+        let bound = |j: usize| match q[j] {
+            value if value - self.lower[j] <= distance => Some(AtBound::Lower),
+            value if self.upper[j] - value <= distance => Some(AtBound::Upper),
+            _ => None,
+        };
+        let rows =
+            (&self.normals * q).iter().zip(&self.least).map(|(along, least)| along - least <= distance).collect();
+        Faces { bounds: (0..q.len()).map(bound).collect(), rows }
+    }
+
+    /// Into the box; a bound that overflowed to no number bounds nothing.
+    pub(super) fn clamped(&self, mut q: DVector<f64>) -> DVector<f64> {
+        (0..q.len()).for_each(|j| q[j] = q[j].max(self.lower[j]).min(self.upper[j]));
+        q
+    }
+
+    /// The part within the half-spaces of a step that is brought into the box, on the faces that are `near`; the way back to q = 0
+    /// is inside.
+    pub(super) fn within(&self, q: DVector<f64>, near: f64) -> PolyhedronSolution {
+        let q = self.clamped(q);
+        let part = (&self.normals * &q)
+            .iter()
+            .zip(&self.least)
+            .filter(|(along, least)| along < least)
+            .fold(1.0_f64, |part, (along, least)| part.min((least / along).clamp(0.0, 1.0)));
+        let q = q * part;
+        PolyhedronSolution { faces: self.faces_near(&q, near), q }
     }
 }

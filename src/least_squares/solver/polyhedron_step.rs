@@ -3,11 +3,12 @@
 use nalgebra::DVector;
 
 use super::interior::interior_point;
+pub(super) use super::polyhedron::PolyhedronSolution;
 use super::polyhedron::{Faces, Polyhedron};
 use super::{AtBound, Factor};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
-const NEAR: f64 = 1e-6;
+pub(super) const NEAR: f64 = 1e-6;
 /// Corrections of the active set allowed to a polish.
 const CORRECTIONS: usize = 30;
 /// Rounding allowed in the optimality conditions.
@@ -19,13 +20,6 @@ pub(super) struct PolyhedronProblem<'a> {
     gradient: DVector<f64>,
     polyhedron: &'a Polyhedron,
     guess: Faces,
-}
-
-/// A minimiser and the faces it lies on.
-#[derive(Debug, Clone)]
-pub(super) struct PolyhedronSolution {
-    pub(super) q: DVector<f64>,
-    pub(super) faces: Faces,
 }
 
 impl<'a> PolyhedronProblem<'a> {
@@ -42,9 +36,13 @@ impl<'a> PolyhedronProblem<'a> {
     /// The minimiser for damping λ, exact on its faces.
     pub(super) fn solve(&mut self, lambda: f64) -> PolyhedronSolution {
         let solution = self.polish(self.guess.clone(), lambda, 2).unwrap_or_else(|| {
-            let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces());
-            let polished = interior.as_ref().and_then(|q| self.polish(self.near(q), lambda, CORRECTIONS));
-            polished.unwrap_or_else(|| self.within(interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()))))
+            let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None).map(|(q, _)| q);
+            let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, NEAR);
+            let polished = interior.as_ref().and_then(|q| self.polish(near(q), lambda, CORRECTIONS));
+            polished.unwrap_or_else(|| {
+                let q = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
+                self.polyhedron.within(q, 0.0)
+            })
         });
         self.guess.clone_from(&solution.faces);
         solution
@@ -58,7 +56,7 @@ impl<'a> PolyhedronProblem<'a> {
             let q = self.on_faces(&faces, lambda);
             let corrected = self.corrected(&faces, &q, lambda);
             if corrected == faces {
-                let q = self.clamped(q);
+                let q = self.polyhedron.clamped(q);
                 let holds = (0..faces.rows.len()).all(|i| !self.polyhedron.leaves(i, &q));
                 return holds.then_some(PolyhedronSolution { q, faces });
             }
@@ -114,41 +112,6 @@ impl<'a> PolyhedronProblem<'a> {
         free.iter().zip(y.iter()).for_each(|(&j, value)| q[j] += value);
         q
     }
-
-    fn near(&self, q: &DVector<f64>) -> Faces {
-        let size = NEAR * q.amax().max(f64::MIN_POSITIVE);
-        self.faces_within(q, size)
-    }
-
-    /// The faces no farther from `q` than `distance`.
-    fn faces_within(&self, q: &DVector<f64>, distance: f64) -> Faces {
-        let Polyhedron { lower, upper, normals, least, .. } = self.polyhedron;
-        let bound = |j: usize| match q[j] {
-            value if value - lower[j] <= distance => Some(AtBound::Lower),
-            value if upper[j] - value <= distance => Some(AtBound::Upper),
-            _ => None,
-        };
-        let rows = (normals * q).iter().zip(least).map(|(along, least)| along - least <= distance).collect();
-        Faces { bounds: (0..q.len()).map(bound).collect(), rows }
-    }
-
-    /// Into the box; a bound that overflowed to no number bounds nothing.
-    fn clamped(&self, mut q: DVector<f64>) -> DVector<f64> {
-        (0..q.len()).for_each(|j| q[j] = q[j].max(self.polyhedron.lower[j]).min(self.polyhedron.upper[j]));
-        q
-    }
-
-    /// The part within the half-spaces of a step that is brought into the box; the way back to q = 0 is inside.
-    fn within(&self, q: DVector<f64>) -> PolyhedronSolution {
-        let q = self.clamped(q);
-        let part = (&self.polyhedron.normals * &q)
-            .iter()
-            .zip(&self.polyhedron.least)
-            .filter(|(along, least)| along < least)
-            .fold(1.0_f64, |part, (along, least)| part.min((least / along).clamp(0.0, 1.0)));
-        let q = q * part;
-        PolyhedronSolution { faces: self.faces_within(&q, 0.0), q }
-    }
 }
 
 #[cfg(test)]
@@ -178,7 +141,7 @@ mod tests {
         let check = |rows: &Inequalities, lambda: f64| {
             let polyhedron = Polyhedron::around(&DVector::zeros(n), &bounds, rows, &DVector::from_element(n, 1.0));
             let mut problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
-            let interior = interior_point(&factor, lambda, &polyhedron.half_spaces()).unwrap();
+            let interior = interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
             let solution = problem.solve(lambda);
             let cost =
                 |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();

@@ -5,8 +5,14 @@ use nalgebra::DVector;
 
 use super::execute::{Silent, run};
 use super::{Bounds, Inequalities, Settings, Solution, State, Termination};
-use super::{constrained_levenberg_marquardt, levenberg_marquardt, nearest};
+use super::{
+    clamped_levenberg_marquardt, constrained_levenberg_marquardt, interior_point_levenberg_marquardt,
+    levenberg_marquardt, nearest, reflective_levenberg_marquardt,
+};
 use crate::least_squares::Objective;
+
+/// Part of the width between bounds within which an interior point is beside a bound.
+const BESIDE: f64 = 1e-3;
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
 ///
@@ -60,6 +66,21 @@ pub fn minimise_observed<O: Objective>(
     run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, Some(observer))
 }
 
+/// How bounds are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Within {
+    /// [`constrained_levenberg_marquardt`].
+    #[default]
+    ActiveSet,
+    /// [`interior_point_levenberg_marquardt`].
+    InteriorPoint,
+    /// [`reflective_levenberg_marquardt`]; inequalities are not seen.
+    Reflective,
+    /// [`clamped_levenberg_marquardt`]; inequalities are not seen.
+    Clamped,
+}
+
 /// Minimises ½‖r(x)‖² within `bounds` from `start`.
 pub fn minimise_bounded<O: Objective>(
     objective: O,
@@ -67,18 +88,7 @@ pub fn minimise_bounded<O: Objective>(
     bounds: &Bounds,
     settings: &Settings,
 ) -> Solution {
-    constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings, None::<Silent>)
-}
-
-/// As [`minimise_bounded`], telling `observer` of every iteration.
-pub fn minimise_bounded_observed<O: Objective>(
-    objective: O,
-    start: DVector<f64>,
-    bounds: &Bounds,
-    settings: &Settings,
-    observer: impl Observe<State> + 'static,
-) -> Solution {
-    constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings, Some(observer))
+    minimise_constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings)
 }
 
 /// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` from `start`.
@@ -89,33 +99,40 @@ pub fn minimise_constrained<O: Objective>(
     rows: &Inequalities,
     settings: &Settings,
 ) -> Solution {
-    constrained(objective, start, bounds, rows, settings, None::<Silent>)
+    minimise_within(Within::ActiveSet, objective, start, (bounds, rows), settings, None::<Silent>)
 }
 
-/// As [`minimise_constrained`], telling `observer` of every iteration.
-pub fn minimise_constrained_observed<O: Objective>(
+/// The same in the way that `within` says, telling `observer` of every iteration.
+pub fn minimise_within<O: Objective>(
+    within: Within,
     objective: O,
     start: DVector<f64>,
-    bounds: &Bounds,
-    rows: &Inequalities,
-    settings: &Settings,
-    observer: impl Observe<State> + 'static,
-) -> Solution {
-    constrained(objective, start, bounds, rows, settings, Some(observer))
-}
-
-fn constrained<O: Objective>(
-    objective: O,
-    start: DVector<f64>,
-    bounds: &Bounds,
-    rows: &Inequalities,
+    (bounds, rows): (&Bounds, &Inequalities),
     settings: &Settings,
     observer: Option<impl Observe<State> + 'static>,
 ) -> Solution {
     let fits = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
     let infeasible = fits && nearest(&start, bounds, rows).is_none();
-    let solver = constrained_levenberg_marquardt(bounds.clone(), rows.clone(), *settings);
-    let mut solution = run(objective, start, solver, settings.max_iterations, observer);
+    let (box_alone, limit) = (bounds.clone(), settings.max_iterations);
+    let mut solution = match within {
+        Within::ActiveSet => {
+            let solver = constrained_levenberg_marquardt(box_alone, rows.clone(), *settings);
+            run(&objective, start, solver, limit, observer)
+        }
+        Within::InteriorPoint => {
+            let solver = interior_point_levenberg_marquardt(box_alone, rows.clone(), *settings);
+            run(&objective, start, solver, limit, observer)
+        }
+        Within::Reflective => {
+            let solver = reflective_levenberg_marquardt(box_alone, *settings);
+            let mut solution = run(&objective, start, solver, limit, observer);
+            if fits {
+                settle(&objective, bounds, &mut solution);
+            }
+            solution
+        }
+        Within::Clamped => run(&objective, start, clamped_levenberg_marquardt(box_alone, *settings), limit, observer),
+    };
     if infeasible {
         solution.termination = Termination::Infeasible;
     } else if fits {
@@ -123,4 +140,24 @@ fn constrained<O: Objective>(
         solution.at_limit = (0..rows.len()).map(|i| rows.at(&solution.x, i)).collect();
     }
     solution
+}
+
+/// Puts unknowns on bounds that they are near where that lowers the cost, each by itself.
+fn settle<O: Objective>(objective: &O, bounds: &Bounds, solution: &mut Solution) {
+    for j in 0..solution.x.len() {
+        for bound in [bounds.lower()[j], bounds.upper()[j]] {
+            let (value, width) = (solution.x[j], bounds.upper()[j] - bounds.lower()[j]);
+            let size = if width.is_finite() { width } else { bound.abs().max(value.abs()) };
+            if value == bound || (value - bound).abs() > BESIDE * size {
+                continue;
+            }
+            let mut settled = solution.x.clone();
+            settled[j] = bound;
+            let cost = objective.cost(&settled);
+            solution.cost_evaluations += 1;
+            if cost <= solution.cost {
+                (solution.x, solution.cost) = (settled, cost);
+            }
+        }
+    }
 }

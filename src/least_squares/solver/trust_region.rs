@@ -2,8 +2,9 @@
 
 use argmin::core::{ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason};
 use argmin::kv;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
+use super::second_order::{Convex, SecondOrder};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
@@ -12,6 +13,10 @@ pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// A step is taken when ρ reaches this.
 const ACCEPT: f64 = 1e-4;
+/// A step may be bent by this part of its length, and is made longer towards the other; shorter ones are tried so often.
+const BENT: f64 = 0.75;
+const WELL_BENT: f64 = 0.03;
+const BENDINGS: usize = 6;
 /// The radius grows when ρ reaches this.
 const GOOD: f64 = 0.75;
 
@@ -57,6 +62,25 @@ pub trait Subproblem {
         (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
     }
 
+    /// Whether the problem may be evaluated at x.
+    fn admits(&self, x: &DVector<f64>) -> bool {
+        let _ = x;
+        true
+    }
+
+    /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x that a step against the scaled
+    /// gradient would leave.
+    fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
+        let _ = (scale, gradient);
+        DMatrix::zeros(0, x.len())
+    }
+
+    /// The point that a step leads to whose model has a gradient larger by ½ `bend`, for the same damping.
+    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+        let _ = (x, bend, damping);
+        None
+    }
+
     /// The best step with ‖D p‖ ≤ `radius` to within 10 %.
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step;
 }
@@ -71,13 +95,26 @@ pub struct TrustRegion<S> {
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
+    second_order: SecondOrder,
+    /// The linearised problem at x, and the model with second derivatives that steps come from instead.
+    linearisation: Option<Linearisation>,
+    convex: Option<Convex>,
     termination: Option<Termination>,
 }
 
 impl<S: Subproblem> TrustRegion<S> {
     /// The loop around `subproblem`.
     pub fn new(subproblem: S, settings: Settings) -> Self {
-        Self { subproblem, settings, scale: DVector::zeros(0), radius: None, termination: None }
+        Self {
+            subproblem,
+            settings,
+            scale: DVector::zeros(0),
+            radius: None,
+            second_order: SecondOrder::default(),
+            linearisation: None,
+            convex: None,
+            termination: None,
+        }
     }
 
     /// Why it stopped, once it has.
@@ -96,8 +133,8 @@ impl<S: Subproblem> TrustRegion<S> {
     }
 
     /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is one.
-    fn take_in(&mut self, x: &DVector<f64>, linearisation: &Linearisation) -> Option<Termination> {
-        let Linearisation { cost, triangle, projected } = linearisation;
+    fn take_in(&mut self, x: &DVector<f64>, linearisation: Linearisation) -> Option<Termination> {
+        let Linearisation { cost, triangle, projected } = &linearisation;
         if !triangle.iter().chain(projected.iter()).all(|v| v.is_finite()) {
             return Some(Termination::DerivativesNotFinite);
         }
@@ -123,13 +160,54 @@ impl<S: Subproblem> TrustRegion<S> {
         if cosine <= f64::EPSILON {
             return Some(Termination::GradientPrecision);
         }
-        self.subproblem.prepare(x, linearisation, &self.scale, &self.settings);
         if self.radius.is_none() {
             let length = self.scale.component_mul(x).norm();
             let factor = self.settings.initial_radius;
             self.radius = Some(residual.max(if length > 0.0 { factor * length } else { factor }));
         }
+        self.linearisation = Some(linearisation);
         None
+    }
+
+    /// Hands the subproblem the model that steps come from.
+    fn prepare(&mut self, x: &DVector<f64>) {
+        let Some(linearisation) = &self.linearisation else { return };
+        let gradient = linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
+        let pressed = || self.subproblem.pressed(x, &self.scale, &gradient);
+        self.convex = self.second_order.model(linearisation, &self.scale, pressed);
+        let model = self.convex.as_ref().map_or(linearisation, |convex| &convex.linearisation);
+        self.subproblem.prepare(x, model, &self.scale, &self.settings);
+    }
+
+    /// The step from x, bent where that is called for, and by which part of its length; the radius becomes that which it took.
+    fn step<O: Objective>(
+        &mut self,
+        problem: &mut Problem<O>,
+        x: &DVector<f64>,
+        radius: &mut f64,
+    ) -> Result<(Step, Option<f64>), Error> {
+        let mut bendings = if self.second_order.bends() { BENDINGS } else { 0 };
+        loop {
+            let mut step = self.subproblem.step(x, *radius);
+            if let Some(convex) = &self.convex {
+                step.predicted += convex.excess(&(&step.point - x).component_mul(&self.scale));
+            }
+            if bendings == 0 || step.length == 0.0 {
+                return Ok((step, None));
+            }
+            let straight = &step.point - x;
+            let bend = problem.problem("bend_count", |o| Ok(o.bend(x, &straight)))?;
+            let Some(point) = bend.and_then(|bend| self.subproblem.bent(x, &bend, step.damping)) else {
+                return Ok((step, None));
+            };
+            let share = (&point - &step.point).component_mul(&self.scale).norm() / step.length;
+            if share <= BENT {
+                step.point = point;
+                return Ok((step, Some(share)));
+            }
+            *radius = step.length * (BENT / share).clamp(0.1, 0.5);
+            bendings -= 1;
+        }
     }
 
     /// The tests of MINPACK after a step, with relative reductions.
@@ -167,10 +245,12 @@ struct Trial {
     ratio: f64,
     length: f64,
     damping: f64,
+    /// By how much the radius grows after it.
+    growth: f64,
 }
 
 impl Trial {
-    fn new(step: &Step, before: f64, after: f64) -> Self {
+    fn new((step, share): (&Step, Option<f64>), before: f64, after: f64) -> Self {
         // A cost a hundred times the old one carries no information on curvature.
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
         let predicted = step.predicted / before;
@@ -183,6 +263,7 @@ impl Trial {
             ratio,
             length: step.length,
             damping: step.damping,
+            growth: share.map_or(2.0, |share| (WELL_BENT / share).clamp(1.5, 8.0)),
         }
     }
 
@@ -193,7 +274,7 @@ impl Trial {
             let shrink = if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
             shrink * radius.min(10.0 * self.length)
         } else if self.ratio >= GOOD || self.damping == 0.0 {
-            2.0 * self.length
+            self.growth * self.length
         } else {
             radius
         }
@@ -227,12 +308,13 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
             return Ok((self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch), None));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
-        let termination = if linearisation.cost.is_finite() {
-            self.take_in(&x, &linearisation)
-        } else {
-            Some(Termination::OutsideDomainAtStart)
-        };
-        let state = state.param(x).cost(linearisation.cost);
+        let cost = linearisation.cost;
+        let termination =
+            if cost.is_finite() { self.take_in(&x, linearisation) } else { Some(Termination::OutsideDomainAtStart) };
+        if termination.is_none() {
+            self.prepare(&x);
+        }
+        let state = state.param(x).cost(cost);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
     }
 
@@ -241,26 +323,33 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let cost = state.get_cost();
         let first = state.get_iter() == 0;
         let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
-        let step = self.subproblem.step(&x, radius);
+        let (step, share) = self.step(problem, &x, &mut radius)?;
         if first {
             radius = radius.min(step.length);
         }
         let after = problem.problem("cost_count", |o| Ok(o.cost(&step.point)))?;
-        let trial = Trial::new(&step, cost, if after.is_nan() { f64::INFINITY } else { after });
+        let trial = Trial::new((&step, share), cost, if after.is_nan() { f64::INFINITY } else { after });
         self.radius = Some(trial.next_radius(radius));
         let taken = trial.ratio >= ACCEPT;
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
         let mut termination = self.judge(&trial, size);
-        let state = if taken {
-            if termination.is_none() {
-                let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
-                termination = self.take_in(&step.point, &linearisation);
+        if taken && termination.is_none() {
+            let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
+            termination = self.take_in(&step.point, linearisation);
+        }
+        let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
+        if termination.is_none() {
+            let renew = self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping));
+            if renew {
+                let within = |x: &DVector<f64>| self.subproblem.admits(x);
+                self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
             }
-            state.param(step.point).cost(trial.cost)
-        } else {
-            state.param(x).cost(cost)
-        };
+            if taken || renew {
+                self.prepare(&x);
+            }
+        }
+        let state = state.param(x).cost(cost);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
     }
 }
