@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::bounded::Bounded;
 use crate::case::{Case, Class};
 use crate::common::file;
 use crate::common::ur10::Ur10;
@@ -21,10 +22,15 @@ const ERRORS: f64 = 0.3;
 const FAR: f64 = 5.0;
 const FAR_STARTS: usize = 3;
 
+/// Bounds that bind a little, much, and against the truth.
+const WITHIN: [&str; 3] = ["stiffness", "tight-geometry", "against-the-truth"];
+
 /// Every arm with its poses.
 pub struct Arms {
     ur10: [Ur10; 3],
     pub lunar: [Lunar; 2],
+    /// `tests/cases/bounded` with their names.
+    within: [(&'static str, Bounded); 3],
 }
 
 /// The lunar sampler with errors drawn as wide as a part of its priors, as it would be measured.
@@ -40,7 +46,11 @@ pub struct Lunar {
 
 impl Arms {
     pub fn new() -> Self {
-        Self { ur10: [100, 1000, 10_000].map(Ur10::new), lunar: [28, 200].map(Lunar::new) }
+        Self {
+            ur10: [100, 1000, 10_000].map(Ur10::new),
+            lunar: [28, 200].map(Lunar::new),
+            within: WITHIN.map(|name| (name, Bounded::read(name))),
+        }
     }
 
     pub fn cases(&self) -> Vec<Case<'_>> {
@@ -59,6 +69,18 @@ impl Arms {
                     accuracy: 0.0,
                 });
             }
+        }
+        for (name, own) in &self.within {
+            cases.push(Case {
+                class: Class::Bounded,
+                name: format!("lunar sampler, {name}"),
+                start: own.nominal(),
+                data: Box::new(own.residuals()),
+                priors: Some(own.priors()),
+                bounds: Some(own.bounds.clone()),
+                minima: Vec::new(),
+                accuracy: 0.0,
+            });
         }
         for lunar in &self.lunar {
             let nominal = DVector::zeros(lunar.truth.len());

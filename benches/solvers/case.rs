@@ -59,7 +59,8 @@ impl Class {
                  drawn from 0.3 of the priors) and from 5 σ of the prior off the true value of every parameter, up or down at random."
             }
             Self::Bounded => {
-                "The same within bounds as wide as 1 σ of the true errors: a third of the true values lie beyond. What ends \
+                "The same within bounds as wide as 1 σ of the true errors: a third of the true values lie beyond. And the arm of \
+                 `tests/cases/bounded` within three sets of bounds, the last against the truth. What ends \
                  outside the bounds has not reached the optimum."
             }
             Self::Sequential => {

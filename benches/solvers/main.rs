@@ -11,6 +11,9 @@
 )]
 
 mod arms;
+#[path = "../../tests/common/bounded.rs"]
+#[expect(dead_code, reason = "only some of it is needed here")]
+mod bounded;
 mod case;
 #[path = "../../tests/collections/mod.rs"]
 mod collections;

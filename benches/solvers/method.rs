@@ -3,10 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
+use argmin::core::observers::Observe;
+use flexcal::identify::SolverChoice;
 use flexcal::least_squares::LeastSquares as _;
 use flexcal::least_squares::solver::{
-    Bounds, GaussNewtonSettings, PseudoInverseSettings, Solution, minimise, minimise_bounded, minimise_gauss_newton,
-    minimise_pseudo_inverse,
+    Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State, Within, minimise,
+    minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
 };
 use nalgebra::DVector;
 
@@ -19,13 +21,17 @@ use crate::watched::Watched;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     LevenbergMarquardt,
-    Bounded,
+    Bounded(Within),
     GaussNewton,
     PseudoInverse,
     TrustRegion,
     Lbfgs,
     Minpack,
 }
+
+struct Silent;
+
+impl Observe<State> for Silent {}
 
 /// What a solver left behind.
 pub struct Run {
@@ -55,9 +61,12 @@ impl From<Solution> for End {
 }
 
 impl Method {
-    pub const EACH: [Self; 7] = [
+    pub const EACH: [Self; 10] = [
         Self::LevenbergMarquardt,
-        Self::Bounded,
+        Self::Bounded(Within::ActiveSet),
+        Self::Bounded(Within::InteriorPoint),
+        Self::Bounded(Within::Reflective),
+        Self::Bounded(Within::Clamped),
         Self::GaussNewton,
         Self::PseudoInverse,
         Self::TrustRegion,
@@ -68,7 +77,10 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::LevenbergMarquardt => "levenberg-marquardt",
-            Self::Bounded => "bounded",
+            Self::Bounded(within) => {
+                let own = SolverChoice::EACH.into_iter().find(|solver| solver.within() == Some(within));
+                own.map_or("bounded", SolverChoice::as_str)
+            }
             Self::GaussNewton => "gauss-newton",
             Self::PseudoInverse => "pseudo-inverse",
             Self::TrustRegion => "argmin trust region",
@@ -96,9 +108,10 @@ impl Method {
         let fit = case.fit(data);
         match self {
             Self::LevenbergMarquardt => minimise(fit, start, &settings).into(),
-            Self::Bounded => {
+            Self::Bounded(within) => {
                 let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
-                minimise_bounded(fit, start, &bounds, &settings).into()
+                let rows = Inequalities::none(data.parameters());
+                minimise_within(within, fit, start, (&bounds, &rows), &settings, None::<Silent>).into()
             }
             Self::GaussNewton => {
                 let tolerance = settings.cost_tolerance.sqrt().min(GaussNewtonSettings::default().tolerance);

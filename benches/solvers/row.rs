@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use flexcal::identify::{Options, SolverChoice, Strategy, identify};
+use flexcal::least_squares::solver::Within;
 use nalgebra::DVector;
 
 use crate::arms::Lunar;
@@ -38,7 +39,11 @@ pub struct Row {
 
 /// Every solver on `case`, repeated in turn.
 pub fn measure(case: &Case) -> Vec<Row> {
-    let (runs, seconds) = repeated(Method::EACH.len(), |k| Method::EACH[k].run(case), |run| run.seconds);
+    // Without bounds those that keep them all do the same; one is enough.
+    let bounded = case.bounds.is_some();
+    let tells = |method: &Method| bounded || !matches!(method, Method::Bounded(within) if *within != Within::ActiveSet);
+    let methods: Vec<Method> = Method::EACH.into_iter().filter(tells).collect();
+    let (runs, seconds) = repeated(methods.len(), |k| methods[k].run(case), |run| run.seconds);
     let found = || runs.iter().map(|run| run.cost);
     let best = |listed: f64| {
         let near = found().filter(|cost| (cost / listed - 1.0).abs() <= case.accuracy);
@@ -60,7 +65,7 @@ pub fn measure(case: &Case) -> Vec<Row> {
         jacobians: Some(run.jacobians),
         seconds,
     };
-    runs.iter().zip(seconds).zip(Method::EACH).map(row).collect()
+    runs.iter().zip(seconds).zip(methods).map(row).collect()
 }
 
 fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
@@ -93,7 +98,8 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
         (whole.cost(&found.x), found, seconds)
     };
     let (best, ..) = cost(&joint);
-    let each = SolverChoice::EACH;
+    let tells = |solver: &SolverChoice| matches!(solver.within(), None | Some(Within::ActiveSet));
+    let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(tells).collect();
     let solve = |k: usize| cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]));
     let (runs, seconds) = repeated(each.len(), solve, |run| run.2);
     let row = |((run, seconds), solver): ((&(f64, flexcal::identify::Identification, f64), f64), SolverChoice)| {

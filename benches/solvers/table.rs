@@ -10,7 +10,8 @@ const HEAD: &str = "# Solvers side by side
 
 Written by `cargo bench --bench solvers`; do not edit. What the table means for the choice of a solver: [docs/solvers.md](../docs/solvers.md).
 
-- Solvers that `identify --solver` offers: `levenberg-marquardt`, `bounded` (Levenberg–Marquardt within bounds),
+- Solvers that `identify --solver` offers: `levenberg-marquardt`, `bounded` (Levenberg–Marquardt within bounds), where there
+  are bounds also `interior-point`, `reflective` and `clamped`,
   `gauss-newton` (argmin's, undamped), `pseudo-inverse` (the paper's iteration, undamped). Beside them argmin's trust region
   (Steihaug, Gauss–Newton Hessian) and L-BFGS on ½‖r‖², unknowns scaled by the columns of the first Jacobian, and the MINPACK
   port of the crate `levenberg-marquardt`. All see the same residuals and derivatives.

@@ -12,7 +12,16 @@ from ._results import Check, ClosedLoop, Identification, Plan, Trace
 from ._tables import Data, Path, source, warn
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
-Solver: TypeAlias = Literal["auto", "levenberg-marquardt", "gauss-newton", "pseudo-inverse", "bounded"]
+Solver: TypeAlias = Literal[
+    "auto",
+    "levenberg-marquardt",
+    "gauss-newton",
+    "pseudo-inverse",
+    "bounded",
+    "interior-point",
+    "reflective",
+    "clamped",
+]
 Criterion: TypeAlias = Literal["S", "A", "D", "E"]
 
 TEXT = "<text>"

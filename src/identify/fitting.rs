@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::alternation::{Alternation, Anderson, contraction};
 use super::assumed::Assumed;
 use super::errors::of_kind;
 use super::placement::HeldOutOnly;
@@ -18,9 +19,9 @@ use crate::model::{Model, Pose};
 use crate::problem::{Fixture, Observation};
 
 /// Sweeps after which a sequential strategy is given up.
-const MAX_SWEEPS: usize = 2000;
+const MAX_SWEEPS: usize = 500;
 /// A sequential strategy has settled when a sweep lowers the cost by less than this part.
-const SWEEP_SETTLED: f64 = 1e-6;
+const SWEEP_SETTLED: f64 = 1e-7;
 /// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage changes are wasted.
 const SWEEP_STEPS: u64 = 2;
 
@@ -59,6 +60,23 @@ pub(super) struct FitEnd {
     /// For each unknown of the fit.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
+    /// How several stages took turns.
+    pub alternation: Option<Alternation>,
+}
+
+impl FitEnd {
+    /// Of a fit of so many unknowns that has not begun.
+    fn at(start: &DVector<f64>, unknowns: usize) -> Self {
+        Self {
+            x: start.clone(),
+            termination: Termination::IterationLimit,
+            iterations: 0,
+            evaluations: 0,
+            at_bound: vec![None; unknowns],
+            gauge: Gauge::default(),
+            alternation: None,
+        }
+    }
 }
 
 impl From<StageEnd> for FitEnd {
@@ -66,7 +84,7 @@ impl From<StageEnd> for FitEnd {
         let StageEnd { x, solution, gauge } = end;
         let evaluations = solution.evaluations();
         let (termination, iterations) = (solution.termination, solution.iterations);
-        Self { x, termination, iterations, evaluations, at_bound: solution.at_bound, gauge }
+        Self { x, termination, iterations, evaluations, at_bound: solution.at_bound, gauge, alternation: None }
     }
 }
 
@@ -170,46 +188,83 @@ impl<'a> Fitting<'a> {
         if rest.is_empty() {
             return Ok(self.strategy_stage(self.choose(first)).run(start)?.into());
         }
-        let mut end = FitEnd {
-            x: start.clone(),
-            termination: Termination::IterationLimit,
-            iterations: 0,
-            evaluations: 0,
-            at_bound: vec![None; whole.unknowns.len()],
-            gauge: Gauge::default(),
+        if self.strategy == Strategy::OneSweep {
+            let mut end = FitEnd::at(start, whole.unknowns.len());
+            end.termination = self.sweep(&whole, &mut end, None)?;
+            return Self::gauged(&whole, end);
+        }
+        let mut end = self.alternate(&whole, start)?;
+        let stages: Vec<Vec<usize>> = self.strategy.stages().iter().map(|chosen| self.choose(chosen)).collect();
+        let free = |k: &usize| end.at_bound[*k].is_none();
+        let places = |stage: &Vec<usize>| {
+            let place = |k: &usize| whole.unknowns.iter().position(|unknown| unknown == k).filter(free);
+            stage.iter().filter_map(place).collect::<Vec<usize>>()
         };
+        let stages: Vec<Vec<usize>> = stages.iter().map(places).collect();
+        if let Some(alternation) = &mut end.alternation {
+            alternation.contraction = contraction(&whole.triangle_with_priors(&end.x), &stages);
+        }
+        Self::gauged(&whole, end)
+    }
+
+    /// Sweeps over the strategy's stages, accelerated, until the cost settles.
+    fn alternate(&self, whole: &Stage, start: &DVector<f64>) -> Result<FitEnd, StageError> {
+        let mut end = FitEnd::at(start, whole.unknowns.len());
+        let scale = whole.triangle_with_priors(start).column_iter().map(|column| column.norm()).collect::<Vec<f64>>();
+        let scale = DVector::from_vec(scale);
+        let mut anderson = Anderson::default();
         let mut cost = f64::INFINITY;
         // Short stages may all be turned back where a long one gets on: only a sweep of long ones can end it.
-        let mut long = self.strategy == Strategy::OneSweep;
-        for _ in 0..MAX_SWEEPS {
-            let mut termination = Termination::Cost;
-            for chosen in self.strategy.stages() {
-                let mut stage = self.strategy_stage(self.choose(chosen));
-                if !long {
-                    stage.max_steps = SWEEP_STEPS;
-                }
-                let StageEnd { x, solution, .. } = stage.run(&end.x)?;
-                end.x = x;
-                end.iterations += solution.iterations;
-                end.evaluations += solution.evaluations();
-                if termination.converged() {
-                    termination = solution.termination;
-                }
-                for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
-                    if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
-                        end.at_bound[j] = at_bound;
-                    }
-                }
-            }
+        let mut long = false;
+        for sweep in 1..=MAX_SWEEPS {
+            let begin = whole.reduced(&end.x);
+            let termination = self.sweep(whole, &mut end, (!long).then_some(SWEEP_STEPS))?;
+            end.alternation = Some(Alternation { sweeps: sweep, contraction: None });
             let next = whole.cost(&end.x);
             let settled = cost - next <= SWEEP_SETTLED * next;
-            if self.strategy == Strategy::OneSweep || !next.is_finite() || (settled && long) {
+            if !next.is_finite() || (settled && long) {
                 end.termination = termination;
                 break;
             }
             long = settled;
             cost = next;
+            if let Some(tried) = anderson.next(&begin, &whole.reduced(&end.x), &scale) {
+                let tried = whole.full(&end.x, &tried);
+                end.evaluations += 1;
+                if whole.allows(&tried)? && whole.cost(&tried) < cost {
+                    end.x = tried;
+                } else {
+                    anderson.restart();
+                }
+            }
         }
+        Ok(end)
+    }
+
+    /// One sweep over the strategy's stages, each of so many steps at most; why it ended.
+    fn sweep(&self, whole: &Stage, end: &mut FitEnd, steps: Option<u64>) -> Result<Termination, StageError> {
+        let mut termination = Termination::Cost;
+        for chosen in self.strategy.stages() {
+            let mut stage = self.strategy_stage(self.choose(chosen));
+            stage.max_steps = steps.unwrap_or(stage.max_steps);
+            let StageEnd { x, solution, .. } = stage.run(&end.x)?;
+            end.x = x;
+            end.iterations += solution.iterations;
+            end.evaluations += solution.evaluations();
+            if termination.converged() {
+                termination = solution.termination;
+            }
+            for (k, at_bound) in stage.unknowns.iter().zip(solution.at_bound) {
+                if let Some(j) = whole.unknowns.iter().position(|unknown| unknown == k) {
+                    end.at_bound[j] = at_bound;
+                }
+            }
+        }
+        Ok(termination)
+    }
+
+    /// With the combinations that nothing decides.
+    fn gauged(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
         Ok(end)

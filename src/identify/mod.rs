@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod active;
+mod alternation;
 mod applied;
 mod assumed;
 mod baseline;
@@ -23,11 +24,13 @@ mod outcome;
 mod outliers;
 mod placement;
 mod predict;
+mod prices;
 mod procedure;
 mod progress;
 mod quality;
 mod registration;
 mod saved;
+mod shadow_price;
 mod sizes;
 mod solver_choice;
 mod spread;
@@ -38,6 +41,7 @@ mod surroundings;
 
 pub use acceptance::{Acceptance, AcceptancePose, Accuracy, acceptance};
 pub use active::ActiveConstraint;
+pub use alternation::Alternation;
 pub use applied::{ErrorsBySession, PredictError, Prediction, predict};
 pub use baseline::Baseline;
 pub use cautions::Caution;
@@ -56,6 +60,7 @@ pub use procedure::{Procedure, TableEntry};
 pub use progress::{Progress, ProgressSink};
 pub use quality::{QualityFlag, TooFewPoses};
 pub use saved::{SavedEstimate, SavedEstimateError};
+pub use shadow_price::ShadowPrice;
 pub use solver_choice::SolverChoice;
 pub use spread::PointSpread;
 pub use stage::StageError;

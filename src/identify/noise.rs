@@ -17,6 +17,9 @@ use crate::model::Pose;
 const NOISE_SETTLED: f64 = 1e-3;
 /// A declared σ that is contradicted has settled when it changes by less than this part: standard errors tell no more.
 const SCALE_SETTLED: f64 = 0.01;
+/// Steps after which a declared σ is judged first, where everything is fitted at once: where it is contradicted, its optimum may
+/// be far away, and is not wanted.
+const FIRST_STEPS: u64 = 30;
 /// Fits after which the search for σ stops.
 const MAX_NOISE_FITS: usize = 20;
 /// Runs the strategy until the σ that it takes is the one declared or, where residual and priors contradict that, the one they
@@ -31,7 +34,13 @@ pub(super) fn fitted(
     let mut begin = start.clone();
     loop {
         fits += 1;
+        let limit = fitting.max_steps;
+        let first = fits == 1 && noise_is_declared && judged && fitting.strategy.stages().len() == 1;
+        if first {
+            fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
+        }
         let end = fitting.run(&begin)?;
+        fitting.max_steps = limit;
         let whole = fitting.whole();
         let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.assumed))?;
         if noise_is_declared {
@@ -44,6 +53,7 @@ pub(super) fn fitted(
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
                 }
+                None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => begin = end.x,
                 None => return Ok((end, statistics, Noise::Declared)),
             }
             continue;

@@ -7,8 +7,8 @@ use super::fitting::FitEnd;
 use super::stage::Stage;
 use super::statistics::Statistics;
 use super::{
-    ActiveConstraint, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag, SolverChoice, Strategy,
-    TooFewPoses,
+    ActiveConstraint, Alternation, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag, ShadowPrice,
+    SolverChoice, Strategy, TooFewPoses,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{BlindCombination, Identifiability};
@@ -49,6 +49,8 @@ pub struct Estimate {
     pub std_error: Option<f64>,
     /// The bound on which the value rests.
     pub at_bound: Option<AtBound>,
+    /// What that costs.
+    pub shadow_price: Option<ShadowPrice>,
     /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among blind combinations.
     pub identified: f64,
     /// Whether the strategy varied it.
@@ -81,6 +83,8 @@ pub struct Identification {
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.
     pub evaluations: u64,
+    /// How the stages of a sequential strategy took turns.
+    pub alternation: Option<Alternation>,
     /// Time taken \[s\].
     pub seconds: f64,
     /// Where the noise comes from.
@@ -178,6 +182,7 @@ impl Estimate {
             estimate: parameter.nominal,
             std_error: None,
             at_bound: None,
+            shadow_price: None,
             identified: 0.0,
             fitted: false,
         }
@@ -199,6 +204,7 @@ pub(super) fn enter(
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));
         estimate.at_bound = end.at_bound[j];
+        estimate.shadow_price = statistics.prices.bounds[j];
         estimate.identified = statistics.identified[j];
         estimate.fitted = true;
     }

@@ -129,6 +129,33 @@ impl<'a> Stage<'a> {
         Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
     }
 
+    /// The same with the rows of the priors below.
+    pub fn triangle_with_priors(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        below(&self.weighted_triangle(at), &self.priors())
+    }
+
+    /// The unknowns' entries of the full parameter vector `at`.
+    pub fn reduced(&self, at: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]))
+    }
+
+    /// The full parameter vector `at` with other unknowns x.
+    pub fn full(&self, at: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
+        let mut full = at.clone();
+        self.unknowns.iter().zip(x.iter()).for_each(|(&k, value)| full[k] = *value);
+        full
+    }
+
+    /// Whether the full parameter vector `at` keeps bounds and constraints.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn allows(&self, at: &DVector<f64>) -> Result<bool, StageError> {
+        let inside =
+            self.unknowns.iter().zip(self.parameters()).all(|(&k, own)| own.lower <= at[k] && at[k] <= own.upper);
+        Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
+    }
+
     /// Combinations of the unknowns that are not `held` which data, priors and `active` constraints leave open at `at`.
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
@@ -264,7 +291,7 @@ impl<'a> Stage<'a> {
     }
 
     /// One row x / σ for each unknown with a prior.
-    fn priors(&self) -> DMatrix<f64> {
+    pub fn priors(&self) -> DMatrix<f64> {
         let sigmas: Vec<(usize, f64)> =
             self.parameters().enumerate().filter_map(|(j, parameter)| Some((j, parameter.sigma?))).collect();
         let mut rows = DMatrix::zeros(sigmas.len(), self.unknowns.len());

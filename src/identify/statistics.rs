@@ -7,6 +7,7 @@ use super::active::{Held, confine};
 use super::assumed::{Assumed, IMPROBABLE};
 use super::fitting::FitEnd;
 use super::outliers::Lengths;
+use super::prices::Prices;
 use super::stage::{Stage, StageError};
 use crate::least_squares::{Identifiability, Loss, Uncertainty};
 
@@ -30,6 +31,8 @@ pub(super) struct Statistics {
     pub chance: Option<(f64, f64)>,
     /// The constraints that hold back.
     pub constraints: Vec<Held>,
+    /// What bounds and constraints cost.
+    pub prices: Prices,
     /// Lengths of the residuals.
     pub lengths: Lengths,
 }
@@ -87,6 +90,7 @@ impl Statistics {
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             chance: chance(freedom),
+            prices: stage.prices(&end.x, &end.at_bound, &constraints)?,
             constraints,
             lengths,
         })

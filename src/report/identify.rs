@@ -10,6 +10,7 @@ use super::errors::{NOMINAL, measure, row, unpredicted};
 use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
+use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
 use super::quantity::{decimals, mm, number};
 use super::render::{Report, report, text};
@@ -35,6 +36,7 @@ object! {
         termination: &'a str = found.termination.as_str(),
         trusted: bool = found.is_trusted(),
         iterations: u64 = found.iterations,
+        alternation: Option<AlternationEntry> = found.alternation.map(AlternationEntry::of),
         seconds: f64 = found.seconds,
         registered: Both = Both::of(&found.registered),
         #[serde(flatten)]
@@ -76,6 +78,7 @@ object! {
         estimate: f64 = estimate.estimate,
         std_error: Option<f64> = estimate.std_error,
         at_bound: Option<&'a str> = estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
+        shadow_price: Option<PriceEntry> = estimate.shadow_price.map(|price| PriceEntry::of(price, estimate.unit)),
         identified: f64 = estimate.identified,
         fitted: bool = estimate.fitted,
     }
@@ -115,6 +118,7 @@ object! {
         constraint: &'a str = &active.words,
         side: &'a str = side(active.side, ["at_least", "at_most"]),
         line: Option<usize> = active.location.line,
+        shadow_price: PriceEntry = PriceEntry::of(active.shadow_price, active.unit),
     }
 }
 object! {
@@ -146,6 +150,8 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
     blocks.extend(active_constraints(found));
+    blocks.extend(shadow_prices(found));
+    blocks.extend(alternation(found));
     blocks.extend(told(found, FILE));
     text(&blocks)
 }
@@ -310,6 +316,8 @@ pub(super) fn remainder<'a>(
     blocks.extend(lower_waves(problem, found, file));
     blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
     blocks.extend(active_constraints(found).map(|own| Block::Page(vec![own])));
+    blocks.extend(shadow_prices(found).map(|own| Block::Page(vec![own])));
+    blocks.extend(alternation(found).map(|own| Block::Page(vec![own])));
     blocks.push(Block::heading("What the poses can tell"));
     blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&found.identifiability)]));
     blocks.extend(told(found, file));

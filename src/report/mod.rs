@@ -22,6 +22,7 @@ mod forecast;
 mod identify;
 mod init;
 mod json;
+mod limits;
 mod paper_tables;
 mod parameters;
 mod plan;

@@ -302,6 +302,7 @@ mod tests {
             std_error: None,
             identified: 1.0,
             at_bound: None,
+            shadow_price: None,
             fitted: true,
         }
     }

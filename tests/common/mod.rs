@@ -3,5 +3,6 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 pub mod arms;
+pub mod bounded;
 pub mod effects;
 pub mod made;

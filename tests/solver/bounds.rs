@@ -1,10 +1,17 @@
 //! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the answers of `SciPy`.
 
-use flexcal::least_squares::solver::{AtBound, Bounds, Termination, minimise, minimise_bounded};
+use argmin::core::observers::Observe;
+use flexcal::least_squares::solver::{
+    AtBound, Bounds, Inequalities, State, Termination, Within, minimise, minimise_bounded, minimise_within,
+};
 use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::DVector;
 
 use super::bench::{Guarded, analytic, tight, vector};
+
+struct Silent;
+
+impl Observe<State> for Silent {}
 
 #[test]
 fn without_active_bounds_as_without_bounds() {
@@ -79,6 +86,17 @@ fn several_active_bounds_as_scipy() {
         println!("{} iterations, {}, cost {:.15}", solution.iterations, solution.termination, solution.cost);
         assert!(solution.termination.converged());
         assert_eq!(solution.at_bound, active);
+        let none = Inequalities::none(x.len());
+        for within in [Within::InteriorPoint, Within::Reflective, Within::Clamped] {
+            let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
+            let start = vector(&start);
+            let other = minimise_within(within, guarded, start, (&bounds, &none), &tight(), None::<Silent>);
+            println!("  {within:?}: {} iterations, {}, cost {:.15}", other.iterations, other.termination, other.cost);
+            assert!(other.cost >= cost * (1.0 - 1e-9), "{within:?}: {}", other.cost);
+            // The naive way may stop short.
+            assert!(within == Within::Clamped || other.cost <= cost * (1.0 + 1e-8), "{within:?}: {}", other.cost);
+            assert!(within == Within::Clamped || other.at_bound == active, "{within:?}: {:?}", other.at_bound);
+        }
         assert!((solution.cost / cost - 1.0).abs() < 1e-9, "{}", solution.cost);
         assert!((&solution.x - vector(&x)).amax() < 1e-6, "{}", solution.x);
         for (j, bound) in active.iter().enumerate() {

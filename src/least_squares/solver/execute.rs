@@ -43,8 +43,11 @@ pub(super) fn run<O: Objective, S: Solver<O, State> + Ends>(
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };
     let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
-    solution.cost_evaluations = count("cost_count");
-    solution.linearisations = count("linearise_count");
+    // A bend takes a residual and a linearisation, second derivatives one linearisation more than there are unknowns.
+    let bends = count("bend_count");
+    solution.cost_evaluations = count("cost_count") + bends;
+    solution.linearisations =
+        count("linearise_count") + bends + count("curvature_count") * (solution.x.len() as u64 + 1);
     solution.iterations = result.state.get_iter();
     solution.termination = match (result.solver.end(), result.state.get_termination_status()) {
         (Some(termination), _) => termination,

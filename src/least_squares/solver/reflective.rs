@@ -125,8 +125,8 @@ impl Subproblem for Reflective {
         self.bounds.clamp(start);
         for j in 0..n {
             let (lower, upper) = (self.bounds.lower()[j], self.bounds.upper()[j]);
-            let least = lower + INSIDE * lower.abs().max(1.0);
-            let most = upper - INSIDE * upper.abs().max(1.0);
+            let room = |bound: f64| if bound.is_finite() { INSIDE * bound.abs().max(1.0) } else { 0.0 };
+            let (least, most) = (lower + room(lower), upper - room(upper));
             start[j] = if least <= most { start[j].clamp(least, most) } else { 0.5 * (lower + upper) };
         }
         true

@@ -124,18 +124,16 @@ pub fn minimise_within<O: Objective>(
             run(&objective, start, solver, limit, observer)
         }
         Within::Reflective => {
-            let solver = reflective_levenberg_marquardt(box_alone, *settings);
-            let mut solution = run(&objective, start, solver, limit, observer);
-            if fits {
-                settle(&objective, bounds, &mut solution);
-            }
-            solution
+            run(&objective, start, reflective_levenberg_marquardt(box_alone, *settings), limit, observer)
         }
         Within::Clamped => run(&objective, start, clamped_levenberg_marquardt(box_alone, *settings), limit, observer),
     };
     if infeasible {
         solution.termination = Termination::Infeasible;
     } else if fits {
+        if matches!(within, Within::InteriorPoint | Within::Reflective) {
+            settle(&objective, bounds, rows, &mut solution);
+        }
         solution.at_bound = (0..solution.x.len()).map(|j| bounds.at(&solution.x, j)).collect();
         solution.at_limit = (0..rows.len()).map(|i| rows.at(&solution.x, i)).collect();
     }
@@ -143,16 +141,20 @@ pub fn minimise_within<O: Objective>(
 }
 
 /// Puts unknowns on bounds that they are near where that lowers the cost, each by itself.
-fn settle<O: Objective>(objective: &O, bounds: &Bounds, solution: &mut Solution) {
+fn settle<O: Objective>(objective: &O, bounds: &Bounds, rows: &Inequalities, solution: &mut Solution) {
     for j in 0..solution.x.len() {
         for bound in [bounds.lower()[j], bounds.upper()[j]] {
             let (value, width) = (solution.x[j], bounds.upper()[j] - bounds.lower()[j]);
             let size = if width.is_finite() { width } else { bound.abs().max(value.abs()) };
-            if value == bound || (value - bound).abs() > BESIDE * size {
+            let distance = (value - bound).abs();
+            if !bound.is_finite() || distance == 0.0 || distance > BESIDE * size {
                 continue;
             }
             let mut settled = solution.x.clone();
             settled[j] = bound;
+            if !rows.contain(&settled) {
+                continue;
+            }
             let cost = objective.cost(&settled);
             solution.cost_evaluations += 1;
             if cost <= solution.cost {

@@ -8,13 +8,21 @@ use crate::least_squares::Linearisation;
 const FORECAST: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// Misses after which steps are bent.
 const BENDING_MISSES: usize = 2;
-/// Misses, and slow steps, of linearised residuals after which S is formed.
+/// Misses, and slow steps, of linearised residuals after which S is formed; for many unknowns, such a part of their number, since
+/// forming S costs about as many linearisations as there are unknowns.
 const MISSES: usize = 6;
+const MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
 const SLOW_STEPS: usize = 3;
+const SLOW_STEPS_PER_UNKNOWN: f64 = 1.0 / 12.0;
+/// Steps for each unknown after which S may be formed again.
+const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
 /// A step without damping is slow if it is longer than this part of the one before.
 const SLOW: f64 = 0.5;
 /// What keeps a step on the faces that it presses against, over the largest curvature.
 const WALL: f64 = 1e3;
+/// μ over the most negative curvature, and over the largest one at least.
+const BEYOND: f64 = 1.01;
+const LEAST_DAMPING: f64 = 1e-10;
 
 /// Second derivatives, once linearised residuals have missed too often.
 ///
@@ -29,8 +37,9 @@ pub(super) struct SecondOrder {
     /// ‖D p‖ of the last step without damping.
     last: Option<f64>,
     matrix: Option<DMatrix<f64>>,
-    /// Whether S was formed at the present point.
+    /// Whether S was formed at the present point, and how many steps ago.
     fresh: bool,
+    age: usize,
 }
 
 /// What a step gains in a quadratic model that is convex, and what was added to make it so.
@@ -58,14 +67,22 @@ impl SecondOrder {
     }
 
     /// Takes in a step of length ‖D p‖; whether S should be formed at the point where the solver is now.
-    pub fn judge(&mut self, ratio: f64, taken: bool, (length, damping): (f64, f64)) -> bool {
+    pub fn judge(&mut self, ratio: f64, taken: bool, (length, damping): (f64, f64), unknowns: usize) -> bool {
         let missed = !FORECAST.contains(&ratio);
         let slow = taken && damping == 0.0 && self.last.is_some_and(|last| length > SLOW * last);
         self.last = (taken && damping == 0.0).then_some(length);
         self.misses += usize::from(missed);
         self.slow += usize::from(slow);
         self.fresh = self.fresh && !taken;
-        let enough = self.matrix.is_some() || self.misses >= MISSES || self.slow >= SLOW_STEPS;
+        self.age += 1;
+        let part = |part: f64| part * unknowns as f64;
+        let enough = match self.matrix {
+            Some(_) => self.age as f64 >= part(STEPS_PER_UNKNOWN),
+            None => {
+                self.misses as f64 >= part(MISSES_PER_UNKNOWN).max(MISSES as f64)
+                    || self.slow as f64 >= part(SLOW_STEPS_PER_UNKNOWN).max(SLOW_STEPS as f64)
+            }
+        };
         (missed || slow) && enough && !self.fresh
     }
 
@@ -73,7 +90,7 @@ impl SecondOrder {
     pub fn renew(&mut self, matrix: Option<DMatrix<f64>>) {
         if let Some(matrix) = matrix {
             self.matrix = Some(matrix);
-            self.fresh = true;
+            (self.fresh, self.age) = (true, 0);
         }
     }
 
@@ -96,26 +113,24 @@ impl SecondOrder {
         let mut gradient = found.triangle.tr_mul(&found.projected);
         gradient.component_div_assign(scale);
         let largest = hessian.diagonal().amax();
-        let none = DMatrix::zeros(0, n);
         let root = |hessian: &DMatrix<f64>| {
             let root = hessian.clone().cholesky()?.unpack();
             let floor = largest.sqrt() * n as f64 * f64::EPSILON.sqrt();
             root.diagonal().iter().all(|value| *value > floor).then_some(root)
         };
-        let (root, damping, walls) = match root(&hessian) {
-            Some(root) => (root, 0.0, none),
+        let (mut damping, mut walls) = (0.0, DMatrix::zeros(0, n));
+        let mut found_root = root(&hessian);
+        if found_root.is_none() {
+            walls = pressed() * (WALL * largest).sqrt();
+            hessian += walls.tr_mul(&walls);
+            found_root = root(&hessian);
+        }
+        let root = match found_root {
+            Some(root) => root,
             None => {
-                let walls = pressed() * (WALL * largest).sqrt();
-                hessian += walls.tr_mul(&walls);
-                match root(&hessian) {
-                    Some(root) => (root, 0.0, walls),
-                    None => {
-                        let least = hessian.symmetric_eigenvalues().min();
-                        let damping = -least * 1.01_f64.copysign(-least) + largest * 1e-10;
-                        (0..n).for_each(|j| hessian[(j, j)] += damping);
-                        (hessian.cholesky()?.unpack(), damping, walls)
-                    }
-                }
+                damping = BEYOND * hessian.symmetric_eigenvalues().min().abs() + LEAST_DAMPING * largest;
+                (0..n).for_each(|j| hessian[(j, j)] += damping);
+                hessian.cholesky()?.unpack()
             }
         };
         let projected = root.solve_lower_triangular(&gradient)?;

@@ -340,7 +340,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         }
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
-            let renew = self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping));
+            let renew = self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping), x.len());
             if renew {
                 let within = |x: &DVector<f64>| self.subproblem.admits(x);
                 self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);

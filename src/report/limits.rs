@@ -1,0 +1,51 @@
+//! What `identify` says of bounds, constraints and stages that take turns.
+
+use super::document::Block;
+use super::json::object;
+use super::quantity::{decimals, number};
+use crate::identify::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
+use crate::least_squares::solver::AtBound;
+use crate::quantity::Unit;
+
+object! {
+    /// What a limit costs.
+    PriceEntry(price: ShadowPrice, unit: Unit) {
+        multiplier: f64 = price.multiplier,
+        rms_mm: f64 = price.in_mm(unit).0,
+        per: &'static str = price.in_mm(unit).1,
+    }
+}
+object! {
+    /// How the stages of a sequential strategy took turns.
+    AlternationEntry(own: Alternation) {
+        sweeps: usize = own.sweeps,
+        contraction: Option<f64> = own.contraction,
+    }
+}
+
+/// What bounds and constraints cost; nothing to say without any.
+pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
+    let line = |name: &str, price: ShadowPrice, unit: Unit| {
+        let (fall, per) = price.in_mm(unit);
+        format!("{name}: {} mm for 1 {per}", number(fall, decimals(fall, 6)))
+    };
+    let bound = |estimate: &Estimate| {
+        let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };
+        Some(line(&format!("{}, {side} bound", estimate.name), estimate.shadow_price?, estimate.unit))
+    };
+    let constraint = |own: &ActiveConstraint| line(&own.words, own.shadow_price, own.unit);
+    let bounds = found.estimates.iter().filter_map(bound);
+    let points: Vec<String> = bounds.chain(found.active_constraints.iter().map(constraint)).collect();
+    let words =
+        "What limits cost (moved out by so much, the rms residual of the fit would fall by so much):".to_owned();
+    (!points.is_empty()).then_some(Block::Lines(words, points))
+}
+
+/// How slowly a sequential strategy converges by itself.
+pub(super) fn alternation<'a>(found: &Identification) -> Option<Block<'a>> {
+    let Alternation { sweeps, contraction } = found.alternation?;
+    let slow = contraction.map_or_else(String::new, |rate| {
+        format!("; by itself each sweep would leave {} of the error", number(rate, decimals(1.0 - rate, 6)))
+    });
+    Some(Block::lines(format!("Stiffness and geometry took turns in {sweeps} accelerated sweeps{slow}.")))
+}

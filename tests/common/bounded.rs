@@ -1,0 +1,66 @@
+//! The lunar sampler within bounds and constraints, as solvers see it: σ as declared, from nominal values.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+use std::path::Path;
+
+use flexcal::identify::Placement;
+use flexcal::least_squares::solver::{Bounds, Inequalities};
+use flexcal::least_squares::{Fit, LinearRows};
+use flexcal::measurement::Dataset;
+use flexcal::model::parameter::{LinearConstraint, Parameter};
+use flexcal::model::{Model, PoseResiduals};
+use flexcal::problem::Problem;
+use nalgebra::{DMatrix, DVector};
+
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases/bounded");
+
+/// A problem of `tests/cases/bounded`.
+pub struct Bounded {
+    pub problem: Problem,
+    pub data: Dataset,
+    pub model: Model,
+    pub bounds: Bounds,
+    pub rows: Inequalities,
+    placement: Placement,
+}
+
+impl Bounded {
+    pub fn read(name: &str) -> Self {
+        let problem = Problem::read(&Path::new(FOLDER).join(format!("{name}.toml"))).unwrap();
+        let (data, _) = Dataset::read(&problem).unwrap();
+        let placement = Placement::of(&data.measurements);
+        let model = Model::new(&problem, &placement.bases, &placement.targets).unwrap();
+        let (n, m) = (model.parameters.len(), model.constraints.len());
+        let limit = |of: fn(&Parameter) -> f64| DVector::from_iterator(n, model.parameters.iter().map(of));
+        let bounds = Bounds::new(limit(|own| own.lower), limit(|own| own.upper)).unwrap();
+        let mut matrix = DMatrix::zeros(m, n);
+        for (i, constraint) in model.constraints.iter().enumerate() {
+            constraint.terms.iter().for_each(|&(k, coefficient)| matrix[(i, k)] = coefficient);
+        }
+        let side = |of: fn(&LinearConstraint) -> f64| DVector::from_iterator(m, model.constraints.iter().map(of));
+        let rows = Inequalities::new(matrix, side(|own| own.lower), side(|own| own.upper)).unwrap();
+        Self { problem, data, model, bounds, rows, placement }
+    }
+
+    pub fn nominal(&self) -> DVector<f64> {
+        DVector::zeros(self.model.parameters.len())
+    }
+
+    pub fn residuals(&self) -> PoseResiduals<'_> {
+        let sigma = self.problem.data.position_sigma.unwrap();
+        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
+        PoseResiduals::new(&self.model, poses, (0..self.model.parameters.len()).collect(), self.nominal())
+    }
+
+    pub fn priors(&self) -> LinearRows {
+        let weights = self.model.parameters.iter().map(|own| own.sigma.map_or(0.0, f64::recip));
+        let matrix = DMatrix::from_diagonal(&DVector::from_iterator(self.model.parameters.len(), weights));
+        LinearRows { matrix, constant: self.nominal() }
+    }
+
+    /// With the priors.
+    pub fn fit<'a>(&self, residuals: &'a PoseResiduals<'a>) -> Fit<'a, PoseResiduals<'a>> {
+        Fit::new(residuals).with_rows(self.priors()).unwrap()
+    }
+}
