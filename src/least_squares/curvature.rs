@@ -2,24 +2,30 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Objective;
-
 /// How far each unknown is moved: by its effect on all residuals together, as a part of their length.
 const STEP: f64 = 1e-4;
 
+/// What is known of an objective at a point.
+pub(super) struct Slopes {
+    /// ½‖r‖².
+    pub cost: f64,
+    /// Jᵀr.
+    pub gradient: DVector<f64>,
+    /// JᵀJ.
+    pub normal: DMatrix<f64>,
+}
+
 /// S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ, by differences of the gradient Jᵀr.
 ///
-/// One linearisation for each unknown. An unknown is moved up, or down where `within` forbids that; where it forbids both, its
+/// One call of `slopes` for each unknown. An unknown is moved up, or down where `within` forbids that; where it forbids both, its
 /// row and column hold what the others say of them.
-pub(super) fn by_differences<O: Objective + ?Sized>(
-    objective: &O,
+pub(super) fn by_differences(
+    slopes: impl Fn(&DVector<f64>) -> Slopes,
     x: &DVector<f64>,
     within: &dyn Fn(&DVector<f64>) -> bool,
 ) -> Option<DMatrix<f64>> {
-    let here = objective.linearise(x);
-    let gradient = here.triangle.tr_mul(&here.projected);
-    let normal = here.triangle.tr_mul(&here.triangle);
-    let residual = (2.0 * here.cost).sqrt();
+    let Slopes { cost, gradient, normal } = slopes(x);
+    let residual = (2.0 * cost).sqrt();
     let n = x.len();
     let mut second = DMatrix::zeros(n, n);
     let mut known = vec![false; n];
@@ -32,8 +38,7 @@ pub(super) fn by_differences<O: Objective + ?Sized>(
             within(&moved).then_some(moved)
         });
         let Some(moved) = moved else { continue };
-        let there = objective.linearise(&moved);
-        let change = (there.triangle.tr_mul(&there.projected) - &gradient) / (moved[j] - x[j]);
+        let change = (slopes(&moved).gradient - &gradient) / (moved[j] - x[j]);
         second.set_column(j, &(change - normal.column(j)));
         known[j] = true;
     }

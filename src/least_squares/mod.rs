@@ -18,6 +18,7 @@ mod weak;
 
 use std::ops::Range;
 
+use curvature::{Slopes, by_differences};
 use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
@@ -117,7 +118,11 @@ pub trait Objective {
     /// By differences of the gradient unless an objective knows better; evaluated only where `within` allows. Nothing where
     /// derivatives are not finite.
     fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
-        curvature::by_differences(self, x, within)
+        let slopes = |x: &DVector<f64>| {
+            let Linearisation { cost, triangle, projected } = self.linearise(x);
+            Slopes { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
+        };
+        by_differences(slopes, x, within)
     }
 
     /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or not finite.

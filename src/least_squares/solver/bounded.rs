@@ -92,11 +92,13 @@ pub struct Constrained {
     model: Option<Model>,
     /// Faces that held in the last problem from the same x.
     guess: Option<Faces>,
+    /// Whether the last step was held back.
+    confined: bool,
 }
 
 impl Constrained {
     fn solver(steps: Steps, bounds: Bounds, rows: Inequalities, settings: Settings) -> TrustRegion<Self> {
-        TrustRegion::new(Self { steps, bounds, rows, model: None, guess: None }, settings)
+        TrustRegion::new(Self { steps, bounds, rows, model: None, guess: None, confined: false }, settings)
     }
 }
 
@@ -138,6 +140,10 @@ impl Subproblem for Constrained {
         self.bounds.contain(x) && self.rows.contain(x)
     }
 
+    fn is_confined(&self) -> bool {
+        self.confined && self.steps != Steps::Clamped
+    }
+
     fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, scale);
         polyhedron.normals_of(&polyhedron.pressed(gradient).0)
@@ -158,6 +164,7 @@ impl Subproblem for Constrained {
         let Some(model) = &mut self.model else { return Step::none(x) };
         let step = model.unbounded_step(x, radius);
         let inside = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
+        self.confined = !inside;
         if inside && self.steps != Steps::InteriorPoint {
             return step;
         }

@@ -80,11 +80,6 @@ impl Subproblem for Unconstrained {
         gradient
     }
 
-    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-        let model = self.model.as_ref()?;
-        Some(x + model.bent(bend)?.damped(damping).component_div(&model.scale))
-    }
-
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         match &mut self.model {
             Some(model) => model.unbounded_step(x, radius),

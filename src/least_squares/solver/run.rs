@@ -13,6 +13,8 @@ use crate::least_squares::Objective;
 
 /// Part of the width between bounds within which an interior point is beside a bound.
 const BESIDE: f64 = 1e-3;
+/// Relative change of the cost that is rounding.
+const NO_WORSE: f64 = 1e-12;
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
 ///
@@ -140,7 +142,7 @@ pub fn minimise_within<O: Objective>(
     solution
 }
 
-/// Puts unknowns on bounds that they are near where that lowers the cost, each by itself.
+/// Puts unknowns on bounds that they are near where that does not raise the cost, each by itself.
 fn settle<O: Objective>(objective: &O, bounds: &Bounds, rows: &Inequalities, solution: &mut Solution) {
     for j in 0..solution.x.len() {
         for bound in [bounds.lower()[j], bounds.upper()[j]] {
@@ -157,7 +159,7 @@ fn settle<O: Objective>(objective: &O, bounds: &Bounds, rows: &Inequalities, sol
             }
             let cost = objective.cost(&settled);
             solution.cost_evaluations += 1;
-            if cost <= solution.cost {
+            if cost <= solution.cost * (1.0 + NO_WORSE) {
                 (solution.x, solution.cost) = (settled, cost);
             }
         }

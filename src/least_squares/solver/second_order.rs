@@ -40,6 +40,8 @@ pub(super) struct SecondOrder {
     /// Whether S was formed at the present point, and how many steps ago.
     fresh: bool,
     age: usize,
+    /// Whether it has done its work.
+    retired: bool,
 }
 
 /// What a step gains in a quadratic model that is convex, and what was added to make it so.
@@ -63,7 +65,16 @@ impl Convex {
 impl SecondOrder {
     /// Whether steps are bent.
     pub fn bends(&self) -> bool {
-        self.misses >= BENDING_MISSES
+        self.misses >= BENDING_MISSES && !self.retired
+    }
+
+    /// Ends it where steps gain nothing more, and says whether it was at work: what is left is better seen by linearised residuals,
+    /// whose condition is not squared.
+    pub fn retire(&mut self) -> bool {
+        let worked = self.bends() || self.matrix.is_some();
+        self.matrix = None;
+        self.retired = true;
+        worked
     }
 
     /// Takes in a step of length ‖D p‖; whether S should be formed at the point where the solver is now.
@@ -83,7 +94,7 @@ impl SecondOrder {
                     || self.slow as f64 >= part(SLOW_STEPS_PER_UNKNOWN).max(SLOW_STEPS as f64)
             }
         };
-        (missed || slow) && enough && !self.fresh
+        (missed || slow) && enough && !self.fresh && !self.retired
     }
 
     /// Takes S at the present point.

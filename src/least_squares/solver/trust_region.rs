@@ -68,6 +68,11 @@ pub trait Subproblem {
         true
     }
 
+    /// Whether constraints changed the last step; only then second derivatives may be called for.
+    fn is_confined(&self) -> bool {
+        false
+    }
+
     /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x that a step against the scaled
     /// gradient would leave.
     fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
@@ -334,18 +339,23 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
         let mut termination = self.judge(&trial, size);
+        let retired = termination.is_some_and(Termination::converged) && self.second_order.retire();
+        if retired {
+            termination = None;
+        }
         if taken && termination.is_none() {
             let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
             termination = self.take_in(&step.point, linearisation);
         }
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
-            let renew = self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping), x.len());
+            let renew = self.subproblem.is_confined()
+                && self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping), x.len());
             if renew {
                 let within = |x: &DVector<f64>| self.subproblem.admits(x);
                 self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
             }
-            if taken || renew {
+            if taken || renew || retired {
                 self.prepare(&x);
             }
         }
