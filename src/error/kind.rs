@@ -258,7 +258,7 @@ pub enum InputErrorKind {
     PosesOfStudy,
     #[error("the model makes no measurements with effects that the problem does not declare; write data = \"rig\"")]
     NeedsRig,
-    #[error("{solver} does not keep the bounds and constraints of the problem; write bounded or auto")]
+    #[error("{solver} does not keep the bounds and constraints of the problem; write bounded, interior-point or auto")]
     SolverIgnoresBounds { solver: &'static str },
     #[error("no parameter of the kind that {strategy} varies is free in the problem; leave it out")]
     NothingToVary { strategy: &'static str },
