@@ -54,7 +54,7 @@ impl Stage<'_> {
         }
         let errors = residuals.position_errors(&x);
         let count = errors.len().max(1) as f64;
-        let rms = (errors.iter().map(|error| error.norm_squared()).sum::<f64>() / count).sqrt();
+        let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
         let variance = self.poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>() / count;
         let price = |force: f64, side: AtBound| {
             let multiplier = if side == AtBound::Lower { force.max(0.0) } else { (-force).max(0.0) };

@@ -85,7 +85,9 @@ impl Reflective {
         let (stride, hits) = self.to_bound(x, &model.step(hat));
         let on_bound = hat * stride;
         let mut mirrored = hat.clone();
-        hits.iter().for_each(|&j| mirrored[j] = -mirrored[j]);
+        for &j in &hits {
+            mirrored[j] = -mirrored[j];
+        }
         let reflected = {
             let to_radius = along_to_radius(&on_bound, &mirrored, radius);
             let (to_bound, _) = self.to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));

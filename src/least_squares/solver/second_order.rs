@@ -136,13 +136,12 @@ impl SecondOrder {
             hessian += walls.tr_mul(&walls);
             found_root = root(&hessian);
         }
-        let root = match found_root {
-            Some(root) => root,
-            None => {
-                damping = BEYOND * hessian.symmetric_eigenvalues().min().abs() + LEAST_DAMPING * largest;
-                (0..n).for_each(|j| hessian[(j, j)] += damping);
-                hessian.cholesky()?.unpack()
-            }
+        let root = if let Some(root) = found_root {
+            root
+        } else {
+            damping = BEYOND * hessian.symmetric_eigenvalues().min().abs() + LEAST_DAMPING * largest;
+            (0..n).for_each(|j| hessian[(j, j)] += damping);
+            hessian.cholesky()?.unpack()
         };
         let projected = root.solve_lower_triangular(&gradient)?;
         let mut triangle = root.transpose();
