@@ -1,6 +1,6 @@
 //! `[[constraint]]` on the lunar sampler: exact where active, without effect where not.
 
-#![expect(clippy::panic, clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod common;
 
