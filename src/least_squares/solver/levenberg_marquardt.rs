@@ -39,6 +39,9 @@ impl Model {
     pub(super) fn bent(&self, bend: &DVector<f64>) -> Option<Factor> {
         let bend = 0.5 * bend.component_div(&self.scale);
         let shift = self.factor.matrix().tr_solve_upper_triangular(&bend)?;
+        if !shift.iter().all(|value| value.is_finite()) {
+            return None;
+        }
         Some(Factor::new(self.factor.matrix().clone(), self.factor.constant() + shift, self.factor.tolerance()))
     }
 

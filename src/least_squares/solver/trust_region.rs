@@ -206,6 +206,9 @@ impl<S: Subproblem> TrustRegion<S> {
                 return Ok((step, None));
             };
             let share = (&point - &step.point).component_mul(&self.scale).norm() / step.length;
+            if share.is_nan() {
+                return Ok((step, None));
+            }
             if share <= BENT {
                 step.point = point;
                 return Ok((step, Some(share)));
