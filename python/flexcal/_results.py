@@ -64,8 +64,8 @@ class _Fit(_Result):
         """The free parameters, a row each, by their names; SI.
 
         Columns: ``unit`` (of the next three), ``nominal``, ``estimate``, ``std_error`` (1 σ, NaN where nothing was learned or a
-        bound holds the value), ``at_bound`` (``"lower"``, ``"upper"`` or None), ``identified`` (0…1, the share that the data
-        gave), ``fitted``.
+        bound holds the value), ``at_bound`` (``"lower"``, ``"upper"`` or None), ``shadow_price`` (what that bound costs: a
+        dict of ``multiplier``, ``rms_mm`` and ``per``, or None), ``identified`` (0…1, the share that the data gave), ``fitted``.
         """
         return _parameters(json.loads(self._fit.json())["parameters"])
 
