@@ -18,6 +18,8 @@ const SLOW_STEPS_PER_UNKNOWN: f64 = 1.0 / 12.0;
 const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
 /// A step without damping is slow if it is longer than this part of the one before.
 const SLOW: f64 = 0.5;
+/// How often S is formed at most: what has not converged by then will not.
+const MOST_TIMES: usize = 50;
 /// What keeps a step on the faces that it presses against, over the largest curvature.
 const WALL: f64 = 1e3;
 /// μ over the most negative curvature, and over the largest one at least.
@@ -40,6 +42,8 @@ pub(super) struct SecondOrder {
     /// Whether S was formed at the present point, and how many steps ago.
     fresh: bool,
     age: usize,
+    /// How often it was formed.
+    times: usize,
     /// Whether it has done its work.
     retired: bool,
 }
@@ -94,11 +98,12 @@ impl SecondOrder {
                     || self.slow as f64 >= part(SLOW_STEPS_PER_UNKNOWN).max(SLOW_STEPS as f64)
             }
         };
-        (missed || slow) && enough && !self.fresh && !self.retired
+        (missed || slow) && enough && !self.fresh && !self.retired && self.times < MOST_TIMES
     }
 
     /// Takes S at the present point.
     pub fn renew(&mut self, matrix: Option<DMatrix<f64>>) {
+        self.times += 1;
         if let Some(matrix) = matrix {
             self.matrix = Some(matrix);
             (self.fresh, self.age) = (true, 0);
