@@ -197,8 +197,10 @@ fn without_tracker(blind: &[BlindCombination], unknowns: &[String]) -> Vec<&'sta
     let place = |own: &BlindCombination| {
         holds(own, &|name| name.starts_with("base")) && all(own, &|name| name.starts_with("base") || is_around(name))
     };
+    // What only shifts everything moves points along one axis; a scale moves them along all three.
     let size = |own: &BlindCombination| {
-        all(own, &is_length) && holds(own, &is_around) && holds(own, &|name| name.starts_with("joint"))
+        let along = |axis: &str| holds(own, &|name| is_around(name) && field(name) == axis);
+        all(own, &is_length) && ["x", "y", "z"].into_iter().all(along) && holds(own, &|name| name.starts_with("joint"))
     };
     let mut words = Vec::new();
     if blind.iter().any(place) {
