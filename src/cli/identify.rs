@@ -79,8 +79,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             diagnostic::warn(&report::joint_sources_text(sources));
         }
     } else if common.talks() {
-        let told = if arguments.verbose { report::estimate_text } else { report::estimate_brief };
-        output::print(&told(&problem, &identification))?;
+        let told = if arguments.verbose {
+            report::estimate_text(&problem, &identification)
+        } else {
+            report::estimate_brief(&problem, &identification, output::columns())
+        };
+        output::print(&told)?;
         if let Some(sources) = &sources {
             output::print(&format!("\n{}\n", report::joint_sources_text(sources)))?;
         }

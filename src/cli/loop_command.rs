@@ -71,8 +71,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if common.json {
         output::print_json(&json)?;
     } else if common.talks() {
-        let told = if arguments.verbose { report::loop_text } else { report::loop_brief };
-        output::print(&told(&problem, &closure))?;
+        let told = if arguments.verbose {
+            report::loop_text(&problem, &closure)
+        } else {
+            report::loop_brief(&problem, &closure, output::columns())
+        };
+        output::print(&told)?;
         let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
         let closed = results.path("problem.closed.toml");

@@ -173,6 +173,11 @@ impl Results {
     }
 }
 
+/// Columns of the terminal that reads standard output; as many as wanted where none does.
+pub fn columns() -> usize {
+    terminal_size::terminal_size_of(io::stdout()).map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
+}
+
 /// Prints to standard output what people read, without characters that do something to their terminal; a closed pipe ends the
 /// printing quietly.
 pub fn print(text: &str) -> Result<(), WriteError> {

@@ -6,7 +6,7 @@ use super::findings;
 use super::identify::{errors_by_axis, headline, noise};
 use super::parameters::correlated;
 use super::quantity::{mm, number};
-use super::render::text;
+use super::render::text_within;
 use super::unexplained::place;
 use crate::diagnose::{ClosedLoop, Verdict};
 use crate::identify::{Estimate, Identification};
@@ -20,15 +20,15 @@ fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A fit on one screen, ending in a line break: errors, how large the residual is, and what to look at.
-pub fn estimate_brief(problem: &Problem, found: &Identification) -> String {
+/// A fit on one screen of so many columns, ending in a line break: errors, how large the residual is, and what to look at.
+pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
     let blocks = [
         headline(problem, found),
         Block::Table(errors_by_axis(found)),
         Block::lines(noise(problem, found)),
         Block::Lines(parameters(&found.estimates), worth_a_look(found)),
     ];
-    text(&blocks)
+    text_within(&blocks, columns)
 }
 
 /// How many parameters are known how well.
@@ -80,8 +80,9 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     points
 }
 
-/// A loop on one screen, ending in a line break: what it came to, what was found, and what remains.
-pub fn loop_brief(problem: &Problem, closure: &ClosedLoop) -> String {
+/// A loop on one screen of so many columns, ending in a line break: what it came to, what was found, and what remains.
+pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
+    let text = |blocks: &[Block]| text_within(blocks, columns);
     let poses = &closure.before.fit.fitted;
     let (n, held_out) = (poses.identification.n, poses.held_out.n);
     let mut table = errors(closure);
@@ -95,8 +96,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop) -> String {
     ];
     blocks.extend(quality_flag(closure));
     blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
-    let remains = remains(closure);
-    let last = usize::from(remains.is_some()) * 2;
+    let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
+    let last = end.lines().count();
     if !closure.effects.is_empty() {
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
@@ -104,14 +105,10 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop) -> String {
         blocks.push(Block::heading("What was found"));
         blocks.push(Block::Ranking(titles.take(room).collect()));
         let more = closure.effects.len().saturating_sub(room);
-        let words = if more > 0 { format!("     and {more} more") } else { String::new() };
-        return text(&blocks) + &if more > 0 { words + "\n" } else { words } + &end(remains);
+        let more = if more > 0 { format!("     and {more} more\n") } else { String::new() };
+        return text(&blocks) + &more + &end;
     }
-    text(&blocks) + &end(remains)
-}
-
-fn end(remains: Option<String>) -> String {
-    remains.map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])))
+    text(&blocks) + &end
 }
 
 /// The beginning of words that would not fit in a line.

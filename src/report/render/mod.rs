@@ -8,4 +8,4 @@ mod text;
 
 pub use html::Report;
 pub(super) use html::report;
-pub(super) use text::text;
+pub(super) use text::{text, text_within};

@@ -9,6 +9,12 @@ const WIDTH: usize = 110;
 
 /// Blocks as text, ending in a line break.
 pub(in crate::report) fn text(blocks: &[Block]) -> String {
+    text_within(blocks, WIDTH)
+}
+
+/// The same with running text wrapped to at most so many columns.
+pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
+    let width = most.min(WIDTH);
     let mut text = String::new();
     let mut follows_heading = false;
     for block in flat(blocks) {
@@ -18,15 +24,15 @@ pub(in crate::report) fn text(blocks: &[Block]) -> String {
         let indent = if follows_heading { "  " } else { "" };
         follows_heading = matches!(block, Block::Heading(_));
         match block {
-            Block::Heading(words) => text.push_str(&wrapped(words, "", "")),
-            Block::Text(words) | Block::Note(words) => text.push_str(&wrapped(words, indent, indent)),
+            Block::Heading(words) => text.push_str(&wrapped(words, ("", ""), width)),
+            Block::Text(words) | Block::Note(words) => text.push_str(&wrapped(words, (indent, indent), width)),
             Block::Lines(words, points) => {
                 text.extend(words.lines().flat_map(|line| [plain(line), "\n".to_owned()]));
                 text.extend(points.iter().map(|point| format!("  {}\n", plain(point))));
             }
-            Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own)),
+            Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own, width)),
             Block::Ranking(points) => {
-                points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
+                points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own, width));
             }
             Block::Table(own) => {
                 text.push_str(&table(own));
@@ -72,18 +78,18 @@ pub(super) fn marked(point: &Point) -> String {
     format!("{mark}{}", point.text)
 }
 
-fn point(text: &mut String, mark: &str, point: &Point) {
+fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
     let (first, further) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
-    text.push_str(&wrapped(&marked(point), &first, &further));
+    text.push_str(&wrapped(&marked(point), (&first, &further), width));
     for detail in &point.details {
-        text.push_str(&wrapped(detail, &further, &format!("{further}  ")));
+        text.push_str(&wrapped(detail, (&further, &format!("{further}  ")), width));
     }
 }
 
 /// Lines of words, each ending in a line break; a break in the words stays one.
-fn wrapped(words: &str, first: &str, further: &str) -> String {
+fn wrapped(words: &str, (first, further): (&str, &str), width: usize) -> String {
     let plain = plain(words);
-    let options = textwrap::Options::new(WIDTH).initial_indent(first).subsequent_indent(further).break_words(false);
+    let options = textwrap::Options::new(width).initial_indent(first).subsequent_indent(further).break_words(false);
     textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
@@ -140,6 +146,8 @@ mod tests {
     #[test]
     fn long_text_is_wrapped_under_its_mark() {
         let words = "word ".repeat(40);
+        let narrow = text_within(&[Block::list([words.clone()])], 50);
+        assert!(narrow.lines().count() == 5 && narrow.lines().all(|line| line.len() <= 50), "{narrow}");
         let text = text(&[Block::list([words])]);
         let lines: Vec<&str> = text.lines().collect();
         assert!(lines.len() == 2 && lines[0].starts_with("  - word") && lines[1].starts_with("    word"), "{text}");
