@@ -5,7 +5,8 @@ const flexcal = (() => {
   const store = document.getElementById("poses");
   const data = store ? JSON.parse(store.textContent) : { joints: [], poses: [], traced: [], uncovered: [] };
   const byRow = new Map(data.poses.map((pose) => [pose.row, pose]));
-  const norm = (v) => Math.hypot(v[0], v[1], v[2]);
+  /* Of a pose without an equilibrium, whose residual is null, no number. */
+  const norm = (v) => (v.every(Number.isFinite) ? Math.hypot(...v) : 0 / 0);
   const shown = (value) => (Number.isFinite(value) ? value.toFixed(Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value) || 1))))) : "\u2013").replace("-", "\u2212");
   const kind = (pose) => (pose.held_out ? "held out" : "fitted");
   const joints = (pose) => data.joints.map(([name, unit], k) => name + " " + pose.q[k].toFixed(2).replace("-", "\u2212") + (unit === "\u00b0" ? "" : "\u202f") + unit).join(", ");
@@ -54,7 +55,7 @@ const flexcal = (() => {
       panel.hidden = !pose;
       panel.querySelector("output").textContent = pose ? words(pose) + ". " + joints(pose) + ". Measured at " + pose.position.map(shown).join(", ") + " mm; residual " + pose.after.map(shown).join(", ") + " mm." : "";
     }
-    document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("chosen", Number(line.dataset.row) === row));
+    document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("picked", Number(line.dataset.row) === row));
     tell();
   };
 
@@ -85,7 +86,7 @@ const flexcal = (() => {
   }
 
   /* Poses by size of the residual, the largest first. */
-  const bySize = [...data.poses].sort((a, b) => norm(b.after) - norm(a.after));
+  const bySize = data.poses.filter((pose) => norm(pose.after) >= 0).sort((a, b) => norm(b.after) - norm(a.after));
   if (panel) {
     const step = (by) => {
       const kept = bySize.filter((pose) => state.kept(pose));
@@ -116,7 +117,7 @@ const flexcal = (() => {
       inputs.forEach((input, end) => { [input.min, input.max] = ends; input.step = "any"; input.value = ends[end]; });
       return { inputs, ends, unit, label: brush.querySelector("[data-range=\"" + k + "\"]") };
     });
-    const rms = (poses) => (poses.length ? shown(Math.sqrt(poses.reduce((sum, pose) => sum + norm(pose.after) ** 2, 0) / poses.length)) + " mm" : "\u2013");
+    const rms = (poses) => shown(Math.sqrt(poses.reduce((sum, pose) => sum + norm(pose.after) ** 2, 0) / poses.length)) + " mm";
     const update = () => {
       const limits = ranges.map(({ inputs, label, unit }) => {
         const values = inputs.map((input) => Number(input.value)).sort((a, b) => a - b);
@@ -127,7 +128,7 @@ const flexcal = (() => {
       const away = new Set(data.poses.filter((pose) => !state.kept(pose)).map((pose) => pose.row));
       figures.forEach((figure) => figure.dots.forEach((own) => own.dot.classList.toggle("away", away.has(own.row))));
       document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("away", away.has(Number(line.dataset.row))));
-      const kept = data.poses.filter(state.kept);
+      const kept = bySize.filter(state.kept);
       brush.querySelector("output").textContent = kept.length + " of " + data.poses.length + " poses; rms residual of the fitted ones " + rms(kept.filter((pose) => !pose.held_out)) + ", of those held out " + rms(kept.filter((pose) => pose.held_out));
       tell();
     };

@@ -171,8 +171,8 @@
     for (const pose of poses) dots.push(...pose.position, ...tone(pose), 1, (pose.row === state.row ? 11 : 4.5) * ratio);
     draw("point", dots, matrix, 0);
 
-    const scale = (value) => value.toPrecision(2);
-    legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + factor.toPrecision(2) : "; in this model nothing gives way") +
+    const scale = (value) => String(Number(value.toPrecision(2)));
+    legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; in this model nothing gives way") +
       (input("vectors").value === "none" ? "" : "; strokes \u00d7 " + scale(lengthen / unit)) +
       (by === "kind" ? "; strong: held out, faint: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);
