@@ -243,10 +243,8 @@ pub fn identify_model(
     if let Some(termination) = place_held_out(&fitting, &mut end, (&mut estimates, &mut covariance), noise)? {
         not_converged = not_converged.or(Some(QualityFlag::HeldOutNotConverged(termination)));
     }
-    if noise == Noise::Unknown {
-        for estimate in &mut estimates {
-            estimate.std_error = None;
-        }
+    for estimate in estimates.iter_mut().filter(|_| noise == Noise::Unknown) {
+        estimate.std_error = None;
     }
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let declared_all = together(whole.declared.iter().copied());
