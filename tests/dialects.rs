@@ -235,3 +235,18 @@ fn names_of_poses_are_kept_as_they_are() {
     let names = named.pose_names.unwrap();
     assert_eq!((named.pose, names.names, names.of_row), (None, vec!["1".to_owned(), "P2".to_owned()], vec![0, 1, 1]));
 }
+
+#[test]
+fn a_lost_position_takes_no_contact_with_it() {
+    let arm = format!("{ARM}[[point]]\nname = 'socket'\n[data]\nposition_sigma_mm = 0.1\npoint_sigma_mm = 0.1\n");
+    let arm = Problem::parse(&format!("{arm}[data.format]\nmissing = '0,0,0'\n"), Path::new("problem.toml")).unwrap();
+    let table =
+        "q1_deg,q2_deg,x_m,y_m,z_m,point\n1,2,3,4,5,\n1,3,0,0,0,\n1,4,0,0,0,socket\n1,5,,,,socket\n1,6,,,,socket\n";
+    let (rows, warnings) = read(&arm, &[("rows.csv", table)]).unwrap();
+    let kinds: Vec<&str> = (0..rows.len()).map(|row| rows.observation(row).kind()).collect();
+    assert_eq!(kinds, ["position", "point", "point", "point"]);
+    assert!(
+        warnings.iter().any(|warning| warning.to_string().contains("nothing was measured in 1 row")),
+        "{warnings:?}"
+    );
+}

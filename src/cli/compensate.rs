@@ -66,6 +66,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results =
         common.results("compensate", &problem, std::slice::from_ref(&arguments.estimate), &["commands.csv"])?;
     let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
+    let targets = targets.of_the_arm();
+    if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
+        return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
+    }
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
     }

@@ -42,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(common.problem())?;
     let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
     let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
+    let rows = rows.of_the_arm();
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
     }

@@ -168,8 +168,7 @@ fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     }
     key.extend(bits(measurements.covariates_of(row)));
     key.push(measurements.session.of_row[row] as u64);
-    let fixtures = measurements.observation(row).fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
-    key.extend([fixtures[0], fixtures[1], measurements.observation(row).coordinates()].map(|word| word as u64));
+    key.extend(measurements.observation(row).key().map(|word| word as u64));
     key.extend(measurements.target.as_ref().map(|target| target.of_row[row] as u64));
     key
 }

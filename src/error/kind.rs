@@ -155,6 +155,8 @@ pub enum InputErrorKind {
     FollowerInTheWay,
     #[error("every row names a fixed point in the column nest; none is of the arm")]
     NestsAlone,
+    #[error("the row names no position to go to: contacts, distances and tilts are no targets")]
+    NoTarget,
     #[error("write joint = … or base = true, one of them")]
     NotOnePlace,
     #[error("no order; write at least one, as in [1]")]

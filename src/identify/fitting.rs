@@ -105,7 +105,10 @@ impl<'a> Fitting<'a> {
         let mut poses = self.poses(rows);
         let declared = poses.iter().map(|pose| pose.sigma).collect();
         for pose in &mut poses {
-            pose.sigma = self.assumed.of(pose.sigma);
+            // What a drawing or a calibrated bar says is no worse for what the contacts scatter.
+            if pose.observation.is_of_arm() {
+                pose.sigma = self.assumed.of(pose.sigma);
+            }
             if let Some(orientation) = &mut pose.orientation {
                 orientation.sigma = self.assumed_turn.of(orientation.sigma);
             }

@@ -67,8 +67,7 @@ pub(super) fn outliers(
 pub(super) fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values = measurements.configuration(row).iter().chain(measurements.positions[row].iter());
-        let fixtures = measurements.observation(row).fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
-        let words = fixtures.into_iter().chain([measurements.session.of_row[row]]);
+        let words = measurements.observation(row).key().into_iter().chain([measurements.session.of_row[row]]);
         values.map(|value| value.to_bits()).chain(words.map(|word| word as u64)).collect()
     };
     let known: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();

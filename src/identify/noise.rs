@@ -107,7 +107,10 @@ fn contradicted(
     if (first && gain <= chance) || (!first && settled) {
         return Ok(None);
     }
-    let of = |all: &dyn Fn(usize) -> f64| places.iter().map(|&place| all(place)).collect::<Vec<f64>>();
+    let of = |all: &dyn Fn(usize) -> f64| {
+        let of_arm = places.iter().filter(|&&place| stage.poses[place].observation.is_of_arm());
+        of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
+    };
     // An error of the model is one length for all only where all measure the same.
     let raised = if several_kinds { Assumed::scaled } else { Assumed::raised };
     let of_position =

@@ -7,6 +7,7 @@ use super::shadow_price::ShadowPrice;
 use super::stage::{Stage, StageError};
 use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
+use crate::model::parameter::Parameter;
 
 /// Normals are dependent when what is left of one is shorter than this part of it.
 const DEPENDENT: f64 = 1e-10;
@@ -52,18 +53,39 @@ impl Stage<'_> {
         for (own, force) in active.iter().zip(&forces) {
             own.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
         }
-        let errors = residuals.position_errors(&x);
+        // Of the rows that measure what most do: millimetres and degrees have no mean.
+        let leading = self.poses.first().map(|pose| pose.observation.kind());
+        let own = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
+        let places: Vec<usize> = (0..self.poses.len()).filter(own).collect();
+        let all = residuals.position_errors(&x);
+        let errors: Vec<_> = places.iter().map(|&place| all[place]).collect();
         let count = errors.len().max(1) as f64;
         let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
-        let variance = self.poses.iter().map(|pose| pose.sigma * pose.sigma).sum::<f64>() / count;
-        let price = |force: f64, side: AtBound| {
-            let multiplier = if side == AtBound::Lower { force.max(0.0) } else { (-force).max(0.0) };
+        let variance = places.iter().map(|&place| self.poses[place].sigma.powi(2)).sum::<f64>() / count;
+        // Where both limits are one, either may push.
+        let parameters: Vec<&Parameter> = self.parameters().collect();
+        let is_equality = |own: &Held| {
+            let limits = &self.model.constraints[own.constraint];
+            limits.lower >= limits.upper
+        };
+        let price = |force: f64, side: AtBound, is_one: bool| {
+            let multiplier = match side {
+                _ if is_one => force.abs(),
+                AtBound::Lower => force.max(0.0),
+                AtBound::Upper => (-force).max(0.0),
+            };
             let rms = if rms > 0.0 { multiplier * variance / (count * rms) } else { 0.0 };
             ShadowPrice { multiplier, rms }
         };
         Ok(Prices {
-            bounds: (0..n).map(|j| at_bound[j].map(|side| price(left[j], side))).collect(),
-            constraints: active.iter().zip(&forces).map(|(own, force)| price(*force, own.side)).collect(),
+            bounds: (0..n)
+                .map(|j| at_bound[j].map(|side| price(left[j], side, parameters[j].lower >= parameters[j].upper)))
+                .collect(),
+            constraints: active
+                .iter()
+                .zip(&forces)
+                .map(|(own, force)| price(*force, own.side, is_equality(own)))
+                .collect(),
         })
     }
 }

@@ -217,6 +217,14 @@ impl Columns {
             .any(|role| self.has(role))
     }
 
+    /// Whether the row that the table is at measures something else than a position.
+    pub fn observes_at(&self, table: &Table) -> bool {
+        let filled =
+            |role: Role| self.place(role).is_some_and(|place| table.text(place).is_ok_and(|cell| !cell.is_empty()));
+        let roles = [Role::Point, Role::Distance, Role::Surface, Role::Tilt(0)];
+        self.file == Some(Role::Point) || roles.into_iter().any(filled)
+    }
+
     /// The number of the row that the table is at in the column of a role \[SI\]; 0 where there is no such column.
     pub fn length(&self, table: &Table, role: Role) -> Result<f64, InputError> {
         let column = self.read.iter().find(|column| column.role == role);

@@ -30,8 +30,7 @@ impl Measurements {
         let approach = self.approach.iter().flat_map(|all| all.iter().skip(row * self.joints).take(self.joints));
         let words = [Some(&self.session), self.target.as_ref()].into_iter().flatten();
         let words = words.filter_map(|labels| labels.of_row.get(row)).copied();
-        let fixtures = self.observation(row).fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
-        let words = words.chain(fixtures).map(|word| word as u64);
+        let words = words.chain(self.observation(row).key()).map(|word| word as u64);
         let turned = self.orientations.iter().filter_map(|all| all.get(row)).flat_map(|own| own.coords.iter());
         // Zero has no sign.
         numbers.chain(turned).chain(time).chain(approach).map(|number| (number + 0.0).to_bits()).chain(words).collect()

@@ -27,11 +27,11 @@ impl Observed {
 }
 
 /// Everything that the row measures which the table is at, in the order position, point, distance, surface; a table of positions
-/// alone measures one in every row, and `in_point` is where the whole file is.
+/// alone measures one in every row, and `in_point` is where the whole file is. A position that is `lost` is none.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
-    (problem, measured): (&Problem, bool),
+    (problem, measured, lost): (&Problem, bool, bool),
     in_point: Option<&str>,
 ) -> Result<Vec<Observed>, InputError> {
     let has_position = columns.has(Role::Position(0));
@@ -44,7 +44,7 @@ pub(super) fn of_row(
     };
     let of_point = |name: &str, place: Option<usize>| fixture(table, place, ("point", name), problem);
     let mut all = Vec::new();
-    if (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
+    if !lost && (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
         all.push(Observed::position(true));
     }
     let in_point = match filled(Role::Point) {
@@ -220,6 +220,13 @@ impl Measurements {
         if let (Some(own), Some(named)) = (&mut self.pose_names, named) {
             own.of_row.extend(named.of_row);
         }
+    }
+
+    /// The rows in which the arm takes part: known distances between points left out.
+    #[must_use]
+    pub fn of_the_arm(self) -> Self {
+        let rows: Vec<usize> = (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
+        if rows.len() == self.len() { self } else { self.select(&rows) }
     }
 
     fn set_sigma(&mut self, row: usize, value: f64) {

@@ -103,17 +103,14 @@ impl<'a> Tables<'a> {
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.seen(), LeftOut::default());
         loop {
-            if dialect
-                .missing
-                .as_ref()
-                .is_some_and(|missing| !columns.observes() && is_missing(missing, &table, &columns))
-            {
+            let lost = dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns));
+            if lost && !columns.observes_at(&table) {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
                 let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
-                for observed in observed::of_row(&table, &columns, (self.problem, self.measured), in_point)? {
+                for observed in observed::of_row(&table, &columns, (self.problem, self.measured, lost), in_point)? {
                     rows.push(index, &table, &columns, &observed)?;
                 }
             }

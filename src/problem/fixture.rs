@@ -137,6 +137,13 @@ impl Observation {
         }
     }
 
+    /// What tells it from others, as numbers.
+    pub(crate) fn key(self) -> [usize; 3] {
+        let [first, second] = self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
+        let frame = if let Self::Tilt(frame) = self { frame + 1 } else { 0 };
+        [first, second, 4 * frame + self.coordinates()]
+    }
+
     /// Whether its numbers are angles \[rad\] rather than lengths \[m\].
     pub fn is_angle(self) -> bool {
         matches!(self, Self::Tilt(_))

@@ -117,8 +117,12 @@ fn columns_of(observation: Observation) -> (&'static str, &'static [&'static str
 
 /// The columns that some rows need.
 fn columns_of_kinds(rows: &Measurements) -> Vec<(&'static str, &'static [&'static str])> {
-    let mut all: Vec<_> = rows.kinds().into_iter().map(columns_of).collect();
-    all.dedup();
+    let mut all: Vec<(&'static str, &'static [&'static str])> = Vec::new();
+    for own in rows.kinds().into_iter().map(columns_of) {
+        if !all.contains(&own) {
+            all.push(own);
+        }
+    }
     if all.is_empty() { vec![columns_of(Observation::Position)] } else { all }
 }
 
