@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FORMAT")]
     format: Option<Format>,
     /// The file to write [default: in out/<name of the problem>, under the name of the URDF or as kinematics.yaml]
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Print nothing but errors
-    #[arg(long)]
+    #[arg(short, long)]
     quiet: bool,
 }
 

@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Folder for problem.toml [default: out/<name of the robot>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace a problem.toml that flexcal did not write, or that was changed since
     #[arg(long)]
@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Print nothing but errors
-    #[arg(long)]
+    #[arg(short, long)]
     quiet: bool,
 }
 

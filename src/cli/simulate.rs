@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long, value_name = "S")]
     seed: u64,
     /// Folder for results [default: out/<name of the problem>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace files that this command or the problem reads, and files that flexcal did not write
     #[arg(long)]
@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Print nothing but errors
-    #[arg(long)]
+    #[arg(short, long)]
     quiet: bool,
 }
 

@@ -49,7 +49,7 @@ struct Common {
     /// A STUDY.toml, or the folder that holds one
     study: PathBuf,
     /// Folder for results [default: out/<name of the study>]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace files that this command or the problem reads, and files that flexcal did not write
     #[arg(long)]
@@ -58,7 +58,7 @@ struct Common {
     #[arg(long)]
     json: bool,
     /// Print nothing but errors (and the JSON, where it is asked for)
-    #[arg(long)]
+    #[arg(short, long)]
     quiet: bool,
 }
 

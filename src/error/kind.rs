@@ -367,6 +367,10 @@ pub enum WarningKind {
     RowsMissing { rows: usize },
     #[error("orientations take no part in the search for effects: its fits and its evidence are of positions")]
     OrientationLeftOut,
+    #[error(
+        "rows are marked in the column split, and held_out divides them otherwise; held_out = {{ column = \"split\" }} follows the marks"
+    )]
+    SplitUnused,
     #[error("joint {joint} takes no q; ignored")]
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]

@@ -69,7 +69,7 @@ pub enum SavedEstimateError {
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
     #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
     OtherArm { file: PathBuf },
-    #[error("{}: {name} was identified, but is not free in the problem; identify again", file.display())]
+    #[error("{}: {name} was identified, but is not free in the problem; give the problem that was identified (after loop, problem.closed.toml)", file.display())]
     NotFree { file: PathBuf, name: String },
     #[error("{}: {name} stands there twice; keep one of the two", file.display())]
     Twice { file: PathBuf, name: String },

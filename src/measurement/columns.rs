@@ -118,6 +118,9 @@ impl Columns {
                 }
             }
         }
+        if let (Some(HeldOut::Fraction { .. }), true) = (&problem.data.held_out, measured && columns.has_split()) {
+            warnings.push(Warning { location: table.column("split"), kind: WarningKind::SplitUnused });
+        }
         if !unmapped.is_empty() {
             let location = Location { key: None, ..table.column("") };
             warnings.push(Warning { location, kind: WarningKind::Unmapped { names: unmapped } });
@@ -262,6 +265,11 @@ impl Columns {
     pub fn orientations(&self) -> (bool, bool) {
         let all = |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
         (all(3, Role::Orientation), all(4, Role::Quaternion))
+    }
+
+    /// Whether rows are marked in the column of that name.
+    fn has_split(&self) -> bool {
+        self.read.iter().any(|column| column.role == Role::Split)
     }
 
     pub fn has(&self, role: Role) -> bool {

@@ -7,7 +7,7 @@ use super::identify::{errors_by_axis, headline, noise};
 use super::parameters::correlated;
 use super::quantity::{mm, number};
 use super::render::text_within;
-use super::unexplained::place;
+use super::unexplained::{place, size_alone};
 use crate::diagnose::{ClosedLoop, Verdict};
 use crate::identify::{Estimate, Identification};
 use crate::problem::Problem;
@@ -101,7 +101,9 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     if !closure.effects.is_empty() {
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
-        let titles = closure.effects.iter().map(|found| Point::from(cut(&called(closure, found))));
+        let few = closure.effects.len() <= FEW;
+        let title = |found| if few { called(closure, found) } else { cut(&called(closure, found)) };
+        let titles = closure.effects.iter().map(|found| Point::from(title(found)));
         blocks.push(Block::heading("What was found"));
         blocks.push(Block::Ranking(titles.take(room).collect()));
         let more = closure.effects.len().saturating_sub(room);
@@ -110,6 +112,9 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     }
     text(&blocks) + &end
 }
+
+/// Effects whose titles may take two lines each.
+const FEW: usize = 3;
 
 /// The beginning of words that would not fit in a line.
 fn cut(words: &str) -> String {
@@ -139,6 +144,7 @@ fn gain(closure: &ClosedLoop) -> String {
 fn remains(closure: &ClosedLoop) -> Option<String> {
     let failed = findings::failed(&closure.findings).len();
     let first = closure.unexplained.first().filter(|_| closure.verdict == Verdict::Unexplained);
+    let first = first.filter(|_| size_alone(closure).is_none());
     let structure = first.map(|left| {
         let more = closure.unexplained.len() - 1;
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };

@@ -10,7 +10,7 @@ use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{decimals, mm, number, or_dash, p_value};
 use super::render::{Report, report, text};
-use super::unexplained::{correction, place, unexplained};
+use super::unexplained::{correction, place, size_alone, unexplained};
 use super::{effect, findings, trace};
 use crate::diagnose::{
     ClosedLoop, Correction, Found, Interval, Round, Says, SelectionRules, Trace, Unexplained, Verdict, Witness,
@@ -279,6 +279,12 @@ pub(super) fn verdict(closure: &ClosedLoop) -> String {
         [one] => format!("{found}; {} is contradicted by data that took no part", closure.before.describe(&one.effect)),
         several => format!("{found}; {} causes are contradicted by data that took no part", several.len()),
     };
+    if let (Verdict::Unexplained, Some(size)) = (closure.verdict, size_alone(closure)) {
+        let size = number(size, 1);
+        return format!(
+            "Unexplained: the residual is {size} × the declared σ, and no structure is seen in it. {found}."
+        );
+    }
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),

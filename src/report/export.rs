@@ -17,8 +17,8 @@ use crate::problem::Problem;
 use crate::urdf::MovedOrigin;
 
 /// What to do about a geometry that lacks what stood beside it.
-const ALONE: &str = "A controller that knows geometry alone does better with one that was fitted alone: identify the problem without its \
-                     effects (and with --strategy rigid where joints or links give way), and export that.";
+const ALONE: &str = "A controller that knows geometry alone may do better with one that was fitted alone: identify the problem without its \
+                     effects (and with --strategy rigid where joints or links give way), export that, and compare its error.";
 
 /// Errors on held-out poses.
 #[derive(Debug, Clone, Copy, PartialEq)]

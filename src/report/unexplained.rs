@@ -12,6 +12,12 @@ pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
     closure.unexplained.iter().find_map(|left| left.correction.as_ref())
 }
 
+/// The residual in units of the declared σ, where its size is all that is left to explain.
+pub(super) fn size_alone(closure: &ClosedLoop) -> Option<f64> {
+    let nowhere = closure.unexplained.iter().all(|left| left.part.is_none());
+    closure.findings.size_alone().filter(|_| nowhere && !closure.unexplained.is_empty())
+}
+
 /// Where structure is.
 pub(super) fn place(left: &Unexplained) -> String {
     left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
@@ -21,6 +27,13 @@ pub(super) fn place(left: &Unexplained) -> String {
 pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
     if closure.unexplained.is_empty() {
         return Vec::new();
+    }
+    if let Some(size) = size_alone(closure) {
+        return vec![format!(
+            "Its size alone is beyond chance ({} × the declared σ): either σ is declared too small, or a cause is at work that these poses show \
+             nowhere in particular.",
+            number(size, 1)
+        )];
     }
     let mut sentences: Vec<String> = closure.unexplained.iter().map(located).collect();
     let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();

@@ -159,6 +159,16 @@ impl Findings {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
+    /// The residual in units of the declared σ, where its size alone is beyond chance and no test sees structure in it.
+    pub fn size_alone(&self) -> Option<f64> {
+        let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
+        let (Some(only), None) = (failed.next(), failed.next()) else { return None };
+        match (&only.test, &only.outcome) {
+            (Test::ReducedChiSquared, Ok(outcome)) if outcome.statistic > 1.0 => Some(outcome.statistic.sqrt()),
+            _ => None,
+        }
+    }
+
     /// Whether anything was tested for structure.
     pub fn is_testable(&self) -> bool {
         self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())
