@@ -83,6 +83,6 @@ fn commit(file: &Path) -> Option<String> {
     let common = read(folder.join("commondir")).map_or_else(|| folder.clone(), |common| folder.join(common));
     read(common.join(name)).or_else(|| {
         let packed = read(common.join("packed-refs"))?;
-        packed.lines().find_map(|line| Some(line.strip_suffix(name)?.trim().to_owned()))
+        packed.lines().find_map(|line| Some(line.strip_suffix(name)?.strip_suffix(' ')?.trim().to_owned()))
     })
 }

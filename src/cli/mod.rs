@@ -64,7 +64,7 @@ enum Command {
     Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
-    /// Certify an arm: accuracy before and after as ISO 9283 counts it, with conditions and digests of every input.
+    /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with conditions and digests of every input.
     Accept(accept::Arguments),
     /// Write the identified geometry into the URDF that the problem came from, or as YAML for a driver.
     Export(export::Arguments),

@@ -1,4 +1,4 @@
-//! How accurately an arm reaches poses that decided nothing, before and after, counted as ISO 9283 counts positions.
+//! How accurately positions are predicted in poses that decided nothing, before and after, counted as ISO 9283 counts positions.
 
 use std::collections::BTreeMap;
 
@@ -16,6 +16,8 @@ use crate::problem::Problem;
 const DRAWS: usize = 5000;
 const COVERED: f64 = 0.95;
 const SEED: u64 = 9283;
+/// Positions of a pose from which a spread of distances can be told.
+const LEAST_CYCLES: usize = 3;
 
 /// What held-out poses say of an arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +41,8 @@ pub struct AcceptancePose {
     pub before: f64,
     /// AP of the identified arm \[m\].
     pub after: f64,
-    /// RP = l̄ + 3 `S_l` of the distances l of the measured positions to their barycentre \[m\]; `None` of a pose measured once.
+    /// RP = l̄ + 3 `S_l` of the distances l of the measured positions to their barycentre \[m\]; `None` of a pose measured less than
+    /// three times: two positions are equally far from their middle.
     pub repeatability: Option<f64>,
 }
 
@@ -76,15 +79,25 @@ pub fn acceptance(problem: &Problem, data: &Dataset, found: &Identification) -> 
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let errors = |x| placement.position_errors(&model, x, measurements, &split.held_out);
     let (before, after) = (errors(&found.registered_x), errors(&found.x));
-    let mut groups: BTreeMap<(Vec<u64>, [usize; 2], u64), Vec<usize>> = BTreeMap::new();
+    let numbers = measurements.pose_numbers(problem);
+    let mut groups: BTreeMap<(usize, [i64; 3]), Vec<usize>> = BTreeMap::new();
     for (k, &row) in split.held_out.iter().enumerate() {
         if !(before[k].norm().is_finite() && after[k].norm().is_finite()) {
             continue;
         }
-        let configuration = measurements.configuration(row).iter().map(|q| q.to_bits()).collect();
-        let payload = measurements.payload.as_ref().map_or(0, |all| all[row].to_bits());
-        let place = [placement.base_of(row), placement.target_of(row)];
-        groups.entry((configuration, place, payload)).or_default().push(k);
+        // Poses that the declared arm does not tell apart may differ in loads and temperature all the same.
+        let set = [&measurements.payload, &measurements.hoist, &measurements.temperature];
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "steps of 0.1 kg, 0.1 N and 1 K, of which as many as matter have room"
+        )]
+        let set = [10.0, 10.0, 1.0]
+            .iter()
+            .zip(set)
+            .map(|(per, own)| own.as_ref().map_or(0, |all| (all[row] * per).round() as i64));
+        let mut key = [0; 3];
+        key.iter_mut().zip(set).for_each(|(own, value)| *own = value);
+        groups.entry((numbers[row], key)).or_default().push(k);
     }
     let mean = |all: &[Vector3<f64>], own: &[usize]| {
         own.iter().map(|&k| all[k]).sum::<Vector3<f64>>() / own.len().max(1) as f64
@@ -111,7 +124,7 @@ pub fn acceptance(problem: &Problem, data: &Dataset, found: &Identification) -> 
 /// RP = l̄ + 3 `S_l`  [ISO 9283, 7.2.2].
 fn repeatability(positions: &[Vector3<f64>]) -> Option<f64> {
     let n = positions.len() as f64;
-    if positions.len() < 2 {
+    if positions.len() < LEAST_CYCLES {
         return None;
     }
     let barycentre = positions.iter().sum::<Vector3<f64>>() / n;
@@ -128,6 +141,7 @@ mod tests {
     #[test]
     fn repeated_positions_scatter_about_their_barycentre() {
         assert_eq!(repeatability(&[Vector3::zeros()]), None);
+        assert_eq!(repeatability(&[Vector3::zeros(), Vector3::x()]), None);
         // Four points at a distance of 1 from the middle: no spread of the distances.
         let square = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)].map(|(x, y)| Vector3::new(x, y, 5.0));
         assert!((repeatability(&square).unwrap_or(0.0) - 1.0).abs() < 1e-12);

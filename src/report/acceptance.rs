@@ -16,6 +16,10 @@ use crate::problem::{HeldOut, Problem};
 /// Cycles that ISO 9283 asks for in each pose.
 const CYCLES: usize = 30;
 
+/// What the numbers are of.
+const JUDGED: &str =
+    "These are errors of predicted positions: what a controller reaches with commands corrected by them is not judged.";
+
 /// Which inputs a certificate is of, and what no file says.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AcceptanceRecord {
@@ -145,6 +149,7 @@ pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
     let blocks = [
         Block::lines(format!("{}\n{} held-out poses; {}", problem.title, judged.poses.len(), protocol(problem))),
         Block::Table(accuracy(judged)),
+        Block::Text(JUDGED.to_owned()),
         Block::Text(repeats(judged)),
     ];
     text(&blocks)
@@ -185,6 +190,7 @@ pub fn acceptance_page(
     let mut blocks = vec![
         Block::Headline(head),
         Block::Table(accuracy(judged)),
+        Block::Text(JUDGED.to_owned()),
         Block::Text(repeats(judged)),
         Block::heading("How it was measured"),
         Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
@@ -203,7 +209,7 @@ pub fn acceptance_page(
             problem.digest()
         )),
     ];
-    blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("Commit of the problem: {commit}."))));
+    blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("HEAD of the repository around the problem: {commit}; whether files differ from it is told by their digests alone."))));
     blocks.extend([
         Block::Table(Table::new(&["input", "SHA-256"], inputs.collect(), &[0, 1])),
         Block::heading("Accepted"),
@@ -229,13 +235,16 @@ fn accuracy(judged: &Acceptance) -> Table {
 fn repeats(judged: &Acceptance) -> String {
     match repeatability(judged) {
         Some(most) => format!(
-            "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm over {} poses measured more than once. \
-             ISO 9283 asks for {CYCLES} cycles a pose.",
+            "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm over {}. ISO 9283 asks for {CYCLES} cycles \
+             a pose.",
             mm(most, 4),
-            repeated(judged).count()
+            match repeated(judged).count() {
+                1 => "one pose measured three times or more".to_owned(),
+                n => format!("{n} poses measured three times or more"),
+            }
         ),
         None => format!(
-            "No held-out pose was measured twice: nothing is said of repeatability, for which ISO 9283 asks {CYCLES} cycles a pose."
+            "No held-out pose was measured three times: nothing is said of repeatability, for which ISO 9283 asks {CYCLES} cycles a pose."
         ),
     }
 }

@@ -70,7 +70,14 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
             .map(|(a, b)| (b - a).powi(2))
             .sum::<f64>()
             .sqrt();
-    let covered = |at: &Vector3<f64>| fitted.iter().any(|pose| (pose.measured - at).norm_squared() <= near * near);
+    // Sessions have measuring frames of their own.
+    let bases = arm.model.base_frames(arm.x.as_slice());
+    let there = |pose: &&Pose| {
+        let own = &bases[pose.base];
+        bases[first.base].point(&own.resolve(&(pose.measured - own.origin)))
+    };
+    let fitted: Vec<Vector3<f64>> = fitted.iter().map(there).collect();
+    let covered = |at: &Vector3<f64>| fitted.iter().any(|own| (own - at).norm_squared() <= near * near);
     let uncovered: Vec<Vector3<f64>> = positions.iter().filter(|at| !covered(at)).copied().collect();
     Coverage { uncovered, tried: positions.len(), near }
 }

@@ -168,7 +168,13 @@ impl PlotData {
         let errors = poses.errors(best, &rows).into_iter().zip(before);
         let all = poses.all(found.sigma);
         let residuals: Vec<PoseError> = all.iter().copied().enumerate().zip(errors).map(residual).collect();
-        let shown = thin(&rows, MOST, |row| residuals[row].error.norm());
+        // The few of one kind are not crowded out by the many of the other.
+        let (held_out, fitted): (Vec<usize>, Vec<usize>) = rows.iter().partition(|&&row| residuals[row].held_out);
+        let few = held_out.len().min(fitted.len()).min(MOST / 2);
+        let room = |kind: &[usize]| if kind.len() <= few { few } else { MOST - few };
+        let size = |row: usize| residuals[row].error.norm();
+        let mut shown = [thin(&fitted, room(&fitted), size), thin(&held_out, room(&held_out), size)].concat();
+        shown.sort_unstable();
         let drawn: Vec<Pose> = shown.iter().map(|&row| all[row]).collect();
         Self {
             stages,

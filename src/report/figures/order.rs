@@ -67,7 +67,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         thinned(shown.len(), finite.len())
     );
     let row = |own: &PoseError| std::iter::once(own.time * factor).chain(own.error.iter().map(|x| x * 1e3)).collect();
-    let columns = [label, "residual_x_mm", "residual_y_mm", "residual_z_mm"];
+    let columns = [if label == "row" { "number" } else { label }, "residual_x_mm", "residual_y_mm", "residual_z_mm"];
     let sheet = Sheet::of_poses(&columns, shown.iter().map(|&(_, own)| (own, row(own))));
     Some(Drawing::new("residual-order", "The residuals one after another", caption, tags.put(&svg)).with(sheet))
 }
