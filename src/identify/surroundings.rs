@@ -6,6 +6,7 @@ use crate::model::parameter::{Parameter, Slot};
 use crate::model::{Model, Pose};
 use crate::problem::FixtureKind;
 use crate::problem::fixture::lean;
+use crate::spatial::plane_normal;
 
 /// Points whose spread across a plane is below this part of that within it are taken to lie in it.
 const IN_A_PLANE: f64 = 1e-3;
@@ -14,11 +15,16 @@ const OFFSETS_DIFFER: f64 = 1e-4;
 /// … and the arm's base does where it is so far from it \[m\].
 const BASE_IS_OFF: f64 = 0.05;
 
-/// Sets the free numbers without a prior of the fixtures that `chosen` parameters belong to, in the full parameter vector `x`, from
-/// `poses` that measure against them. What no pose touches stays as it is.
+/// Sets the free numbers without a prior, of which the problem says nothing, of the fixtures that `chosen` parameters belong to, in
+/// the full parameter vector `x`, from `poses` that measure against them. What no pose touches stays as it is.
 pub(crate) fn locate(model: &Model, poses: &[Pose], chosen: impl Fn(usize) -> bool, x: &mut DVector<f64>) {
     let free = |(k, parameter): (usize, &Parameter)| match parameter.slot {
-        Slot::Fixture { fixture, kind, axis } if parameter.sigma.is_none() && !parameter.is_bounded() && chosen(k) => {
+        Slot::Fixture { fixture, kind, axis }
+            if parameter.sigma.is_none()
+                && !parameter.is_bounded()
+                && !model.is_declared(fixture, axis)
+                && chosen(k) =>
+        {
             Some((fixture, kind, axis, k))
         }
         _ => None,
@@ -40,7 +46,12 @@ pub(crate) fn locate(model: &Model, poses: &[Pose], chosen: impl Fn(usize) -> bo
         let contacts: Vec<(Vector3<f64>, f64)> = poses.iter().zip(&points).filter_map(touches).collect();
         let base = poses.iter().find(|pose| pose.observation.fixture() == Some(fixture));
         let base = base.map_or(Vector3::zeros(), |pose| bases[pose.base].origin);
-        let Some(found) = found(kind, &contacts, &base) else { continue };
+        let Some(mut found) = found(kind, &contacts, &base) else { continue };
+        if kind == FixtureKind::Plane && model.is_declared(fixture, 0) {
+            // Its normal is declared.
+            let [rx, ry, ..] = model.fixtures(x.as_slice())[fixture].numbers;
+            found[2] = height(&contacts, &plane_normal(rx, ry));
+        }
         for &&(_, _, axis, k) in &own {
             x[k] = found[axis] - model.parameters[k].nominal;
         }
@@ -144,7 +155,12 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     };
     let normal = if side < 0.0 { -normal } else { normal };
     let [rx, ry] = lean(&normal);
-    [rx, ry, normal.dot(&middle) - offset, 0.0]
+    [rx, ry, height(contacts, &normal), 0.0]
+}
+
+/// The number d of a plane with this normal \[m\].
+fn height(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
+    contacts.iter().map(|(point, offset)| normal.dot(point) - offset).sum::<f64>() / contacts.len() as f64
 }
 
 #[cfg(test)]
@@ -179,7 +195,7 @@ mod tests {
             };
             let wall: Vec<_> = points().iter().enumerate().map(touch).collect();
             let [rx, ry, d, _] = plane(&wall, &(normal * 3.0));
-            let found = crate::spatial::rotate(&Vector3::new(rx, ry, 0.0), &Vector3::z());
+            let found = plane_normal(rx, ry);
             assert!((found - normal).norm() < 0.05 && (d - 0.7).abs() < 0.05, "{found} {d}");
         }
     }

@@ -22,6 +22,7 @@ impl Model {
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             fixtures: self.fixtures(x.as_slice()),
+            declared: self.declared.clone(),
             turned: self.target_rotations(x.as_slice()),
             parameters,
             constraints: Vec::new(),

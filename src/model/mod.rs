@@ -52,6 +52,8 @@ pub struct Model {
     turned: Vec<Vector3<f64>>,
     /// Points, anchors and surfaces, as declared; 0 where nothing is known.
     fixtures: Vec<FixtureAt<f64>>,
+    /// The numbers of each of them that are declared.
+    declared: Vec<Vec<Option<f64>>>,
     /// Free parameters, shape of every full parameter vector.
     pub parameters: Vec<Parameter>,
     /// Linear inequalities between them.
@@ -80,6 +82,7 @@ impl Model {
             targets: vec![problem.tool.target; targets.len()],
             turned: vec![problem.tool.rotation; targets.len()],
             fixtures: problem.fixtures.iter().map(FixtureAt::declared).collect(),
+            declared: problem.fixtures.iter().map(|own| own.known.clone()).collect(),
             parameters,
         })
     }
@@ -184,6 +187,11 @@ impl Model {
             }
         }
         targets
+    }
+
+    /// Whether the problem says something of a number of a fixture.
+    pub(crate) fn is_declared(&self, fixture: usize, axis: usize) -> bool {
+        self.declared.get(fixture).and_then(|own| own.get(axis)).is_some_and(Option::is_some)
     }
 
     /// Points, anchors and surfaces in the measuring frame.

@@ -5,7 +5,7 @@ use num_dual::DualSVec64;
 
 use crate::problem::{Fixture, FixtureKind};
 use crate::scalar::{Scalar, gradient, seeded};
-use crate::spatial::rotate;
+use crate::spatial::plane_normal;
 
 /// Most numbers of a fixture.
 const NUMBERS: usize = 4;
@@ -66,7 +66,7 @@ impl<S: Scalar> FixtureAt<S> {
     ///
     /// - point P: x − P, which is 0 in the socket
     /// - anchor A: ‖x − A‖
-    /// - plane: n·x − d with n = exp(\[(rx, ry, 0)\]×) ẑ
+    /// - plane: n·x − d with n of [`plane_normal`]
     /// - sphere of centre C and radius ρ: ‖x − C‖ − ρ
     pub fn seen(&self, position: &Vector3<S>) -> Vector3<S> {
         let zero = S::from(0.0);
@@ -77,10 +77,7 @@ impl<S: Scalar> FixtureAt<S> {
             FixtureKind::Point => position - centre,
             FixtureKind::Anchor => only(length(&(position - centre))),
             FixtureKind::Sphere => only(length(&(position - centre)) - radius),
-            FixtureKind::Plane => {
-                let normal = rotate(&Vector3::new(x, y, zero), &Vector3::new(zero, zero, S::from(1.0)));
-                only(normal.dot(position) - z)
-            }
+            FixtureKind::Plane => only(plane_normal(x, y).dot(position) - z),
         }
     }
 }

@@ -3,11 +3,14 @@
 //!
 //! All of it stands in the measuring frame.
 
+use std::f64::consts::PI;
+
 use nalgebra::Vector3;
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
+use crate::spatial::TOLD_BY_OPPOSITE;
 
 /// σ of a known distance that says nothing of it: one micrometre \[m\].
 const EXACT: f64 = 1e-6;
@@ -33,7 +36,7 @@ pub enum FixtureKind {
     Point,
     /// A point to which distances are measured; x, y, z \[m\].
     Anchor,
-    /// A plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ; rx, ry \[rad\], d \[m\].
+    /// A plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ, or near −ẑ, with rx above 3π/4, n = −exp(\[(rx − π, ry, 0)\]×) ẑ; rx, ry \[rad\], d \[m\].
     Plane,
     /// A sphere: centre x, y, z and radius \[m\].
     Sphere,
@@ -223,14 +226,15 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
     Ok((kind, vec![Some(rx), Some(ry), at.map(|at| at.dot(&normal) / length)]))
 }
 
-/// The first two numbers (rx, ry) of a plane with this normal, of length 1: ẑ turned by them about an axis across it \[rad\].
+/// The first two numbers (rx, ry) of a plane with this normal, of length 1 \[rad\]; see [`plane_normal`](crate::spatial::plane_normal).
 pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     let across = normal.x.hypot(normal.y);
     let angle = across.atan2(normal.z);
-    if across > 0.0 {
+    if angle > TOLD_BY_OPPOSITE {
+        let [rx, ry] = lean(&-normal);
+        [PI + rx, ry]
+    } else if across > 0.0 {
         [-normal.y / across * angle, normal.x / across * angle]
-    } else if normal.z < 0.0 {
-        [std::f64::consts::PI, 0.0]
     } else {
         [0.0; 2]
     }

@@ -7,7 +7,7 @@ use super::draw::{Row, between, rounded_command};
 use super::truth::Truth;
 use super::{NoRest, Rig};
 use crate::problem::{FixtureKind, Joint, JointKind, Observation, PoseConditions};
-use crate::spatial::rotate;
+use crate::spatial::plane_normal;
 
 /// Configurations from which a contact is sought before it is given up.
 const TRIES: usize = 200;
@@ -33,10 +33,7 @@ impl Rig {
             FixtureKind::Point => target - place,
             FixtureKind::Anchor => only((target - place).norm()),
             FixtureKind::Sphere => only((target - place).norm() - number(3)),
-            FixtureKind::Plane => {
-                let normal = rotate(&Vector3::new(place.x, place.y, 0.0), &Vector3::z());
-                only(normal.dot(target) - place.z)
-            }
+            FixtureKind::Plane => only(plane_normal(place.x, place.y).dot(target) - place.z),
         }
     }
 

@@ -152,7 +152,7 @@ impl Bench {
     }
 
     /// A configuration in which `miss` of the target's position is nothing, near one drawn at random.
-    fn contact(&mut self, miss: &dyn Fn(&Vector3<f64>) -> Vec<f64>) -> Vec<f64> {
+    pub fn contact(&mut self, miss: &dyn Fn(&Vector3<f64>) -> Vec<f64>) -> Vec<f64> {
         loop {
             let mut q = DVector::from_vec(self.anywhere());
             let start = q.clone();

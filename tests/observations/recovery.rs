@@ -1,6 +1,9 @@
 //! The truth is found from rows of every kind, within its standard errors.
 
+use std::fmt::Write as _;
+
 use flexcal::identify::{Identification, Options, identify};
+use nalgebra::Vector3;
 
 use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, read, true_arm};
 
@@ -73,4 +76,41 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
     let top = found.spreads.iter().find(|(before, ..)| before.point == "top").unwrap();
     println!("top: {:.3} mm before, {:.3} mm after", top.0.mean * 1e3, top.1.mean * 1e3);
     assert!(top.2 && top.0.mean > 5.0 * top.1.mean && top.1.mean < 0.2e-3);
+}
+
+/// Horizontal planes above and below the arm's base, touched with and without offsets; a declared normal that is freed decides the
+/// side.
+#[test]
+fn planes_of_either_side_are_found() {
+    for (height, up) in [(0.2, 1.0), (0.2, -1.0), (-0.2, 1.0), (-0.2, -1.0)] {
+        for (step, declared) in [(2e-3, false), (0.0, true), (0.0, false)] {
+            // Without offsets to tell the side it is that of the arm's base.
+            let up = if step == 0.0 && !declared { -f64::signum(height) } else { up };
+            let normal = Vector3::new(0.03 * up, -0.02, up).normalize();
+            let plane = "name = \"table\"\nkind = \"plane\"\n";
+            let known = format!("{plane}normal = [0, 0, {up}]\nat_mm = [0, 0, {}]\n", height * 1e3);
+            let around = if declared { AROUND.replace(plane, &known) } else { AROUND.to_owned() };
+            let problem = problem(&format!("\"surface[table].*\" = {{ free = true }}\n{around}"));
+            let (arm, _) = true_arm(&problem, 5);
+            let mut bench = Bench::new(arm, 11);
+            let mut table = bench.table(&["position"], 40);
+            for k in 0..60 {
+                let offset = step * f64::from(k % 3);
+                let q = bench.contact(&|at| vec![normal.dot(at) - height * up - offset]);
+                let q: Vec<String> = q.iter().map(|q| format!("{q:.12}")).collect();
+                let _ = writeln!(table, "{},,,,,,,table,{:.7},,,", q.join(","), offset * 1e3);
+            }
+            let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
+            let what = format!("{height} m, up {up}, step {step}, declared {declared}");
+            assert!(found.is_trusted(), "{what}: {:?}", found.quality_flag);
+            let value = |field: &str| found.estimate(&format!("surface[table].{field}")).unwrap().estimate;
+            let lean = [value("rx"), value("ry")];
+            let own = flexcal::spatial::plane_normal(lean[0], lean[1]);
+            assert!(
+                (own - normal).norm() < 1e-3 && (value("d") - height * up).abs() < 1e-3,
+                "{what}: {own} {}",
+                value("d")
+            );
+        }
+    }
 }
