@@ -1,9 +1,12 @@
 //! The arm where it is to be measured.
 
+use std::collections::BTreeSet;
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::{DesignError, Sensitivity, Workspace};
+use crate::error::InputErrorKind;
 use crate::identify::{Placement, locate};
 use crate::measurement::Measurements;
 use crate::model::parameter::{BeamField, Parameter, Slot};
@@ -30,7 +33,8 @@ impl<'a> Site<'a> {
     /// For all poses of `tables`.
     ///
     /// # Errors
-    /// Rules of `[parameters]` do not fit the arm, no parameter is free, or σ is not known.
+    /// Rules of `[parameters]` do not fit the arm, no parameter is free, σ is not known, or distances are to be
+    /// measured to an anchor that nobody knows the place of.
     pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
         let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
         let add = |all: &mut Vec<String>, word: &String| {
@@ -54,12 +58,27 @@ impl<'a> Site<'a> {
         }
         let about = DVector::zeros(model.parameters.len());
         let mut site = Self { model, problem, bases, targets, about };
+        let (mut seen, mut planned_only) = (BTreeSet::new(), BTreeSet::new());
         for table in tables {
             let mut poses = site.poses(table, &Placement::of(table));
+            for pose in &poses {
+                // Where nothing is measured yet, contacts tell where something stands; distances do not.
+                let planned = matches!(pose.observation, Observation::Distance(_)) && !table.position_measured;
+                if let Some(fixture) = pose.observation.fixture() {
+                    if planned { &mut planned_only } else { &mut seen }.insert(fixture);
+                }
+            }
             poses.retain(|pose| table.position_measured || !matches!(pose.observation, Observation::Distance(_)));
             let mut about = std::mem::take(&mut site.about);
             locate(&site.model, &poses, |_| true, &mut about);
             site.about = about;
+        }
+        for own in planned_only.difference(&seen).filter_map(|&fixture| problem.fixtures.get(fixture)) {
+            if own.known.iter().any(Option::is_none) {
+                let (what, name) = (own.kind.word(), own.name.clone());
+                let kind = InputErrorKind::PlaceUnknown { what, name, write: own.kind.declared_by(0) };
+                return Err(own.location.clone().error(kind).into());
+            }
         }
         Ok(site)
     }

@@ -118,6 +118,10 @@ pub enum InputErrorKind {
     RepeatedFixture { what: &'static str, name: String, line: usize },
     #[error("no {what} is called \"{name}\"{}; {}", meant(name, known), list("there are", known, "none is declared"))]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
+    #[error("nobody knows where {parameter} is, so it can neither be held nor have a prior; write {write}")]
+    HeldUnknown { parameter: String, write: &'static str },
+    #[error("nobody knows where the {what} \"{name}\" is; declare about where: {write}")]
+    PlaceUnknown { what: &'static str, name: String, write: &'static str },
     #[error("a distance is between two different points, found {found}")]
     NotTwoPoints { found: usize },
     #[error(

@@ -61,6 +61,15 @@ impl FixtureKind {
         }
     }
 
+    /// The keys that declare one of its numbers.
+    pub fn declared_by(self, axis: usize) -> &'static str {
+        match (self, axis) {
+            (Self::Plane, _) => "normal and at_m",
+            (Self::Sphere, 3) => "radius_m",
+            _ => "at_m",
+        }
+    }
+
     /// Kind of quantity of one of its numbers.
     pub fn unit(self, axis: usize) -> Unit {
         if self == Self::Plane && axis < 2 { Unit::Angle } else { Unit::Length }

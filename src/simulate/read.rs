@@ -64,6 +64,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
         Some(section) => section.entries().iter().map(|(pattern, item)| random(pattern, item, &known)).collect(),
         None => Ok(Vec::new()),
     }?;
+    check_places(root, problem, &parameters, &random)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
     let (poses, time_step, held_out, positions) = ranges::read(section, problem)?;
@@ -81,6 +82,26 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
         held_out,
         segments,
     })
+}
+
+/// Everything that the rig measures against stands somewhere.
+fn check_places(
+    root: &Section<'_, '_>,
+    problem: &Problem,
+    parameters: &[Deviation],
+    random: &[RandomRule],
+) -> Result<(), InputError> {
+    for own in &problem.fixtures {
+        for (field, _) in own.kind.fields().iter().zip(&own.known).filter(|(_, known)| known.is_none()) {
+            let name = format!("{}[{}].{field}", own.kind.word(), own.name);
+            let is_said = parameters.iter().any(|own| own.name == name);
+            if !is_said && !random.iter().any(|rule| matches(&rule.pattern, &name)) {
+                let key = format!("parameters.\"{name}\"");
+                return Err(root.missing(&key, format!("where it truly is: \"{name}\" in [parameters]")));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// How the section `[poses]` may be written for these joints.

@@ -84,3 +84,13 @@ fn what_contacts_cannot_tell_is_named() {
     }
     assert!(found.identifiability.blind.len() >= 6);
 }
+
+#[test]
+fn what_nobody_knows_is_neither_held_nor_about_zero() {
+    for rule in ["{ fixed = true }", "{ sigma_mm = 2 }"] {
+        let problem = problem(&format!("\"anchor[A].x\" = {rule}\n{AROUND}"));
+        let data = read(&problem, &Bench::new(problem.clone(), 7).table(&["distance"], 40));
+        let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("nobody knows where anchor[A].x is") && error.contains("at_m"), "{error}");
+    }
+}

@@ -99,6 +99,12 @@ pub fn resolve(
     }
     let mut parameters = Vec::new();
     for (candidate, rule) in candidates.into_iter().zip(decided) {
+        if let (true, Some(rule), Slot::Fixture { kind, axis, .. }) = (candidate.unknown, rule, candidate.slot)
+            && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if of_kind(sigma, candidate.unit()).is_none())
+        {
+            let kind = InputErrorKind::HeldUnknown { parameter: candidate.name, write: kind.declared_by(axis) };
+            return Err(rule.location.clone().error(kind));
+        }
         let none = Quantities::default();
         let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.of_effect) {
             (Some(Freedom::Free { sigma, min, max }), _) => (of_kind(sigma, candidate.unit()), min, max),
