@@ -8,7 +8,7 @@ use super::arm::{Arm, Poses};
 use super::cause::{self, Cause};
 use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
-use super::pose::{PoseError, thin};
+use super::pose::{PoseError, weighted};
 use crate::diagnose::{ClosedLoop, Findings, examine};
 use crate::error::{Location, Warning};
 use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
@@ -72,6 +72,8 @@ pub struct PlotData {
     pub residuals: Vec<PoseError>,
     /// The rows among them that figures may draw, ascending: all, or evenly many with the largest residuals among them.
     pub shown: Vec<usize>,
+    /// How many rows each of `shown` stands for.
+    pub stand_for: Vec<f64>,
     /// Joints that take a command.
     pub commands: Vec<Command>,
     /// What the change of each parameter, and each effect, does to the predicted positions, the largest first.
@@ -173,8 +175,9 @@ impl PlotData {
         let few = held_out.len().min(fitted.len()).min(MOST / 2);
         let room = |kind: &[usize]| if kind.len() <= few { few } else { MOST - few };
         let size = |row: usize| residuals[row].error.norm();
-        let mut shown = [thin(&fitted, room(&fitted), size), thin(&held_out, room(&held_out), size)].concat();
-        shown.sort_unstable();
+        let mut drawn = [weighted(&fitted, room(&fitted), size), weighted(&held_out, room(&held_out), size)].concat();
+        drawn.sort_unstable_by_key(|own| own.0);
+        let (shown, stand_for): (Vec<usize>, Vec<f64>) = drawn.into_iter().unzip();
         let drawn: Vec<Pose> = shown.iter().map(|&row| all[row]).collect();
         Self {
             stages,
@@ -183,6 +186,7 @@ impl PlotData {
             commands: commands(problem),
             coverage: coverage::of(problem, poses, best),
             shown,
+            stand_for,
             residuals,
             time_measured: measurements.time_measured,
             findings,

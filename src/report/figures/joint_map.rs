@@ -89,7 +89,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                     part.count.to_string(),
                     rms(part).map_or_else(String::new, |rms| fixed(rms * 1e3, 6)),
                 ]);
-                tags.own(format!(" data-joint=\"{}\" data-low=\"{low:.4}\" data-high=\"{high:.4}\"", command.joint));
+                tags.own(format!(" data-joint=\"{}\" data-low=\"{low:.6}\" data-high=\"{high:.6}\"", command.joint));
                 match rms(part) {
                     Some(rms) => area.draw(&Rectangle::new(corners, WARM.mix(shade(rms)).filled()))?,
                     None => area.draw(&Rectangle::new(corners, line(FAINT, 0.5)))?,

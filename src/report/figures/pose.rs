@@ -28,8 +28,14 @@ const LARGEST: usize = 10;
 
 /// At most `most` of some rows, ascending: those of the largest `size`, and others evenly among the rest.
 pub fn thin(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
+    weighted(rows, most, size).into_iter().map(|(row, _)| row).collect()
+}
+
+/// The same, each with the number of rows that it stands for: 1 of the largest, as many as there are for one that is drawn of the
+/// others, so that sums over all rows can be told from those that are drawn [Horvitz & Thompson 1952].
+pub fn weighted(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<(usize, f64)> {
     if rows.len() <= most {
-        return rows.to_vec();
+        return rows.iter().map(|&row| (row, 1.0)).collect();
     }
     let finite = |row: usize| Some(size(row)).filter(|size| size.is_finite()).unwrap_or(0.0);
     let mut by_size = rows.to_vec();
@@ -37,8 +43,11 @@ pub fn thin(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<usi
     let (largest, rest) = by_size.split_at_mut((most / LARGEST).max(1));
     rest.sort_unstable();
     let every = rest.len().div_ceil((most - largest.len()).max(1));
-    let mut kept: Vec<usize> = largest.iter().copied().chain(rest.iter().copied().step_by(every)).collect();
-    kept.sort_unstable();
+    let drawn: Vec<usize> = rest.iter().copied().step_by(every).collect();
+    let each = rest.len() as f64 / drawn.len().max(1) as f64;
+    let mut kept: Vec<(usize, f64)> =
+        largest.iter().map(|&row| (row, 1.0)).chain(drawn.into_iter().map(|row| (row, each))).collect();
+    kept.sort_unstable_by_key(|own| own.0);
     kept
 }
 
@@ -73,5 +82,7 @@ mod tests {
         assert!(kept.contains(&501) && kept.contains(&0) && kept.is_sorted());
         assert_eq!(thin(&rows[..7], 100, size), rows[..7]);
         assert_eq!(thin(&rows, 100, |_| f64::NAN).len(), kept.len());
+        let stands_for: f64 = weighted(&rows, 100, size).into_iter().map(|(_, count)| count).sum();
+        assert!((stands_for - 1000.0).abs() < 1e-9, "{stands_for}");
     }
 }

@@ -53,7 +53,7 @@ const flexcal = (() => {
     const pose = byRow.get(row);
     if (panel) {
       panel.hidden = !pose;
-      panel.querySelector("output").textContent = pose ? words(pose) + ". " + joints(pose) + ". Measured at " + pose.position.map(shown).join(", ") + " mm; residual " + pose.after.map(shown).join(", ") + " mm." : "";
+      panel.querySelector("output").textContent = pose ? words(pose) + ". " + joints(pose) + ". Measured at " + pose.position.map((value) => value.toFixed(2).replace("-", "\u2212")).join(", ") + " mm; residual " + pose.after.map(shown).join(", ") + " mm." : "";
     }
     document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("picked", Number(line.dataset.row) === row));
     tell();
@@ -117,7 +117,10 @@ const flexcal = (() => {
       inputs.forEach((input, end) => { [input.min, input.max] = ends; input.step = "any"; input.value = ends[end]; });
       return { inputs, ends, unit, label: brush.querySelector("[data-range=\"" + k + "\"]") };
     });
-    const rms = (poses) => shown(Math.sqrt(poses.reduce((sum, pose) => sum + norm(pose.after) ** 2, 0) / poses.length)) + " mm";
+    /* Of many poses some are drawn, and one stands for so many. */
+    const count = (poses) => poses.reduce((sum, pose) => sum + (pose.n || 1), 0);
+    const about = data.poses.some((pose) => pose.n) ? "about " : "";
+    const rms = (poses) => about + shown(Math.sqrt(poses.reduce((sum, pose) => sum + (pose.n || 1) * norm(pose.after) ** 2, 0) / count(poses))) + " mm";
     const update = () => {
       const limits = ranges.map(({ inputs, label, unit }) => {
         const values = inputs.map((input) => Number(input.value)).sort((a, b) => a - b);
@@ -129,7 +132,7 @@ const flexcal = (() => {
       figures.forEach((figure) => figure.dots.forEach((own) => own.dot.classList.toggle("away", away.has(own.row))));
       document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("away", away.has(Number(line.dataset.row))));
       const kept = bySize.filter(state.kept);
-      brush.querySelector("output").textContent = kept.length + " of " + data.poses.length + " poses; rms residual of the fitted ones " + rms(kept.filter((pose) => !pose.held_out)) + ", of those held out " + rms(kept.filter((pose) => pose.held_out));
+      brush.querySelector("output").textContent = about + Math.round(count(kept)) + " of " + Math.round(count(data.poses)) + " poses; rms residual of the fitted ones " + rms(kept.filter((pose) => !pose.held_out)) + ", of those held out " + rms(kept.filter((pose) => pose.held_out));
       tell();
     };
     brush.addEventListener("input", update);
@@ -141,8 +144,9 @@ const flexcal = (() => {
       box.addEventListener("click", () => {
         const k = data.joints.findIndex((joint) => joint[2] === Number(box.dataset.joint));
         if (k < 0) return;
-        ranges[k].inputs[0].value = box.dataset.low;
-        ranges[k].inputs[1].value = box.dataset.high;
+        /* Joints are rounded to 1e-5. */
+        ranges[k].inputs[0].value = Number(box.dataset.low) - 6e-6;
+        ranges[k].inputs[1].value = Number(box.dataset.high) + 6e-6;
         update();
       });
     }
@@ -169,7 +173,7 @@ const flexcal = (() => {
         const order = (a, b) => {
           const [one, other] = [value(a), value(b)];
           if (typeof one !== typeof other) return typeof one === "number" ? -1 : 1;
-          return (falling ? -1 : 1) * (typeof one === "number" ? one - other : one.localeCompare(other));
+          return (falling ? -1 : 1) * (typeof one === "number" ? one - other : one.localeCompare(other, "en", { numeric: true }));
         };
         table.tBodies[0].append(...[...table.tBodies[0].rows].sort(order));
       });

@@ -29,6 +29,9 @@ struct Entry {
     row: usize,
     place: String,
     held_out: bool,
+    /// How many poses it stands for, where not all are there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    n: Option<f64>,
     q: Vec<f64>,
     position: [f64; 3],
     before: [f64; 3],
@@ -71,16 +74,17 @@ fn angle(command: Command, q: f64) -> f64 {
 impl Store {
     fn of(data: &PlotData) -> Self {
         let joint = |own: &Command| (own.name(), own.unit.display(1.0).symbol, own.joint);
-        let entry = |(&row, arm): (&usize, &Option<Shape>)| {
+        let entry = |((&row, &count), arm): ((&usize, &f64), &Option<Shape>)| {
             let own = &data.residuals[row];
             Entry {
                 row,
                 place: own.place.clone(),
                 held_out: own.held_out,
+                n: Some(count).filter(|count| *count > 1.0),
                 q: data
                     .commands
                     .iter()
-                    .map(|own_q| rounded(angle(*own_q, own.configuration[own_q.joint]), 3))
+                    .map(|own_q| rounded(angle(*own_q, own.configuration[own_q.joint]), 5))
                     .collect(),
                 position: millimetres(&own.position, 2),
                 before: millimetres(&own.before, 4),
@@ -98,7 +102,7 @@ impl Store {
         });
         Self {
             joints: data.commands.iter().map(joint).collect(),
-            poses: data.shown.iter().zip(&data.arms).map(entry).collect(),
+            poses: data.shown.iter().zip(&data.stand_for).zip(&data.arms).map(entry).collect(),
             traced: traced.collect(),
             uncovered: data.coverage.uncovered.iter().map(|at| millimetres(at, 0)).collect(),
         }

@@ -216,7 +216,8 @@
   });
   canvas.addEventListener("pointerleave", () => point(null));
   const zoom = (by) => { orbit.distance = Math.min(12, Math.max(0.4, orbit.distance * by)); repaint(); };
-  canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(event.deltaY * 0.001)); }, { passive: false });
+  /* A page scrolls past the view unless that is asked to zoom. */
+  canvas.addEventListener("wheel", (event) => { if (!event.ctrlKey && document.activeElement !== canvas) return; event.preventDefault(); zoom(Math.exp(event.deltaY * 0.001)); }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
     const act = { ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, 0.1), ArrowDown: () => turn(0, -0.1), "+": () => zoom(0.9), "-": () => zoom(1.1) }[event.key];
     if (act) { event.preventDefault(); act(); }
