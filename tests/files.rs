@@ -173,8 +173,14 @@ fn a_command_that_is_killed_leaves_no_litter() {
         process.kill().unwrap();
         process.wait().unwrap();
         let left = whole("killed");
-        assert!(left.iter().all(|name| expected.contains(name)), "after {} ms: {left:?}", 4 * delay);
+        // Between the two calls that replace a file it has another name.
+        let is_passing = |name: &String| name.rsplit('/').next().is_some_and(|last| last.starts_with(".flexcal-"));
+        assert!(left.iter().filter(|name| is_passing(name)).count() <= 1, "after {} ms: {left:?}", 4 * delay);
+        let known = |name: &String| expected.contains(name) || is_passing(name);
+        assert!(left.iter().all(known), "after {} ms: {left:?}", 4 * delay);
     }
+    // Numbers of processes end at 4 194 304.
+    fs::write(bench.path("killed/figures/.flexcal-5000000-x"), "left behind").unwrap();
     bench.flexcal("identify arm --out killed").success();
     assert_eq!(whole("killed"), expected);
 }

@@ -101,6 +101,8 @@ pub struct SelectionRules {
     /// Root mean square displacements that a hypothesis may cause, in units of σ, each as probable as the others: from a third
     /// of σ, which hardly shows, by steps of three to what nobody overlooks.
     pub displacements: [f64; 6],
+    /// Largest plausible value of an effect's parameter, in units of the 1 σ of its prior.
+    pub plausible: f64,
     /// Half width of the distribution of ln(true σ / declared σ): mostly to a tenth, but its tails are those of Cauchy.
     pub trust_declared: f64,
     /// The same of a σ that was estimated from the same residual.
@@ -174,6 +176,7 @@ impl SelectionRules {
         sure: 0.95,
         stated: 0.9,
         displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
+        plausible: 3.0,
         trust_declared: 0.1,
         trust_estimated: 1.0,
         together: 4,
@@ -229,6 +232,7 @@ impl SelectionRules {
             ("gross", size(self.gross)),
             ("few", part(self.few)),
             ("displacements", self.displacements.iter().all(|&size_of| size(size_of))),
+            ("plausible", size(self.plausible)),
             ("trust_declared", size(self.trust_declared)),
             ("trust_estimated", size(self.trust_estimated)),
             ("together", self.together >= 1),

@@ -8,7 +8,8 @@ use tempfile::NamedTempFile;
 
 /// A text that is on the disk as a whole and lacks only its name.
 ///
-/// Where the system can, it has no name at all until then, so that a process that is killed leaves nothing behind.
+/// Where the system can, it has no name at all until then, so that a process that is killed leaves nothing behind; killed between the
+/// two calls that replace a file, it leaves what the next one to replace files there takes away.
 #[derive(Debug)]
 pub struct Ready {
     path: PathBuf,
@@ -94,19 +95,36 @@ impl Kept {
     }
 }
 
+/// How names begin that last until a file is replaced; the number of their process follows.
+#[cfg(target_os = "linux")]
+const PASSING: &str = ".flexcal-";
+
+/// Takes away what processes left that are no more.
+#[cfg(target_os = "linux")]
+fn clear(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let process = name.to_str().and_then(|name| name.strip_prefix(PASSING)?.split_once('-')?.0.parse::<u32>().ok());
+        if process.is_some_and(|process| !Path::new("/proc").join(process.to_string()).exists()) {
+            _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Gives a file without a name its own: at once where nothing has it, else by way of a name that nobody else takes.
 #[cfg(target_os = "linux")]
 fn name(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd as _;
 
     use rustix::fs::{AtFlags, CWD, linkat};
+    clear(folder);
     let nameless = format!("/proc/self/fd/{}", file.as_raw_fd());
     let link = |to: &Path| linkat(CWD, &nameless, CWD, to, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
     match link(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         done => return done,
     }
-    let new = tempfile::Builder::new().make_in(folder, link)?;
+    let new = tempfile::Builder::new().prefix(&format!("{PASSING}{}-", std::process::id())).make_in(folder, link)?;
     fs::rename(new.path(), path)?;
     // It is gone under this name already.
     _ = new.into_temp_path().keep();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::marginal::{Normal, of_block};
+use super::marginal::{Coefficients, Normal, of_block};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
 
@@ -93,8 +93,7 @@ pub(super) struct Block {
     /// AᵀA and Aᵀr.
     normal: Normal,
     pub ln_prior: f64,
-    /// For each column, whether its parameter is never negative; empty: none.
-    never_negative: Vec<bool>,
+    coefficients: Coefficients,
 }
 
 #[derive(Debug, Clone)]
@@ -107,8 +106,7 @@ enum Columns {
 
 impl Block {
     /// Of columns of root mean square 1 in the data.
-    pub fn new(design: Design, fit: &LinearNeighbourhood, ln_prior: f64, never_negative: &[bool]) -> Self {
-        let never_negative = never_negative.to_vec();
+    pub fn new(design: Design, fit: &LinearNeighbourhood, ln_prior: f64, coefficients: Coefficients) -> Self {
         match design {
             Design::Dense(columns) => {
                 let columns = fit.left_of(&columns);
@@ -116,7 +114,7 @@ impl Block {
                 // The narrow side is transposed: this is the product that is fast.
                 gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
                 let normal = Normal::Dense { product: columns.tr_mul(fit.residual()), gram };
-                Self { columns: Columns::Dense(columns), normal, ln_prior, never_negative }
+                Self { columns: Columns::Dense(columns), normal, ln_prior, coefficients }
             }
             Design::Grouped { levers, groups } => {
                 let squares = levers.map(|value| value * value);
@@ -130,7 +128,7 @@ impl Block {
                         .column(0)
                         .into_owned(),
                 };
-                Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, never_negative }
+                Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, coefficients }
             }
         }
     }
@@ -160,7 +158,7 @@ impl Block {
         grid: &[(f64, f64)],
         rules: &SelectionRules,
     ) -> (f64, f64) {
-        let prior = (&rules.displacements[..], &self.never_negative[..]);
+        let prior = (&rules.displacements[..], &self.coefficients);
         let (with, size) = if within.nrows() == 0 {
             of_block(&self.normal, left, grid, prior)
         } else {
@@ -204,7 +202,7 @@ mod tests {
                 let grouped = grouped.scaled(12).unwrap().without(&[3]);
                 let dense = Design::Dense(grouped.columns().into_owned());
                 let [one, other] = [grouped, dense].map(|design| {
-                    let block = Block::new(design, &fit, 0.0, &[]);
+                    let block = Block::new(design, &fit, 0.0, Coefficients::default());
                     (block.gain((&set, &taken), ((100.0, 30.0), 0.0), &grid, &rules), block.columns(&fit).into_owned())
                 });
                 assert!((one.0.0 - other.0.0).abs() < 1e-9 && (one.0.1 - other.0.1).abs() < 1e-12, "{one:?} {other:?}");

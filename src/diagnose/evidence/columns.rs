@@ -5,12 +5,14 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::functions::{Known, basis, goes_with, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
+use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
 use crate::diagnose::data::{bits, number};
 use crate::diagnose::neighbourhood::{Linearised, tries};
 use crate::diagnose::rules::SelectionRules;
 use crate::model::Pose;
-use crate::model::parameter::{BeamField, JointField, Slot};
+use crate::model::effect::Term;
+use crate::model::parameter::{BeamField, Driver, JointField, Slot};
 use crate::problem::{Effect, JointKind, Problem};
 
 /// A hypothesis with its columns and the logarithm of its prior probability.
@@ -21,8 +23,7 @@ pub(super) struct Candidate {
     /// Of root mean square 1 all together.
     pub design: Design,
     pub ln_prior: f64,
-    /// For each column, whether its parameter is never negative.
-    pub never_negative: Vec<bool>,
+    pub coefficients: Coefficients,
 }
 
 /// Slots whose columns the hypotheses need beside those of effects.
@@ -42,6 +43,16 @@ pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
 fn places(problem: &Problem) -> impl Iterator<Item = Slot> + '_ {
     (0..problem.joints.len())
         .flat_map(|joint| JointField::GEOMETRY.into_iter().map(move |field| Slot::Joint { joint, field }))
+}
+
+/// Whether the parameters of an effect stand for axes of the arm, as compliances about two of them, of which one alone may give way;
+/// a shift of what measures and the phase of a harmonic have no such axes.
+fn acts_along_axes(terms: &[Term]) -> bool {
+    let is_axis = |term: &Term| {
+        term.driver == Driver::Constant && term.nominal == 0.0 && Part::of(term.slot) != Part::Measurement
+    };
+    let distinct = |(k, term): (usize, &Term)| terms[..k].iter().all(|other| other.slot != term.slot);
+    terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
 }
 
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
@@ -94,14 +105,21 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         // Names of effects, one's own among them, have no space before them.
-        self.entered(&format!(" {family}"), share, hypothesis, design(), Vec::new());
+        self.entered(&format!(" {family}"), share, hypothesis, design(), Coefficients::default());
     }
 
-    fn entered(&mut self, family: &str, share: f64, hypothesis: Hypothesis, design: Design, never_negative: Vec<bool>) {
+    fn entered(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        design: Design,
+        coefficients: Coefficients,
+    ) {
         if let Some(design) = design.scaled(self.weighed) {
             let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
             let variant = same.map_or(0, |last| last.variant + 1);
-            self.candidates.push(Candidate { hypothesis, variant, design, ln_prior: 0.0, never_negative });
+            self.candidates.push(Candidate { hypothesis, variant, design, ln_prior: 0.0, coefficients });
             self.shares.push((family.to_owned(), share));
         }
     }
@@ -112,16 +130,24 @@ impl<'a, 'l> Columns<'a, 'l> {
         let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
         for ((effect, columns), tries) in effects.iter().zip(tries) {
             let mut columns = columns.clone();
+            let terms = effect.terms(self.problem);
+            let mut largest = Vec::new();
             // Parameters of several units: each alone moves the poses as much as the others.
-            for mut column in columns.column_iter_mut() {
+            for (k, mut column) in columns.column_iter_mut().enumerate() {
                 let length = column.rows(0, 3 * self.weighed).norm();
+                let most = terms.get(k).map_or(f64::INFINITY, |term| self.rules.plausible * term.size);
+                largest.push(if length > 0.0 { most * length / ((3 * self.weighed) as f64).sqrt() } else { 1e-9 });
                 if length > 0.0 {
                     column /= length;
                 }
             }
             let hypothesis = Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
-            let never = effect.terms(self.problem).iter().map(|term| term.never_negative).collect();
-            self.entered(effect.name(), 1.0 / tries, hypothesis, Design::Dense(columns), never);
+            let coefficients = Coefficients {
+                never_negative: terms.iter().map(|term| term.never_negative).collect(),
+                alone: acts_along_axes(&terms),
+                largest,
+            };
+            self.entered(effect.name(), 1.0 / tries, hypothesis, Design::Dense(columns), coefficients);
         }
     }
 

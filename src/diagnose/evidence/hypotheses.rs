@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::columns::{Candidate, Columns, slots};
 use super::functions::{Known, Shape};
+use super::marginal::Coefficients;
 use super::{Explanation, Hypothesis};
 use crate::diagnose::candidates::Candidates;
 use crate::diagnose::covariate::Covariate;
@@ -82,8 +83,8 @@ impl<'a> Hypotheses<'a> {
                 columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
             }
             let design = Design::Dense(columns).scaled(weighed)?;
-            let never_negative = vec![false];
-            Some((*shape, Candidate { hypothesis: hypothesis.clone(), variant: 0, design, ln_prior, never_negative }))
+            let coefficients = Coefficients::default();
+            Some((*shape, Candidate { hypothesis: hypothesis.clone(), variant: 0, design, ln_prior, coefficients }))
         };
         shapes.iter().filter_map(one).collect()
     }

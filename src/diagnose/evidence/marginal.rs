@@ -134,11 +134,61 @@ fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
     all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
 }
 
+/// What is known of the coefficients of a block before any data.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Coefficients {
+    /// For each whether it is never negative; empty: none.
+    pub never_negative: Vec<bool>,
+    /// Whether each may be at work without the others.
+    pub alone: bool,
+    /// For each the root mean square displacement, in units of σ, that the largest plausible value causes; empty: any.
+    pub largest: Vec<f64>,
+}
+
+impl Coefficients {
+    /// Sizes that are plausible for some of them, of columns of that root mean square: larger ones stand for the largest.
+    fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
+        let largest = of.filter_map(|j| self.largest.get(j)).copied().reduce(f64::max).unwrap_or(f64::INFINITY);
+        sizes.iter().map(|size| size.min(largest / column)).collect()
+    }
+}
+
 /// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the most probable of its sizes.
+///
+/// Where its k columns may be at work one without the others, all together and each alone have the same chance 1/(k + 1): otherwise
+/// what one column of two explains would be held by another effect of that one column, for its prior is the narrower.
+pub(super) fn of_block(
+    normal: &Normal,
+    left: (f64, f64),
+    grid: &[(f64, f64)],
+    (sizes, coefficients): (&[f64], &Coefficients),
+) -> (f64, f64) {
+    let k = coefficients.largest.len().max(1);
+    // All columns together have a root mean square of 1, and so has each alone.
+    let column = (k as f64).sqrt().recip();
+    let plausible = coefficients.plausible(sizes, 0..k, column);
+    let (whole, size) = of_columns(normal, left, grid, (&plausible, &coefficients.never_negative));
+    let (gram, product) = match normal {
+        Normal::Dense { gram, product } if coefficients.alone && gram.ncols() > 1 => (gram, product),
+        _ => return (whole, size),
+    };
+    let one = |j: usize| {
+        let own =
+            Normal::Dense { gram: gram.view((j, j), (1, 1)).into_owned(), product: product.rows(j, 1).into_owned() };
+        let sign = coefficients.never_negative.get(j).copied().unwrap_or(false);
+        let sizes: Vec<f64> =
+            coefficients.plausible(sizes, std::iter::once(j), 1.0).iter().map(|size| size / column).collect();
+        of_columns(&own, left, grid, (&sizes, &[sign])).0
+    };
+    let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(one)).collect();
+    (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
+}
+
+/// The same of all columns together.
 ///
 /// Of a parameter that is `never_negative` the prior is the half β ≥ 0 of its normal distribution: with the estimate m and its
 /// standard error s the likelihood changes by 2 Φ(m / s).
-pub(super) fn of_block(
+fn of_columns(
     normal: &Normal,
     (squares, freedom): (f64, f64),
     grid: &[(f64, f64)],
@@ -168,4 +218,40 @@ fn signs(covariance: &DMatrix<f64>, product: &DVector<f64>, scatter: f64, never_
         statrs::function::erf::erfc(-t / std::f64::consts::SQRT_2).max(f64::MIN_POSITIVE).ln()
     };
     (0..mean.len()).filter(|&j| never_negative.get(j) == Some(&true)).map(one).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: [f64; 6] = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+
+    /// ln p(r | columns) − ln p(r) of r = 5 A₁ and noise, A of two columns or of the first alone.
+    fn gain(count: usize, coefficients: &Coefficients) -> f64 {
+        let column = |j: usize, i: usize| ((12.9898 + 3.77 * j as f64) * i as f64 + 0.5).sin() * 2.0_f64.sqrt();
+        let columns = DMatrix::from_fn(120, count, |i, j| column(j, i) / (count as f64).sqrt());
+        let residual = DVector::from_fn(120, |i, _| 5.0 * column(0, i) + column(7, i));
+        let normal = Normal::Dense { gram: columns.transpose() * &columns, product: columns.transpose() * &residual };
+        let noise = Noise { freedom: 120.0, trust: 0.1, least: 0.0 };
+        let (squares, grid) = (residual.norm_squared(), noise.grid());
+        of_block(&normal, (squares, 120.0), &grid, (&SIZES, coefficients)).0 - over_noise(squares, &grid)
+    }
+
+    #[test]
+    fn what_one_of_two_columns_explains_is_not_the_other_effects_of_that_column() {
+        let plausible = |count: usize| vec![f64::INFINITY; count];
+        let one = gain(1, &Coefficients { largest: plausible(1), ..Coefficients::default() });
+        let two = gain(2, &Coefficients { largest: plausible(2), ..Coefficients::default() });
+        let alone = gain(2, &Coefficients { largest: plausible(2), alone: true, ..Coefficients::default() });
+        assert!(one > 50.0 && one - two > 2.0, "{one} {two}");
+        assert!((one - alone - 3.0_f64.ln()).abs() < 0.2, "{one} {alone}");
+    }
+
+    #[test]
+    fn what_needs_an_implausible_size_is_no_explanation() {
+        let any = gain(1, &Coefficients::default());
+        let plausible = gain(1, &Coefficients { largest: vec![5.0], ..Coefficients::default() });
+        let hardly = gain(1, &Coefficients { largest: vec![0.2], ..Coefficients::default() });
+        assert!(plausible > any && hardly < any - 50.0, "{any} {plausible} {hardly}");
+    }
 }

@@ -318,7 +318,7 @@ fn blocks(
     }
     let of_candidate = |candidate: &&Candidate| {
         let design = candidate.design.clone().without(left_out);
-        Block::new(design, &neighbourhood, candidate.ln_prior, &candidate.never_negative)
+        Block::new(design, &neighbourhood, candidate.ln_prior, candidate.coefficients.clone())
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
