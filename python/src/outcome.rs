@@ -94,7 +94,7 @@ impl Identification {
     /// Columns of the residual table.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = py.detach(|| self.found.residuals(&self.problem, &self.data));
-        residuals::table(py, &self.data, &found.map_err(|error| raised(&error))?)
+        residuals::table(py, &self.problem, &self.data, &found.map_err(|error| raised(&error))?)
     }
 
     /// Positions of the identified arm, shape = (poses, 3), measuring frame [m].

@@ -11,15 +11,22 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
 use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
 
+use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
 use super::{diagnostic, output};
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("out", |arg| {
+        let default = "in out/<name of the problem>, under the name of the URDF or as kinematics.yaml";
+        arg.value_name("FILE").help(format!("The file to write [default: {default}]"))
+    }),
+    after_help = "Examples:
   flexcal export panda --estimate out/panda/estimate.json --urdf panda.urdf
-  flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml")]
+  flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml"
+)]
 pub struct Arguments {
     /// A problem.toml, or the folder that holds one
     problem: PathBuf,
@@ -32,21 +39,11 @@ pub struct Arguments {
     /// Origins of the joints as YAML instead
     #[arg(long, value_name = "FORMAT")]
     format: Option<Format>,
-    /// The file to write [default: in out/<name of the problem>, under the name of the URDF or as kinematics.yaml]
-    #[arg(short, long, value_name = "FILE")]
-    out: Option<PathBuf>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Replace a file that flexcal did not write, or that was changed since
-    #[arg(long)]
-    force: bool,
-    /// Print what was written as JSON on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// Print nothing but errors
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    flags: Flags,
 }
 
 /// A form of YAML.
@@ -60,6 +57,7 @@ enum Format {
 
 /// Writes the identified geometry, and says what it leaves out.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = SavedEstimate::read(&arguments.estimate)?;
     let model = estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
@@ -77,28 +75,28 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             (yaml(&joint_origins(&problem, &arm, form)?, form), None, PathBuf::from("kinematics.yaml"))
         }
     };
-    let path = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name).join(default));
+    let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let own =
         if arguments.problem.is_dir() { arguments.problem.join("problem.toml") } else { arguments.problem.clone() };
     let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
     let inputs = [&[own, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
-    let results = Results::claim("export", folder, inputs, &[&name], (arguments.force, arguments.quiet))?;
+    let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
     // Measurements that the problem names need not be at hand any more.
     let at_hand = !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
-    if let Some(absent) = files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !arguments.quiet) {
+    if let Some(absent) = files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet) {
         diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
     }
-    let errors = if at_hand { Some(errors(&problem, files, &estimates, arguments.quiet)?) } else { None };
+    let errors = if at_hand { Some(errors(&problem, files, &estimates, flags.quiet)?) } else { None };
     results.write(&[(&name, &text)])?;
     let exported = Exported { problem: &problem, model: &model, file: Some(&path), moved: moved.as_deref(), errors };
-    if arguments.json {
+    if flags.json {
         output::print_json(&report::export_json(&exported))?;
-    } else if !arguments.quiet {
+    } else if flags.talks() {
         output::print(&report::export_text(&exported))?;
     }
-    if !estimates.trusted && !arguments.quiet {
+    if !estimates.trusted && !flags.quiet {
         diagnostic::warn("the estimate is not to be trusted, and so is this file not");
     }
     Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })

@@ -5,7 +5,7 @@ use std::error::Error;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::identify::{self, Options, SolverChoice, Strategy};
-use flexcal::report::{self, PlotData};
+use flexcal::report::{self, PlotData, shell_word};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
@@ -96,8 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 format!("flexcal loop {named} looks for what the model lacks")
             }
             true => {
-                let problem = common.problem().display();
-                let estimate = estimate.display();
+                let [problem, estimate] = [common.problem(), &estimate].map(shell_word);
                 format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
             }
             false => format!("flexcal check {named} says what the poses can tell"),

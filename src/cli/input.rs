@@ -1,14 +1,17 @@
 //! Arguments that every command takes, and the input they name.
 
 use std::error::Error;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::error::{InputError, Warning, WarningKind};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
+use flexcal::report::shell_word;
 
 use super::diagnostic;
+use super::flags::Flags;
 use super::output::{Results, WriteError};
 
 /// Problem, data, and where results go.
@@ -20,18 +23,17 @@ pub struct Common {
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
-    /// Folder for results [default: out/<name of the problem>]
-    #[arg(short, long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write
-    #[arg(long)]
-    pub force: bool,
-    /// Print the result as JSON on standard output, and nothing else
-    #[arg(long)]
-    pub json: bool,
-    /// Print nothing but errors (and the JSON, where it is asked for)
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub flags: Flags,
+}
+
+/// Everything else that stands among the flags.
+impl Deref for Common {
+    type Target = Flags;
+
+    fn deref(&self) -> &Flags {
+        &self.flags
+    }
 }
 
 /// Everything that was read.
@@ -60,9 +62,9 @@ impl Common {
 
     /// The problem, and the measurement files where any are named, as arguments of another command.
     pub fn named(&self) -> String {
-        let data: Vec<String> = self.data().iter().map(|file| format!(" {}", file.display())).collect();
+        let data: Vec<String> = self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
         let data = if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
-        format!("{}{data}", self.problem().display())
+        format!("{}{data}", shell_word(self.problem()))
     }
 
     /// The measurement files that are named, none where those of the problem count.
@@ -109,7 +111,7 @@ impl Common {
     ) -> Result<Results, WriteError> {
         let own = [self.problem_file()];
         let inputs = [&own, others, &problem.data.files, self.data()].concat();
-        Results::claim(command, self.folder(problem), inputs, names, (self.force, self.quiet))
+        self.claim(command, &self.results_name(problem), inputs, names)
     }
 
     /// The measurement files.
@@ -123,17 +125,11 @@ impl Common {
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Folder for the results of `problem`; those of a `problem.closed.toml` do not go where those of the problem went that it
-    /// comes from.
-    fn folder(&self, problem: &Problem) -> PathBuf {
+    /// Name of the results of `problem`; those of a `problem.closed.toml` do not go where those of the problem went that it comes
+    /// from.
+    fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));
-        let name = variant.map_or_else(|| problem.name.clone(), |variant| format!("{}-{variant}", problem.name));
-        self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
-    }
-
-    /// Whether people read along.
-    pub fn talks(&self) -> bool {
-        !self.json && !self.quiet
+        variant.map_or_else(|| problem.name.clone(), |variant| format!("{}-{variant}", problem.name))
     }
 }

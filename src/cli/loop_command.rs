@@ -8,7 +8,7 @@ use clap::Args;
 use flexcal::diagnose;
 use flexcal::identify::Options;
 use flexcal::problem::Problem;
-use flexcal::report::{self, PlotData};
+use flexcal::report::{self, PlotData, shell_word};
 
 use super::input::Common;
 use super::outcome::Outcome;
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let closed = results.path("problem.closed.toml");
         output::print(&format!(
             "Next: flexcal identify {} -v lists the parameters of the final fit\n",
-            closed.display()
+            shell_word(&closed)
         ))?;
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))

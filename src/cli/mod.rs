@@ -9,6 +9,7 @@ mod compensate;
 mod completions;
 mod diagnostic;
 mod export;
+mod flags;
 mod identify;
 mod init;
 mod input;

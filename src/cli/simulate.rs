@@ -7,10 +7,11 @@ use clap::{Args, value_parser};
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{HeldOut, PoseConditions, Problem};
+use flexcal::report::shell_word;
 use flexcal::simulate::{Simulation, Truth, simulate, simulate_poses};
 
+use super::flags::Flags;
 use super::outcome::Outcome;
-use super::output::Results;
 use super::{diagnostic, output};
 
 /// Arguments of `flexcal simulate`.
@@ -35,18 +36,8 @@ pub struct Arguments {
     /// Seed of every random number
     #[arg(long, value_name = "S")]
     seed: u64,
-    /// Folder for results [default: out/<name of the problem>]
-    #[arg(short, long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write
-    #[arg(long)]
-    force: bool,
-    /// Print what is true as JSON on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// Print nothing but errors
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    flags: Flags,
 }
 
 /// Measures the true arm on the virtual test rig; writes `measurements.csv` and `truth.json`.
@@ -56,9 +47,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let inside = |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
     let own = [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
     let inputs = [&own[..], &problem.data.files, &arguments.data].concat();
-    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&problem.name));
-    let (force, quiet) = (arguments.force, arguments.quiet);
-    let results = Results::claim("simulate", folder, inputs, &["measurements.csv", "truth.json"], (force, quiet))?;
+    let flags = &arguments.flags;
+    let results = flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
     let simulation = match arguments.poses {
         Some(poses) => simulate(&problem, &truth, poses as usize, arguments.seed)?,
         None => simulate_poses(&problem, &truth, poses_of(arguments, &problem)?, arguments.seed)?,
@@ -67,15 +57,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is divided by whoever reads the rows.
     let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. })) || simulation.held_out() > 0;
-    if arguments.json {
+    if flags.json {
         output::print_json(&json)?;
-    } else if !arguments.quiet {
+    } else if flags.talks() {
         output::print(&summary(&simulation, &table))?;
         if divided {
             output::print(&next(&arguments.problem, &table))?;
         }
     }
-    if !divided && !arguments.quiet {
+    if !divided && !flags.quiet {
         diagnostic::warn(
             "no row is held out, and identify needs some to judge by: simulate more poses, or change held_out or \
              identification in [poses]",
@@ -87,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// What the rows of the tables set.
 fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<PoseConditions>, InputError> {
     let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
-    if !arguments.quiet {
+    if !arguments.flags.quiet {
         diagnostic::print_warnings(&warnings);
     }
     Ok(rows.all_conditions())
@@ -98,9 +88,10 @@ fn summary(simulation: &Simulation, table: &Path) -> String {
     let (identify, sigma) = (poses - held_out, simulation.truth.noise_sigma * 1e3);
     let table = table.display();
     format!(
-        "{poses} poses: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
+        "{poses} pose{s}: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
          Effects: {effects}\n\n\
          Written to {table}, what is true to truth.json beside it\n",
+        s = if poses == 1 { "" } else { "s" },
         effects = match simulation.effect_names().join(", ") {
             none if none.is_empty() => "none".to_owned(),
             names => names,
@@ -110,6 +101,6 @@ fn summary(simulation: &Simulation, table: &Path) -> String {
 
 fn next(problem: &Path, table: &Path) -> String {
     let folder = table.parent().unwrap_or(table).join("identified");
-    let (problem, table, folder) = (problem.display(), table.display(), folder.display());
+    let [problem, table, folder] = [problem, table, &folder].map(shell_word);
     format!("Next: flexcal identify {problem} --data {table} --out {folder}\n")
 }

@@ -1,12 +1,13 @@
 //! `flexcal study`.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use flexcal::monte_carlo::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
-use flexcal::report;
+use flexcal::report::{self, shell_word};
 
+use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::{self, REPORT, Results, WriteError};
 use super::progress::FitBar;
@@ -45,21 +46,12 @@ enum Merge {
 }
 
 #[derive(Debug, Args)]
+#[command(mut_arg("out", |arg| arg.help("Folder for results [default: out/<name of the study>]")))]
 struct Common {
     /// A STUDY.toml, or the folder that holds one
     study: PathBuf,
-    /// Folder for results [default: out/<name of the study>]
-    #[arg(short, long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write
-    #[arg(long)]
-    force: bool,
-    /// Print the result as JSON on standard output, and nothing else
-    #[arg(long)]
-    json: bool,
-    /// Print nothing but errors (and the JSON, where it is asked for)
-    #[arg(short, long)]
-    quiet: bool,
+    #[command(flatten)]
+    flags: Flags,
 }
 
 /// A folder of shares that is not there.
@@ -80,13 +72,7 @@ impl Common {
 
     /// The same of a study called `name`, which reads `files` and writes `names`.
     fn claim(&self, name: &str, files: &[PathBuf], names: &[&str]) -> Result<Results, WriteError> {
-        let folder = self.out.clone().unwrap_or_else(|| Path::new("out").join(name));
-        Results::claim("study", folder, files.to_vec(), names, (self.force, self.quiet))
-    }
-
-    /// Whether people read along.
-    fn talks(&self) -> bool {
-        !self.json && !self.quiet
+        self.flags.claim("study", name, files.to_vec(), names)
     }
 }
 
@@ -117,8 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if arguments.shard.is_none() {
         return finish(common, &study, &results, &[store]);
     }
-    if common.talks() {
-        let (file, folder) = (common.study.display(), results.folder.display());
+    if common.flags.talks() {
+        let (file, folder) = (shell_word(&common.study), shell_word(&results.folder));
         output::print(&format!("Share done. After the last: flexcal study merge {file} --out {folder}\n"))?;
     }
     Ok(Outcome::Done)
@@ -128,15 +114,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
-    let bar = common.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
+    let bar = common.flags.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
     let found = monte_carlo::replicate(study, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     let found = found?;
     let json = report::replica_json(study, &found);
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
-    if common.json {
+    if common.flags.json {
         output::print_json(&json)?;
-    } else if common.talks() {
+    } else if common.flags.talks() {
         output::print(&report::replica_text(study, &found))?;
         let folder = results.folder.display();
         output::print(&format!("\nWritten to {folder}: misprints.json, report.md, report.html\n"))?;
@@ -149,7 +135,7 @@ fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<()
     let own = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = own.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
-    let bar = common.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
+    let bar = common.flags.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
     let done = monte_carlo::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     Ok(done?)
@@ -165,9 +151,9 @@ fn finish(common: &Common, study: &Study, results: &Results, stores: &[Store]) -
         (NAMES[3], &report::study_csv(study, &found)),
     ];
     results.write(&texts)?;
-    if common.json {
+    if common.flags.json {
         output::print_json(&json)?;
-    } else if common.talks() {
+    } else if common.flags.talks() {
         output::print(&report::study_text(study, &found))?;
         output::print(&format!(
             "\nWritten to {}, each parameter to parameters.csv beside it\n",

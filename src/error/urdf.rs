@@ -37,7 +37,7 @@ pub enum UrdfMistake {
         "a joint of type \"{kind}\" is not one that an arm can have; known: revolute, continuous, prismatic, fixed"
     )]
     Kind { kind: String },
-    #[error("no link is called \"{name}\"{}", meant(name, known))]
+    #[error("no link is called \"{name}\"{}; the links are {}", meant(name, known), listed(known))]
     NoLink { name: String, known: Vec<String> },
     #[error("no joint is called \"{name}\"{}", meant(name, known))]
     NoJoint { name: String, known: Vec<String> },
@@ -73,4 +73,14 @@ pub enum UrdfMistake {
     NoRoom { joint: String, off: String },
     #[error("not an arm of Universal Robots' form: {why}")]
     NotUr { why: String },
+}
+
+/// Most names in a list.
+const LISTED: usize = 30;
+
+/// Names, and how many more there are.
+fn listed(names: &[String]) -> String {
+    let more = names.len().saturating_sub(LISTED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    names.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ") + &more
 }

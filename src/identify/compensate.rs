@@ -9,6 +9,7 @@ use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{JointKind, PoseView, Problem};
+use crate::spatial::Frame;
 
 use super::stage::StageError;
 
@@ -88,32 +89,28 @@ pub fn waypoints(
 
 /// Targets that are given in the frame of the arm's base, as seen from the measuring frame.
 pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
-    let (placement, bases) = (Placement::of(targets), model.base_frames(x.as_slice()));
-    let base = |row: usize| &bases[placement.base_of(row)];
-    let mut seen = targets.clone();
-    for (row, position) in seen.positions.iter_mut().enumerate() {
-        *position = base(row).point(position);
-    }
-    for (row, orientation) in seen.orientations.iter_mut().flatten().enumerate() {
-        let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&base(row).axes));
-        *orientation = UnitQuaternion::from(turn) * *orientation;
-    }
-    seen
+    moved(targets, &model.base_frames(x.as_slice()))
 }
 
 /// The inverse: positions and orientations in the measuring frame, as seen from the arm's base.
 pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
-    let (placement, bases) = (Placement::of(targets), model.base_frames(x.as_slice()));
+    let bases: Vec<Frame<f64>> = model.base_frames(x.as_slice()).iter().map(Frame::inverse).collect();
+    moved(targets, &bases)
+}
+
+/// Positions and orientations moved by the frame of each row's base.
+fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
+    let placement = Placement::of(targets);
     let base = |row: usize| &bases[placement.base_of(row)];
-    let mut seen = targets.clone();
-    for (row, position) in seen.positions.iter_mut().enumerate() {
-        *position = base(row).resolve(&(*position - base(row).origin));
+    let mut moved = targets.clone();
+    for (row, position) in moved.positions.iter_mut().enumerate() {
+        *position = base(row).point(position);
     }
-    for (row, orientation) in seen.orientations.iter_mut().flatten().enumerate() {
+    for (row, orientation) in moved.orientations.iter_mut().flatten().enumerate() {
         let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&base(row).axes));
-        *orientation = UnitQuaternion::from(turn).inverse() * *orientation;
+        *orientation = UnitQuaternion::from(turn) * *orientation;
     }
-    seen
+    moved
 }
 
 /// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the

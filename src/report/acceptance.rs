@@ -6,7 +6,7 @@ use super::document::{Block, Headline, Table};
 use super::figures::range;
 use super::identify::{BEFORE, short_mm};
 use super::json::{object, to_text};
-use super::quantity::{mm, number};
+use super::quantity::{counted, mm, number};
 use super::render::{report, text};
 use super::table;
 use crate::identify::{Acceptance, AcceptancePose, Accuracy, Identification};
@@ -147,7 +147,12 @@ pub fn acceptance_json(
 /// The accuracy in brief, ending in a line break.
 pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
     let blocks = [
-        Block::lines(format!("{}\n{} held-out poses; {}", problem.title, judged.poses.len(), protocol(problem))),
+        Block::lines(format!(
+            "{}\n{}; {}",
+            problem.title,
+            counted(judged.poses.len(), "held-out pose"),
+            protocol(problem)
+        )),
         Block::Table(accuracy(judged)),
         Block::Text(JUDGED.to_owned()),
         Block::Text(repeats(judged)),
@@ -168,7 +173,7 @@ pub fn acceptance_page(
             (BEFORE, short_mm(judged.before.mean.value)),
             ("as identified", short_mm(judged.after.mean.value)),
         ],
-        of: format!("{} held-out poses", judged.poses.len()),
+        of: counted(judged.poses.len(), "held-out pose"),
         facts: Vec::new(),
     };
     let trust = if found.is_trusted() { "The fit is trusted." } else { "Beware: the fit is not to be trusted." };
@@ -195,7 +200,7 @@ pub fn acceptance_page(
         Block::heading("How it was measured"),
         Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
         Block::Text(format!(
-            "Poses {}. {} rows were fitted. {trust}",
+            "Poses {}. Rows that were fitted: {}. {trust}",
             protocol(problem),
             found.fitted.identification.n
         )),

@@ -5,7 +5,7 @@ use super::document::{Block, Point};
 use super::findings;
 use super::identify::{errors_by_axis, headline, noise};
 use super::parameters::correlated;
-use super::quantity::{mm, number};
+use super::quantity::{counted, mm, number};
 use super::render::text_within;
 use super::unexplained::{place, size_alone};
 use crate::diagnose::{ClosedLoop, Verdict};
@@ -14,11 +14,6 @@ use crate::problem::Problem;
 
 /// Lines of a screen, less those that say where results are and what to do next.
 const LINES: usize = 22;
-
-/// "1 pose", "3 poses".
-fn counted(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
 
 /// A fit on one screen of so many columns, ending in a line break: errors, how large the residual is, and what to look at.
 pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
@@ -91,7 +86,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     let mut blocks = vec![
-        Block::lines(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
+        Block::lines(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(n, "pose"))),
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));

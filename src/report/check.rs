@@ -2,10 +2,10 @@
 
 use super::detection;
 use super::document::{Block, Table};
-use super::forecast::{ExpectedEntry, cells};
+use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{blind, conditioning};
-use super::quantity::mm;
+use super::quantity::{counted, mm};
 use super::render::text;
 use crate::design::{Check, Elsewhere, GrowthStep, Prediction};
 use crate::problem::Problem;
@@ -80,7 +80,12 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
     let mut blocks = vec![
-        Block::lines(format!("{}\n{} parameters, {} poses", problem.title, names.len(), forecast.poses)),
+        Block::lines(format!(
+            "{}\n{}, {}",
+            problem.title,
+            counted(names.len(), "parameter"),
+            counted(forecast.poses, "pose")
+        )),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&[
             "± 1 σ: to be expected of the estimate; identified: the share that the data will give, the rest is prior or choice",
         ])),
@@ -93,6 +98,9 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
         Block::Table(growth(check)),
         Block::lines(enough(check)),
     ];
+    // Where the poses are measured ones, the held-out ones are none of them.
+    let all = (check.elsewhere != Elsewhere::HeldOut).then_some(forecast.poses);
+    blocks.extend(assumptions(problem, &forecast.expected, all));
     blocks.extend(detection::blocks(&check.detection));
     text(&blocks)
 }

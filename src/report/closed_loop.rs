@@ -8,7 +8,7 @@ use super::figures::{Figure, PlotData};
 use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted};
 use super::json::{Both, Summary, object, to_text};
 use super::parameters::{lower_waves, parameters};
-use super::quantity::{decimals, mm, number, or_dash, p_value};
+use super::quantity::{counted, decimals, mm, number, or_dash, p_value};
 use super::render::{Report, report, text};
 use super::unexplained::{correction, place, size_alone, unexplained};
 use super::{effect, findings, trace};
@@ -128,7 +128,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let poses = &closure.before.fit.fitted;
     let (n, held_out) = (poses.identification.n, poses.held_out.n);
     let mut blocks = vec![
-        Block::Text(format!("{}\n{n} poses to identify, {held_out} held out", problem.title)),
+        Block::Text(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(n, "pose"))),
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
@@ -159,10 +159,10 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let (fit, after) = (&closure.before.fit, &closure.after);
     let file = format!("the estimate.json of {}", code("flexcal identify problem.closed.toml"));
     let counts = format!(
-        "{} parameters from {} poses; {} poses held out, which took no part in any choice.",
-        fit.unknowns.len(),
-        fit.fitted.identification.n,
-        fit.fitted.held_out.n
+        "{} from {}; {} held out, which took no part in any choice.",
+        counted(fit.unknowns.len(), "parameter"),
+        counted(fit.fitted.identification.n, "pose"),
+        counted(fit.fitted.held_out.n, "pose")
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
@@ -241,7 +241,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         ("Gain of the effects", format!("{value} mm, 95 % interval {low} to {high} mm"))
     }));
     facts.extend((!problem.effects.is_empty()).then(|| ("Effects declared", problem.effects.len().to_string())));
-    let of = format!("{} held-out poses{with}", last.n);
+    let of = format!("{}{with}", counted(last.n, "held-out pose"));
     let mut states = vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
     if !closure.effects.is_empty() || correction.is_some() {
         states.push(("with what was found", mean(&best)));

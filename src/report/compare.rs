@@ -11,7 +11,7 @@ use super::identify::{
 };
 use super::json::{Both, object, to_text};
 use super::paper_tables::{Tables, table_2, table_3, title};
-use super::quantity::{mm, number, or_dash};
+use super::quantity::{counted, mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::{Baseline, Comparison, Errors, Identification, SolverChoice};
 use crate::model::Ablation;
@@ -110,7 +110,8 @@ pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     let joint = &comparison.joint;
     let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
-    let mut blocks = vec![Block::lines(format!("{}\n{poses} poses to identify, {held_out} held out", problem.title))];
+    let mut blocks =
+        vec![Block::lines(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(poses, "pose")))];
     blocks.extend(in_the_papers_shape(comparison));
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(strategies(comparison)));

@@ -1,6 +1,6 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
-use super::quantity::mm;
+use super::quantity::{counted, mm};
 use crate::identify::{ErrorSummary, Errors};
 
 /// The arm before anything was identified.
@@ -36,7 +36,7 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     for (arm, errors) in arms {
         for (poses, of) in [("held-out", &errors.held_out), ("identification", &errors.identification)] {
             if of.unpredicted > 0 {
-                parts.push(format!("{} with {arm}", counted(of, poses)));
+                parts.push(format!("{} with {arm}", without_equilibrium(of, poses)));
             }
         }
     }
@@ -50,7 +50,7 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
 }
 
 /// "3 of 50 held-out poses have no equilibrium".
-pub(super) fn counted(of: &ErrorSummary, poses: &str) -> String {
+pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
     let have = if of.unpredicted == 1 { "has" } else { "have" };
-    format!("{} of {} {poses} poses {have} no equilibrium", of.unpredicted, of.n)
+    format!("{} of {} {have} no equilibrium", of.unpredicted, counted(of.n, &format!("{poses} pose")))
 }

@@ -12,7 +12,7 @@ use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
 use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
 use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
-use super::quantity::{decimals, mm, number};
+use super::quantity::{counted, decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
     ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors, Outlier,
@@ -165,14 +165,14 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     let held_out = found.fitted.held_out;
     let head = Headline {
         states: vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))],
-        of: format!("{} held-out poses", held_out.n),
+        of: counted(held_out.n, "held-out pose"),
         facts: vec![
             poses(found),
             fitted_parameters(found),
             ("Held out, after", spread(&held_out)),
             size("Residual against σ", found),
             ("Strategy", found.strategy.as_str().to_owned()),
-            ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
+            ("Solver", format!("{}, {}", found.solver.as_str(), steps(found))),
         ],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
@@ -199,27 +199,27 @@ pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'
     let fitted = &found.fitted;
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     Block::lines(format!(
-        "{}\n{} parameters from {}, {} poses held out; strategy {}, solver {}{reason}\n{} after {} steps, {:.3} s",
+        "{}\n{} from {}, {} held out; strategy {}, solver {}{reason}\n{} after {}, {:.3} s",
         problem.title,
-        found.unknowns.len(),
+        counted(found.unknowns.len(), "parameter"),
         measured(found),
-        fitted.held_out.n,
+        counted(fitted.held_out.n, "pose"),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
-        found.iterations,
+        steps(found),
         found.seconds,
     ))
 }
 
 /// What was fitted to what, and how it ended.
 pub(super) fn counts(found: &Identification) -> String {
-    let held_out = found.fitted.held_out.n;
     let beware = if found.is_trusted() { String::new() } else { format!(" Beware: {}.", why_not_trusted(found)) };
     format!(
-        "{} parameters from {}; {held_out} poses held out. Strategy {}, solver {}: {}.{beware}",
-        found.unknowns.len(),
+        "{} from {}; {} held out. Strategy {}, solver {}: {}.{beware}",
+        counted(found.unknowns.len(), "parameter"),
         measured(found),
+        counted(found.fitted.held_out.n, "pose"),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
@@ -238,10 +238,15 @@ pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Blo
 fn measured(found: &Identification) -> String {
     let points = found.fitted.identification.n;
     if found.several_targets {
-        format!("{points} points in {} different poses", found.poses)
+        format!("{} in {}", counted(points, "point"), counted(found.poses, "different pose"))
     } else {
-        format!("{points} poses")
+        counted(points, "pose")
     }
+}
+
+fn steps(found: &Identification) -> String {
+    let steps = found.iterations;
+    format!("{steps} step{}", if steps == 1 { "" } else { "s" })
 }
 
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
@@ -442,7 +447,8 @@ fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> 
         format!("{}: {} mm, {} σ of the scatter", own.location, mm(own.error.norm(), 3), number(own.distance, 1))
     };
     let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
-    let words = format!("{n} of {poses} poses are too far off to be noise ({treatment}):");
+    let are = if n == 1 { "is" } else { "are" };
+    let words = format!("{n} of {} {are} too far off to be noise ({treatment}):", counted(poses, "pose"));
     (n > 0).then_some(Block::Lines(words, points))
 }
 

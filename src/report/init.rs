@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::json::{object, to_text};
-use crate::urdf::{Chain, Description};
+use super::shell::shell_word;
+use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
 object! {
     Document<'a>(chain: &'a Chain<'_>, description: &'a Description, file: &Path) {
@@ -32,11 +33,17 @@ pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> Str
     for note in &description.notes {
         let _ = writeln!(words, "  note: {note}");
     }
-    let folder = folder.display();
+    let file = folder.join("problem.toml");
+    let (written, word) = (file.display(), shell_word(folder));
     let _ = write!(
         words,
-        "\nWritten to {folder}/problem.toml. Put measurements.csv beside it (its columns stand in problem.toml) and\n\
-         position_sigma_mm of your instrument into it, then\n  flexcal identify {folder}\n  flexcal loop {folder}\n"
+        "\nWritten to {written}. Fill in there\n  \
+         target_m           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
+         position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
+         held_out           now {} % of the poses judge and are not fitted, so measure more than check and plan count\n\
+         and put measurements.csv beside it (its columns stand there, too).\n\
+         Next: flexcal check {word} --poses 40, then flexcal loop {word}\n",
+        100.0 * HELD_OUT
     );
     words
 }

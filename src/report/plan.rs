@@ -1,10 +1,10 @@
 //! What `plan` says and writes.
 
 use super::document::{Block, Table};
-use super::forecast::{ExpectedEntry, cells};
+use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{blind, conditioning};
-use super::quantity::{number, or_dash};
+use super::quantity::{counted, number, or_dash};
 use super::render::text;
 use super::separation;
 use crate::design::{Criterion, Expected, Plan, Separated};
@@ -94,17 +94,19 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
     let names: Vec<String> = planned.expected.iter().map(|expected| expected.name.clone()).collect();
     let mut blocks = vec![
         Block::lines(format!(
-            "{}\n{poses} poses{besides}, from {} candidates; criterion {}, best of {} starts",
+            "{}\n{}{besides}, from {}; criterion {}, best of {}",
             problem.title,
-            plan.candidates,
+            counted(poses, "pose"),
+            counted(plan.candidates, "candidate"),
             criterion.as_str(),
-            plan.starts.len(),
+            counted(plan.starts.len(), "start"),
         )),
         Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])),
     ];
     blocks.extend(gain);
     blocks.push(conditioning(&planned.identifiability, names.len(), 3 * planned.poses));
     blocks.push(blind(&planned.identifiability, &names, "plan.json"));
+    blocks.extend(assumptions(problem, &planned.expected, Some(planned.poses)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
     text(&blocks)
 }

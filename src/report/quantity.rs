@@ -37,6 +37,11 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// "1 pose", "3 poses".
+pub(super) fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
 /// A length \[m\] in mm with `decimals`.
 pub(super) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)

@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::document::{Block, Point, some_of};
-use super::errors::counted;
+use super::errors::without_equilibrium;
 use super::json::{Both, object, to_text};
-use super::quantity::{mm, number, p_value};
+use super::quantity::{counted, mm, number, p_value};
 use super::render::text;
 use super::{effect, findings};
 use crate::diagnose::{Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace};
@@ -249,14 +249,19 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
         fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", number(chi2, 2)));
     let error = match held_out.unpredicted {
         0 => format!(
-            "on {} held-out poses the error is {} mm in the mean, rms {} mm",
-            held_out.n,
+            "on {} the error is {} mm in the mean, rms {} mm",
+            counted(held_out.n, "held-out pose"),
             mm(held_out.mean.norm, 4),
             mm(held_out.rms.norm, 4),
         ),
-        _ => counted(held_out, "held-out"),
+        _ => without_equilibrium(held_out, "held-out"),
     };
-    format!("{}\n{} parameters from {} poses{size}; {error}", problem.title, fit.unknowns.len(), fitted.n)
+    format!(
+        "{}\n{} from {}{size}; {error}",
+        problem.title,
+        counted(fit.unknowns.len(), "parameter"),
+        counted(fitted.n, "pose")
+    )
 }
 
 /// The candidates that stand out, at most so many of them, how to read them, and `where_all` are.

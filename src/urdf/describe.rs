@@ -20,7 +20,9 @@ use crate::spatial::Frame;
 /// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-11;
 /// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop \[mm\].
-const SIGMA_MM: f64 = 0.05;
+pub const SIGMA_MM: f64 = 0.05;
+/// Part of the poses that judge and are not fitted where nobody has said it yet.
+pub const HELD_OUT: f64 = 0.3;
 /// Most characters of a problem's name that come from a robot's.
 const LONGEST_NAME: usize = 60;
 
@@ -234,7 +236,7 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
         }
     }
     text.push_str(
-        "\n[tool]\ntarget_m = [0, 0, 0]                             # the measured point, in the frame of the tip\n",
+        "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured point, in the frame of the tip\n",
     );
     text
 }
@@ -277,7 +279,7 @@ fn data(chain: &Chain, rows: &[Row]) -> String {
         "#   x_mm, y_mm, z_mm: the target, which moves with {}, in the measuring frame\n\
          [data]\nfiles = [\"measurements.csv\"]\n\
          position_sigma_mm = {SIGMA_MM}                         # 1 σ of a measured coordinate: put in that of your instrument\n\
-         held_out = {{ fraction = 0.3, seed = 1 }}          # poses that judge and are not fitted\n",
+         held_out = {{ fraction = {HELD_OUT}, seed = 1 }}          # poses that judge and are not fitted\n",
         chain.ends().1
     );
     text

@@ -16,7 +16,7 @@ mod weights;
 mod yaml;
 
 pub use chain::Chain;
-pub use describe::{Description, describe};
+pub use describe::{Description, HELD_OUT, SIGMA_MM, describe};
 pub use export::{Export, MovedOrigin, export};
 pub use read::Robot;
 pub use yaml::{JointOrigin, Yaml, joint_origins, yaml};

@@ -10,6 +10,9 @@ const browser = await puppeteer.launch({
   executablePath: process.env.CHROMIUM,
   args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 });
+/* What people read, with the pages of paper it may take. */
+const paper = { "loop/report.html": 10, "accept/acceptance.html": 2 };
+const pages = Object.keys(paper);
 let passed = 0;
 const test = async (name, check) => {
   await check();
@@ -39,16 +42,21 @@ const finish = async (page) => {
   await page.close();
 };
 
-/* Pixels of the arm's view that are not paper. */
-const drawn = (page) => page.evaluate(() => {
+/* The arm's view as it stands, pixel by pixel. */
+const shot = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
   const gl = document.querySelector("#view canvas").getContext("webgl");
-  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-  const pixels = new Uint8Array(4 * width * height);
-  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-  let count = 0;
-  for (let k = 0; k < pixels.length; k += 4) count += pixels[k] !== pixels[0] || pixels[k + 1] !== pixels[1];
-  return count;
-});
+  const pixels = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+  gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  done([...new Uint32Array(pixels.buffer)]);
+}))));
+const different = (one, other) => one.reduce((count, pixel, k) => count + (pixel !== other[k]), 0);
+/* Sets a control of the view, as a hand does. */
+const put = (page, name, value) => page.evaluate((name, value) => {
+  const control = document.querySelector("[data-view=" + name + "]");
+  if (control.type === "checkbox") control.checked = value;
+  else control.value = value;
+  control.dispatchEvent(new Event("input", { bubbles: true }));
+}, name, value);
 
 await test("a page of 10 000 poses is small, paints at once and asks for nothing", async () => {
   const size = fs.statSync(folder + "/many/report.html").size;
@@ -74,17 +82,26 @@ await test("a page of 10 000 poses is small, paints at once and asks for nothing
 
 await test("the arm is drawn, and gives way by the slider", async () => {
   const page = await open("loop/report.html");
-  const first = await drawn(page);
-  assert.ok(first > 2000, first + " pixels");
-  const before = await page.evaluate(() => document.querySelector("#view canvas").toDataURL());
-  await page.evaluate(() => {
-    const slider = document.querySelector("[data-view=give]");
-    slider.value = 2.6;
-    slider.dispatchEvent(new Event("input", { bubbles: true }));
-    return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-  });
-  const after = await page.evaluate(() => document.querySelector("#view canvas").toDataURL());
-  assert.notEqual(before, after);
+  /* The arms alone, stiff: what the slider moves is nothing but them. */
+  for (const name of ["fitted", "held_out"]) assert.ok(await page.$eval("[data-view=" + name + "]", (box) => box.checked));
+  await put(page, "vectors", "none");
+  await put(page, "give", 0);
+  const stiff = await shot(page);
+  await put(page, "give", 2.6);
+  const bent = await shot(page);
+  await put(page, "arms", false);
+  const none = await shot(page);
+  await put(page, "give", 0);
+  assert.equal(different(none, await shot(page)), 0, "without arms the slider moves nothing");
+  const [arms, moved] = [different(stiff, none), different(stiff, bent)];
+  const picture = stiff.length;
+  assert.ok(arms > 0.01 * picture, arms + " of " + picture + " pixels show arms");
+  assert.ok(moved > 0.5 * arms, moved + " pixels move, " + arms + " show arms");
+  await put(page, "arms", true);
+  assert.equal(different(stiff, await shot(page)), 0, "back is as before");
+  await put(page, "fitted", false);
+  await put(page, "held_out", false);
+  assert.ok(different(stiff, await shot(page)) > 0.5 * arms, "poses that are not wanted go");
   const options = await page.$$eval("[data-view=colour] option", (all) => all.map((own) => own.textContent));
   assert.ok(options.includes("temperature [°C]"), options.join());
   await finish(page);
@@ -141,14 +158,21 @@ await test("tables sort, and figures give their data", async () => {
   await finish(page);
 });
 
-await test("the page reads without its script", async () => {
-  const page = await open("loop/report.html", { script: false });
-  const text = await page.content();
-  assert.ok(text.includes("mean position error") && text.includes("<svg"));
-  await finish(page);
-});
+for (const name of pages) {
+  await test(name + " reads without its script", async () => {
+    const page = await open(name, { script: false });
+    const numbers = await page.$$eval("table", (tables) => tables.map((table) => [...table.querySelectorAll("td")].filter((cell) => cell.checkVisibility() && /\d/.test(cell.textContent)).length));
+    assert.ok(numbers.length >= 2 && numbers.every((count) => count > 0), "cells with numbers: " + numbers);
+    const drawings = await page.$$eval("figure svg", (all) => all.map((own) => own.getBoundingClientRect().height));
+    assert.ok(drawings.every((height) => height > 50), "heights of figures: " + drawings);
+    /* What is there to be used has a use: links and what folds need no script. */
+    const idle = await page.$$eval("button, input, select, canvas, [onclick], [data-script]", (all) => all.filter((own) => own.checkVisibility()).map((own) => own.outerHTML.slice(0, 80)));
+    assert.deepEqual(idle, []);
+    await finish(page);
+  });
+}
 
-for (const name of ["loop/report.html", "accept/acceptance.html"]) {
+for (const name of pages) {
   for (const width of [1280, 400]) {
     for (const scheme of ["light", "dark"]) {
       await test(name + " at " + width + " pixels, " + scheme, async () => {
@@ -166,9 +190,25 @@ for (const name of ["loop/report.html", "accept/acceptance.html"]) {
   }
   await test(name + " on paper", async () => {
     const page = await open(name);
-    const paper = folder + "/" + name.replace(/\W/g, "-") + ".pdf";
-    await page.pdf({ path: paper, format: "A4" });
-    assert.ok(fs.statSync(paper).size > 10000);
+    const file = folder + "/" + name.replace(/\W/g, "-") + ".pdf";
+    await page.pdf({ path: file, format: "A4", preferCSSPageSize: true });
+    const sheets = fs.readFileSync(file, "latin1").match(/\/Type \/Page\b(?!s)/g).length;
+    console.log("   " + sheets + " pages");
+    assert.ok(sheets <= paper[name], sheets + " pages");
+    /* A4 less its margins, at 96 pixels an inch. */
+    await page.emulateMediaType("print");
+    await page.setViewport({ width: Math.floor((186 / 25.4) * 96), height: 1030 });
+    const cut = await page.evaluate(() => [...document.querySelectorAll("body *")].filter((own) => own.checkVisibility() && !own.closest("svg *")).filter((own) => {
+      const beyond = own.getBoundingClientRect().right > document.documentElement.clientWidth + 1;
+      const hides = getComputedStyle(own).overflowX !== "visible" && own.scrollWidth > own.clientWidth + 1;
+      return beyond || hides;
+    }).map((own) => own.outerHTML.slice(0, 80)));
+    assert.deepEqual(cut, []);
+    const torn = await page.$$eval("figure, tr", (all) => all.filter((own) => own.checkVisibility() && (getComputedStyle(own).breakInside !== "avoid" || own.getBoundingClientRect().height > 1030)).map((own) => own.outerHTML.slice(0, 80)));
+    assert.deepEqual(torn, []);
+    const folded = await page.$$eval("details:not([open])", (all) => all.filter((own) => own.checkVisibility() || !own.nextElementSibling.checkVisibility()).length);
+    assert.equal(folded, 0, "what is folded away is said in a sentence");
+    await page.screenshot({ path: file.replace(/pdf$/, "paper.png"), fullPage: true });
     await finish(page);
   });
 }

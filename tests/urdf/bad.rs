@@ -39,7 +39,7 @@ fn mistakes_are_named_with_their_place() {
             ":2: a xacro",
         ),
         ("no links", "<robot name=\"r\"/>".to_owned(), "there are no links"),
-        ("missing link", with("<link name=\"a\"/>", JOINT), ":3: no link is called \"b\""),
+        ("missing link", with("<link name=\"a\"/>", JOINT), ":3: no link is called \"b\"; the links are a"),
         (
             "no child",
             with(links, "<joint name=\"j\" type=\"fixed\"><parent link=\"a\"/></joint>"),

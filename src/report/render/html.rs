@@ -56,8 +56,8 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
                     footer {
                         "Made by flexcal " (env!("CARGO_PKG_VERSION")) ". Errors are distances between measured and predicted \
                         positions. Before: the nominal arm, with base and tool fitted where they are free, unless the page says \
-                        otherwise. Held-out poses decided nothing: no parameter was fitted to them and no effect chosen by them. \
-                        Every figure is also a file in the folder figures."
+                        otherwise. Held-out poses decided nothing: no parameter was fitted to them and no effect chosen by them."
+                        @if !figures.is_empty() { " Every figure is also a file in the folder figures." }
                     }
                 }
                 script { (PreEscaped(SCRIPTS.concat())) }

@@ -32,13 +32,8 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                     let _ = writeln!(text, "{}\n", escaped(&own.notes.join("\n")));
                 }
             }
-            Block::Headline(_)
-            | Block::Blanks(_)
-            | Block::Figures(_)
-            | Block::Poses(_)
-            | Block::Folded(..)
-            | Block::Page(_)
-            | Block::Words(_) => {}
+            // Of the page alone.
+            _ => {}
         }
     }
     text

@@ -27,8 +27,8 @@ pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
             Block::Heading(words) => text.push_str(&wrapped(words, ("", ""), width)),
             Block::Text(words) | Block::Note(words) => text.push_str(&wrapped(words, (indent, indent), width)),
             Block::Lines(words, points) => {
-                text.extend(words.lines().flat_map(|line| [plain(line), "\n".to_owned()]));
-                text.extend(points.iter().map(|point| format!("  {}\n", plain(point))));
+                text.extend(words.lines().map(|line| wrapped(line, ("", ""), width)));
+                text.extend(points.iter().map(|point| wrapped(point, ("  ", "    "), width)));
             }
             Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own, width)),
             Block::Ranking(points) => {
@@ -36,15 +36,10 @@ pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
             }
             Block::Table(own) => {
                 text.push_str(&table(own));
-                text.extend(own.notes.iter().map(|note| format!("  {note}\n")));
+                text.extend(own.notes.iter().map(|note| wrapped(note, ("  ", "  "), width)));
             }
-            Block::Headline(_)
-            | Block::Blanks(_)
-            | Block::Figures(_)
-            | Block::Poses(_)
-            | Block::Folded(..)
-            | Block::Page(_)
-            | Block::Words(_) => {}
+            // Of the page alone.
+            _ => {}
         }
     }
     text

@@ -54,6 +54,12 @@
     layout.forEach(([name]) => gl.disableVertexAttribArray(gl.getAttribLocation(own, name)));
   };
   const NONE = [0, 0, 0];
+  /* Strokes of x, y and z: from and to, right and up. */
+  const LETTERS = [
+    [[-1, -1, 1, 1], [-1, 1, 1, -1]],
+    [[-1, 1, 0, 0], [1, 1, 0, 0], [0, 0, 0, -1]],
+    [[-1, 1, 1, 1], [1, 1, -1, -1], [-1, -1, 1, -1]],
+  ];
   const segment = (numbers, a, b, ga, gb, colour, width) => {
     for (const corner of [[0, -1], [0, 1], [1, -1], [1, -1], [0, 1], [1, 1]]) numbers.push(...a, ...b, ...ga, ...gb, ...corner, ...colour, width);
   };
@@ -75,10 +81,13 @@
   data.traced.forEach(([label], k) => input("colour").append(new Option(label, "traced" + k)));
 
   const orbit = { yaw: -0.9, pitch: 0.45, distance: 2 };
-  const camera = () => {
+  /* To the right, up, towards the eye; z of the measuring frame points up. */
+  const directions = () => {
     const [cy, sy, cp, sp] = [Math.cos(orbit.yaw), Math.sin(orbit.yaw), Math.cos(orbit.pitch), Math.sin(orbit.pitch)];
-    /* Rows: to the right, up, towards the eye; z of the measuring frame points up. */
-    const rows = [[-sy, cy, 0], [-sp * cy, -sp * sy, cp], [cp * cy, cp * sy, sp]];
+    return [[-sy, cy, 0], [-sp * cy, -sp * sy, cp], [cp * cy, cp * sy, sp]];
+  };
+  const camera = () => {
+    const rows = directions();
     const eye = orbit.distance * reach;
     const [f, near, far] = [2, 0.02 * reach, eye + 4 * reach];
     const aspect = canvas.width / canvas.height;
@@ -148,10 +157,17 @@
     }
     draw("line", arms, matrix, factor);
 
+    /* The measuring frame, each axis with its letter, which faces the eye and keeps its size. */
     const axes = [];
+    const [right, up] = directions();
+    const size = 0.012 * orbit.distance * reach;
     [warm, muted, accent].forEach((colour, k) => {
-      const tip = [0, 1, 2].map((j) => (j === k ? 0.25 * reach : 0));
-      segment(axes, NONE, tip, NONE, NONE, [...colour, 0.9], 1.4 * ratio);
+      const along = (length) => [0, 1, 2].map((j) => (j === k ? length : 0));
+      const stroke = (a, b) => segment(axes, a, b, NONE, NONE, [...colour, 0.9], 1.4 * ratio);
+      stroke(NONE, along(0.25 * reach));
+      const middle = along(0.25 * reach + 2.2 * size);
+      const at = (x, y) => middle.map((own, j) => own + size * (0.7 * x * right[j] + y * up[j]));
+      LETTERS[k].forEach(([x0, y0, x1, y1]) => stroke(at(x0, y0), at(x1, y1)));
     });
     draw("line", axes, matrix, 0);
 
@@ -172,7 +188,7 @@
     draw("point", dots, matrix, 0);
 
     const scale = (value) => String(Number(value.toPrecision(2)));
-    legend.textContent = poses.length + " poses" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; in this model nothing gives way") +
+    legend.textContent = poses.length + " poses; axes of the measuring frame" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; in this model nothing gives way") +
       (input("vectors").value === "none" ? "" : "; strokes \u00d7 " + scale(lengthen / unit)) +
       (by === "kind" ? "; strong: held out, faint: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);

@@ -1,0 +1,47 @@
+//! Arguments of every command that writes results.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::output::{Results, WriteError};
+
+/// Where results go, and who reads along.
+#[derive(Debug, Args)]
+pub struct Flags {
+    /// Folder for results [default: out/<name of the problem>]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    #[arg(long)]
+    pub force: bool,
+    /// Print the result as JSON on standard output, and nothing else
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors (and the JSON, where it is asked for)
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl Flags {
+    /// Whether people read along.
+    pub fn talks(&self) -> bool {
+        !self.json && !self.quiet
+    }
+
+    /// The folder for results of what is called `name`.
+    pub fn folder(&self, name: &str) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
+    }
+
+    /// Where `command`, which reads `inputs`, writes the results called `names` of what is called `name`.
+    pub fn claim(
+        &self,
+        command: &'static str,
+        name: &str,
+        inputs: Vec<PathBuf>,
+        names: &[&str],
+    ) -> Result<Results, WriteError> {
+        Results::claim(command, self.folder(name), inputs, names, (self.force, self.quiet))
+    }
+}

@@ -1,0 +1,71 @@
+//! Results on disk: the same every time, and in nobody's way.
+
+use std::fs;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use super::{Bench, text};
+
+#[test]
+fn results_repeat_to_the_byte_but_for_the_time() {
+    let bench = Bench::new();
+    let run = || {
+        let mut json: Value = serde_json::from_slice(&bench.identify(&["--json"]).get_output().stdout).unwrap();
+        json["seconds"] = Value::Null;
+        json
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_result_that_cannot_be_written_is_an_error() {
+    let bench = Bench::new();
+    fs::write(bench.path("taken"), "a file where a folder is wanted").unwrap();
+    let assert = bench.identify(&["--out", "taken"]).code(2);
+    assert!(text(&assert.get_output().stderr).contains("cannot write"));
+    // What is in the way of one file keeps all away.
+    fs::create_dir_all(bench.path("page/report.html")).unwrap();
+    bench.identify(&["--out", "page"]).code(2);
+    assert_eq!(fs::read_dir(bench.path("page")).unwrap().count(), 1);
+    fs::create_dir(bench.path("drawn")).unwrap();
+    fs::write(bench.path("drawn/figures"), "").unwrap();
+    bench.identify(&["--out", "drawn"]).code(2);
+    assert_eq!(fs::read_dir(bench.path("drawn")).unwrap().count(), 1);
+}
+
+#[cfg(unix)]
+#[test]
+fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let bench = Bench::new();
+    let mode = |name: &str| fs::metadata(bench.path(name)).unwrap().permissions().mode() & 0o777;
+    fs::write(bench.path("made"), "").unwrap();
+    bench.identify(&["--quiet", "--out", "out"]).success();
+    assert_eq!(mode("out/estimate.json"), mode("made"), "new");
+    assert_eq!(mode("out/report.html"), mode("made"), "new");
+    fs::set_permissions(bench.path("out/estimate.json"), fs::Permissions::from_mode(0o640)).unwrap();
+    bench.identify(&["--quiet", "--out", "out"]).success();
+    assert_eq!((mode("out/estimate.json"), mode("out/report.html")), (0o640, mode("made")), "older");
+}
+
+#[test]
+fn figures_of_an_older_page_go_and_other_files_stay() {
+    let bench = Bench::new();
+    let flexcal = |command: &str| {
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        flexcal.current_dir(bench.folder.path()).args([command, ".", "--out", "out"]).assert()
+    };
+    let there = |name: &str| bench.path(&format!("out/figures/{name}")).exists();
+    flexcal("compare").success();
+    assert!(there("strategies.svg") && there("ablations.svg"));
+    let write = |name: &str| fs::write(bench.path(&format!("out/figures/{name}")), "mine").unwrap();
+    ["effect-mine.svg", "mine.svg", "ranking.txt"].into_iter().for_each(write);
+    flexcal("identify").success();
+    assert!(!there("strategies.svg") && !there("ablations.svg"));
+    assert!(["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there));
+    // One that some page may have and that is not flexcal's keeps all of them away, before any work is done.
+    write("effect-1.svg");
+    let error = text(&flexcal("identify").code(2).get_output().stderr);
+    assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");
+}
