@@ -185,6 +185,66 @@ fn commands(page: &str) -> Vec<String> {
     commands.map(|line| line.split(" # ").next().unwrap().trim_end().to_owned()).collect()
 }
 
+/// A URDF of the arm in problems/panda, links panda_link0 to panda_link8.
+fn panda_urdf() -> String {
+    const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+    let origins = [
+        ([0.0, 0.0, 0.333], 0.0),
+        ([0.0; 3], -QUARTER),
+        ([0.0, -0.316, 0.0], QUARTER),
+        ([0.0825, 0.0, 0.0], QUARTER),
+        ([-0.0825, 0.384, 0.0], -QUARTER),
+        ([0.0; 3], QUARTER),
+        ([0.088, 0.0, 0.0], QUARTER),
+        ([0.0, 0.0, 0.107], 0.0),
+    ];
+    let mut text = "<robot name=\"panda\">\n<link name=\"panda_link0\"/>\n".to_owned();
+    for (k, ([x, y, z], roll)) in origins.into_iter().enumerate() {
+        let (number, kind) = (k + 1, if k < 7 { "revolute" } else { "fixed" });
+        let (lower, upper) = if number == 4 { (-3.07, -0.07) } else { (-2.9, 2.9) };
+        writeln!(
+            text,
+            "<link name=\"panda_link{number}\"/>\n<joint name=\"panda_joint{number}\" type=\"{kind}\">\n  \
+             <parent link=\"panda_link{k}\"/>\n  <child link=\"panda_link{number}\"/>\n  \
+             <origin xyz=\"{x} {y} {z}\" rpy=\"{roll} 0 0\"/>\n  <axis xyz=\"0 0 1\"/>\n  \
+             <limit lower=\"{lower}\" upper=\"{upper}\"/>\n</joint>"
+        )
+        .unwrap();
+    }
+    text + "</robot>\n"
+}
+
+#[test]
+fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let (_, own) = readme.split_once("## Your own arm").unwrap();
+    let commands = commands(own.split("\n## ").next().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("panda.urdf"), panda_urdf()).unwrap();
+    let mut said = Vec::new();
+    for command in &commands {
+        said.push(printed(command, folder.path()));
+        if command.starts_with("flexcal init ") {
+            // What others do with an instrument, the rig does here.
+            let truth = root.join("problems/panda/TRUTH.toml");
+            let measure = format!("flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig", truth.display());
+            printed(&measure, folder.path());
+            fs::copy(folder.path().join("rig/measurements.csv"), folder.path().join("measurements.csv")).unwrap();
+        }
+    }
+    let [init, check, found, _, exported] = said.as_slice() else { panic!("{commands:?}") };
+    for words in ["target_m", "position_sigma_mm", "30 % of the poses", "Next: flexcal check panda --poses 40"] {
+        assert!(init.contains(words), "{words:?} missing in:\n{init}");
+    }
+    for words in ["it takes 58", "target_m = [0, 0, 0]"] {
+        assert!(check.contains(words), "{words:?} missing in:\n{check}");
+    }
+    assert!(found.contains("Explained: one effect was found") && found.contains("joint = 4"), "{found}");
+    assert!(exported.contains("held-out poses: mean 0."), "{exported}");
+    assert!(folder.path().join("calibrated.urdf").is_file() && folder.path().join("out/closed/report.html").is_file());
+}
+
 #[test]
 fn commands_of_the_documentation_are_understood() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

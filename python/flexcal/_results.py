@@ -80,9 +80,11 @@ class _Fit(_Result):
     def residuals(self) -> pd.DataFrame:
         """What the fit leaves, a row for each row of the data, in their order.
 
-        Columns: ``file``, ``line`` and what else names the row (``pose``, ``session``, ``target``); ``predicted_x_mm`` …;
-        ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; where orientation is fitted ``predicted_rx_deg`` … and
-        ``residual_rx_deg`` … [°]; ``whitened``: length of all that is left over 1 σ of each part; ``outlier``; ``held_out``.
+        Columns: ``file``, ``line`` and what else names the row (``pose``, ``session``, ``target``, ``point``, ``anchor``,
+        ``surface``); ``predicted_x_mm`` …; ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; where orientation is
+        fitted ``predicted_rx_deg`` … and ``residual_rx_deg`` … [°]; where rows measure them ``…_distance_mm``, ``…_offset_mm`` (of a
+        surface) and ``…_tilt_x_deg`` …, NaN in rows of another kind; ``whitened``: length of all that is left over 1 σ of each
+        part; ``outlier``; ``held_out``.
         """
         return _residuals(self._fit.residuals())
 

@@ -44,6 +44,61 @@ def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoo
     assert again.to_json() == (out / "plan.json").read_text()
 
 
+AROUND = """
+name = "around"
+joint = [{ d_m = 0.4 }, { alpha_deg = 90 }, { a_m = 0.6 }, { alpha_deg = 90, a_m = 0.1, d_m = 0.55 }, { alpha_deg = -90 }, { alpha_deg = 90, d_m = 0.1 }]
+tool.target_m = [0.05, 0.02, 0.15]
+anchor = [{ name = "A" }]
+surface = [{ name = "table", kind = "plane" }]
+[parameters]
+"joint*.theta" = { sigma_deg = 0.2 }
+"joint*.a" = { sigma_mm = 2 }
+[data]
+position_sigma_mm = 0.05
+distance_sigma_mm = 0.05
+surface_sigma_mm = 0.05
+tilt_sigma_deg = 0.01
+held_out = { fraction = 0.2, seed = 1 }
+"""
+AROUND_TRUTH = """
+[parameters]
+"joint3.a" = { mm = 0.8 }
+"anchor[A].x" = { mm = 1500 }
+"anchor[A].y" = { mm = 500 }
+"anchor[A].z" = { mm = 1200 }
+"surface[table].d" = { mm = 200 }
+[noise]
+position_sigma_mm = 0.05
+[poses]
+q1_deg = [-90, 90]
+q2_deg = [-60, 100]
+q3_deg = [-120, 120]
+q4_deg = [-150, 150]
+q5_deg = [-100, 100]
+q6_deg = [-150, 150]
+positions = 20
+"""
+
+
+def test_observations_without_a_tracker(command: Command, tmp_path: Path) -> None:
+    (tmp_path / "problem.toml").write_text(AROUND)
+    (tmp_path / "TRUTH.toml").write_text(AROUND_TRUTH)
+    run, made = command("simulate", tmp_path, "--truth", tmp_path, "--poses", 80, "--seed", 1)
+    assert run.returncode == 0, run.stderr
+    # The tilt of a level tool, beside them.
+    tilts = pd.DataFrame([{f"q{k}_deg": 0.0 for k in range(1, 7)} | {"tilt_x_deg": 0.0, "tilt_y_deg": 0.0}])
+    measured = pd.concat([pd.read_csv(made / "measurements.csv"), tilts])
+    measured.to_csv(tmp_path / "all.csv", index=False)
+    run, out = command("identify", tmp_path, "--data", tmp_path / "all.csv")
+    residuals = flexcal.Problem(AROUND).identify(tmp_path / "all.csv").residuals
+    assert_written(residuals, out / "residuals.csv")
+    kinds = {"x": 20, "distance": 30, "offset": 30, "tilt_x": 1}
+    for kind, count in kinds.items():
+        unit = "deg" if kind == "tilt_x" else "mm"
+        assert residuals[f"residual_{kind}_{unit}"].notna().sum() == count, kind
+    assert (residuals["anchor"] == "A").sum() == (residuals["surface"] == "table").sum() == 30
+
+
 def test_orientation(lunar: flexcal.Problem, command: Command, tmp_path: Path) -> None:
     oriented = lunar.text.replace("position_sigma_mm", "orientation_sigma_deg = 0.02\nposition_sigma_mm")
     oriented = oriented.replace('"tool.*" = {', '"tool.*" = { sigma_deg = 2.0,')
