@@ -179,5 +179,5 @@ fn two_points_do_not_turn_a_base() {
     data.split = split_at(2, &data.measurements);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let turned: f64 = ["base.rx", "base.ry", "base.rz"].iter().map(|name| estimate(&found, name).estimate.abs()).sum();
-    assert!(turned < 0.01 && !found.identifiability.blind.is_empty(), "{turned} rad");
+    assert!(turned < 0.01 && !found.identifiability.unidentifiable.is_empty(), "{turned} rad");
 }

@@ -8,7 +8,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnose::{Evidence, Hypothesis, Law, Says, Verdict, close, trace};
+use flexcal::diagnose::{Evidence, Hypothesis, Law, Verdict, WitnessVerdict, close, trace};
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::monte_carlo::table;
@@ -160,7 +160,7 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
     let plain = close(&problem, &data, &Options::default()).unwrap();
     let found = plain.effects.iter().find(|found| found.effect.name() == "tracker-drift").unwrap();
     let drift = Vector3::from_iterator(found.estimates.iter().map(|estimate| estimate.estimate));
-    for (moves, says) in [(1.0, Some(Says::Corroborated)), (0.0, Some(Says::Contradicted))] {
+    for (moves, says) in [(1.0, Some(WitnessVerdict::Corroborated)), (0.0, Some(WitnessVerdict::Contradicted))] {
         let mut data = data.clone();
         for k in 0..5 {
             let time = last * f64::from(k) / 4.0;

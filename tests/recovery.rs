@@ -62,24 +62,24 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
     let found = fit(&problem, &rows, &split_at(28, &rows));
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
     // β1 turns about the axis of θ2; d2, d3 and d4 lie along parallel axes.
-    let blind: Vec<Vec<&str>> = found
+    let unidentifiable: Vec<Vec<&str>> = found
         .identifiability
-        .blind
+        .unidentifiable
         .iter()
-        .map(|blind| blind.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect())
+        .map(|own| own.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect())
         .collect();
-    assert_eq!(blind, [["joint1.beta", "joint2.theta"], ["joint2.d", "joint4.d"], ["joint3.d", "joint4.d"]]);
+    assert_eq!(unidentifiable, [["joint1.beta", "joint2.theta"], ["joint2.d", "joint4.d"], ["joint3.d", "joint4.d"]]);
     let model = model_of(&problem, &rows);
     let error = &found.x - table_2_deviations(&model.parameters);
     let of = |name: &str| error[found.estimates.iter().position(|estimate| estimate.name == name).unwrap()];
     for (estimate, error) in found.estimates.iter().zip(&error) {
-        // The blind ones stay near nominal; what is left of them after the first order others make up for.
+        // The unidentifiable ones stay near nominal; what is left of them after the first order others make up for.
         let limit = if estimate.identified > 0.999_999 { 2e-5 } else { 0.01 };
         assert!(error.abs() < limit, "{}: off by {error:e}", estimate.name);
     }
     assert!((of("joint1.beta") - of("joint2.theta")).abs() < 1e-6);
     assert!((of("joint2.d") + of("joint3.d") + of("joint4.d")).abs() < 1e-8);
-    assert!(of("joint2.d").abs() > 1e-3, "the parts of a blind combination are not known");
+    assert!(of("joint2.d").abs() > 1e-3, "the parts of an unidentifiable combination are not known");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use flexcal::monte_carlo::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 use flexcal::report::{self, shell_word};
 
+use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::{self, REPORT, Results, WriteError};
@@ -97,6 +98,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         // Reads it as what has shares, which says what is wrong.
         Request::Misprints(_) => Study::read(&common.study)?,
     };
+    if study.problem.data.fits_orientation && !common.flags.quiet {
+        diagnostic::warn("a study fits positions alone: orientation_sigma is left out");
+    }
     let results = common.results(&study)?;
     let store = Store::new(&results.folder);
     fit(common, &study, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;

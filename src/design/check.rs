@@ -1,6 +1,6 @@
 //! What measurements in given poses will tell, before anyone makes them.
 //!
-//! Rank, blind combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
+//! Rank, unidentifiable combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
 //! drawn from the priors.
 
 use super::plan::choose;

@@ -90,8 +90,8 @@ impl Exchange {
             i if i < n => scaled_prior[(i, j)].sqrt(),
             i => rows[(j, i - n)],
         });
-        let blind = Identifiability::of(&seen.qr().r()).gauge;
-        let held = blind.transpose() * &blind * HELD;
+        let unidentifiable = Identifiability::of(&seen.qr().r()).gauge;
+        let held = unidentifiable.transpose() * &unidentifiable * HELD;
         ground += &held;
         all += &held;
         let yardstick = criterion.yardstick(parameters, &all, &scaled_prior)?;

@@ -41,7 +41,7 @@ pub struct Forecast {
     pub identifiability: Identifiability,
     /// Every free parameter.
     pub expected: Vec<Expected>,
-    /// Covariance of x, blind combinations held, shape = (parameters, parameters).
+    /// Covariance of x, unidentifiable combinations held, shape = (parameters, parameters).
     pub covariance: DMatrix<f64>,
     /// Combinations that neither positions nor priors see.
     pub open: usize,
@@ -92,7 +92,7 @@ impl Forecast {
     /// The same, with the errors to expect of arms that differ from the nominal one: root mean squares over what the poses
     /// tell about each of them, in `arms`.
     ///
-    /// Where a combination is blind at the nominal arm and its prior is wide, other parameters go with it at other arms: their
+    /// Where a combination is unidentifiable at the nominal arm and its prior is wide, other parameters go with it at other arms: their
     /// errors are larger than the nominal arm's linearisation says.
     #[must_use]
     pub fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {

@@ -36,4 +36,4 @@ pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, clos
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};
-pub use witness::{Says, Witness};
+pub use witness::{Witness, WitnessVerdict};

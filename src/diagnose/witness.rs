@@ -22,7 +22,7 @@ const DECIDED: f64 = 9.21;
 
 /// What it says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Says {
+pub enum WitnessVerdict {
     /// It moved as the effect has it.
     Corroborated,
     /// It did not.
@@ -35,7 +35,7 @@ pub struct Witness {
     /// Which data.
     pub data: String,
     /// What they say.
-    pub says: Says,
+    pub says: WitnessVerdict,
 }
 
 /// A reading of a fixed point.
@@ -104,9 +104,9 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
         points.values().map(|all| told(all)).fold((Vector3::zeros(), 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     let gain = odds(&strength, &spread, &told, certainty)?;
     let says = if gain > DECIDED {
-        Says::Corroborated
+        WitnessVerdict::Corroborated
     } else if gain < -DECIDED {
-        Says::Contradicted
+        WitnessVerdict::Contradicted
     } else {
         return None;
     };

@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 
 use super::alternation::{Alternation, Anderson, contraction};
-use super::assumed::Assumed;
 use super::errors::of_kind;
+use super::noise_model::NoiseModel;
 use super::placement::HeldOutOnly;
 use super::registration::register;
 use super::spread::{PointSpread, spreads};
@@ -45,9 +45,9 @@ pub(super) struct Fitting<'a> {
     /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
     pub turn_sigma: Option<f64>,
     /// What the fit makes of each row's σ.
-    pub assumed: Assumed,
+    pub noise_model: NoiseModel,
     /// What it makes of the σ of orientations.
-    pub assumed_turn: Assumed,
+    pub turn_noise_model: NoiseModel,
 }
 
 /// Where a fit ended.
@@ -107,10 +107,10 @@ impl<'a> Fitting<'a> {
         for pose in &mut poses {
             // What a drawing or a calibrated bar says is no worse for what the contacts scatter.
             if pose.observation.is_of_arm() {
-                pose.sigma = self.assumed.of(pose.sigma);
+                pose.sigma = self.noise_model.of(pose.sigma);
             }
             if let Some(orientation) = &mut pose.orientation {
-                orientation.sigma = self.assumed_turn.of(orientation.sigma);
+                orientation.sigma = self.turn_noise_model.of(orientation.sigma);
             }
         }
         Stage {
@@ -320,7 +320,7 @@ impl<'a> Fitting<'a> {
     /// Errors of orientation on both parts of the data at the full parameter vectors of the registered nominal arm and of the
     /// fitted one; `None` where orientation is not fitted.
     pub fn orientation(&self, registered: &DVector<f64>, fitted: &DVector<f64>) -> Option<OrientationErrors> {
-        let sigma_taken = self.assumed_turn.of(self.turn_sigma?);
+        let sigma_taken = self.turn_noise_model.of(self.turn_sigma?);
         let errors = |x: &DVector<f64>| {
             let of = |rows: &[usize]| ErrorSummary::of(&self.model.orientation_residuals(self.poses(rows), x));
             Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }

@@ -5,14 +5,14 @@ use std::time::Instant;
 use nalgebra::DVector;
 
 use super::active::ActiveConstraint;
-use super::assumed::{Assumed, LEAST_NOISE};
 use super::covariance::Collected;
-use super::enough::Enough;
 use super::fitting::{FitEnd, Fitting};
 use super::judgement::Judgement;
 use super::noise::fitted;
+use super::noise_model::{LEAST_NOISE, NoiseModel};
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
+use super::pose_sufficiency::PoseSufficiency;
 use super::quality::QualityFlag;
 use super::stage::StageError;
 use super::statistics::Statistics;
@@ -220,8 +220,8 @@ pub fn identify_model(
         max_steps: options.max_steps,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
-        assumed: Assumed::DECLARED,
-        assumed_turn: Assumed::DECLARED,
+        noise_model: NoiseModel::DECLARED,
+        turn_noise_model: NoiseModel::DECLARED,
     };
     let unknowns = fitted_parameters(&fitting)?;
     let start = fitting.registered()?;
@@ -230,7 +230,7 @@ pub fn identify_model(
         fitting.sigma = (registered.identification.rms.norm / measurements.leading().root()).max(LEAST_NOISE);
     }
     let begin = options.begin(model, &start);
-    let enough = Enough::of(&fitting, problem, &unknowns, &start);
+    let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
     let judged = enough.too_few.is_none() && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
@@ -279,7 +279,7 @@ pub fn identify_model(
         chance: statistics.chance.filter(|_| noise_is_declared),
         noise_factor: (taken / declared_all).powi(2),
         sigma_taken: taken,
-        sigma_scale: fitting.assumed.scale.min(1.0),
+        sigma_scale: fitting.noise_model.scale.min(1.0),
         kinds: fitting.errors_by_kind(&start, &end.x),
         spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
         weak: end.gauge.weak.clone(),
@@ -322,7 +322,7 @@ fn place_held_out(
     let placed: FitEnd = stage.run(&end.x)?.into();
     end.iterations += placed.iterations;
     end.evaluations += placed.evaluations;
-    let statistics = Statistics::of(&stage, &placed, (noise == Noise::Declared).then_some(fitting.assumed))?;
+    let statistics = Statistics::of(&stage, &placed, (noise == Noise::Declared).then_some(fitting.noise_model))?;
     enter(results, &stage, &placed, &statistics);
     end.x = placed.x;
     Ok((!placed.termination.converged()).then_some(placed.termination))

@@ -4,8 +4,8 @@ use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::active::confine;
-use super::assumed::{Assumed, IMPROBABLE, LEAST_NOISE};
 use super::fitting::{FitEnd, Fitting};
+use super::noise_model::{IMPROBABLE, LEAST_NOISE, NoiseModel};
 use super::outcome::Noise;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
@@ -42,13 +42,13 @@ pub(super) fn fitted(
         let end = fitting.run(&begin)?;
         fitting.max_steps = limit;
         let whole = fitting.whole();
-        let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.assumed))?;
+        let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.noise_model))?;
         if noise_is_declared {
-            let assumed = (fitting.assumed, fitting.assumed_turn);
+            let assumed = (fitting.noise_model, fitting.turn_noise_model);
             let next = if judged { contradicted(&whole, &end, &statistics, assumed)? } else { None };
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
-                    (fitting.assumed, fitting.assumed_turn) = next;
+                    (fitting.noise_model, fitting.turn_noise_model) = next;
                     // What was held stays where it began, and what ran off under a σ too small begins anew.
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
@@ -80,8 +80,8 @@ fn contradicted(
     stage: &Stage,
     end: &FitEnd,
     statistics: &Statistics,
-    assumed: (Assumed, Assumed),
-) -> Result<Option<(Assumed, Assumed)>, StageError> {
+    assumed: (NoiseModel, NoiseModel),
+) -> Result<Option<(NoiseModel, NoiseModel)>, StageError> {
     let counts = |place: &usize| stage.loss == Loss::Squares || statistics.lengths.outlying(*place).is_none();
     let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
     let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
@@ -99,7 +99,7 @@ fn contradicted(
     if !ratio.is_finite() {
         return Ok(None);
     }
-    let first = assumed == (Assumed::DECLARED, Assumed::DECLARED);
+    let first = assumed == (NoiseModel::DECLARED, NoiseModel::DECLARED);
     let shares = shares(&residual_vector(&residuals, &x), stage.coordinates(), [count - turned, turned]);
     // Positions and orientations settle each by themselves.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
@@ -112,13 +112,13 @@ fn contradicted(
         of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
     };
     // An error of the model is one length for all only where all measure the same.
-    let raised = if several_kinds { Assumed::scaled } else { Assumed::raised };
+    let raised = if several_kinds { NoiseModel::scaled } else { NoiseModel::raised };
     let of_position =
         raised(&of(&|place| stage.declared[place]), &of(&|place| stage.poses[place].sigma), ratio * shares[0]);
     let taken = |place: usize| stage.poses[place].orientation.map_or(1.0, |own| own.sigma);
     let of_turn = match stage.declared_turn {
-        Some(sigma) => Assumed::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
-        None => Assumed::DECLARED,
+        Some(sigma) => NoiseModel::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
+        None => NoiseModel::DECLARED,
     };
     let next = (of_position, of_turn);
     Ok((next != assumed).then_some(next))

@@ -11,7 +11,7 @@ use super::{
     SolverChoice, Strategy, TooFewPoses,
 };
 use crate::least_squares::solver::{AtBound, Termination};
-use crate::least_squares::{BlindCombination, Identifiability};
+use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
@@ -51,7 +51,7 @@ pub struct Estimate {
     pub at_bound: Option<AtBound>,
     /// What that costs.
     pub shadow_price: Option<ShadowPrice>,
-    /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among blind combinations.
+    /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among unidentifiable combinations.
     pub identified: f64,
     /// Whether the strategy varied it.
     pub fitted: bool,
@@ -113,7 +113,7 @@ pub struct Identification {
     pub sigma_scale: f64,
     /// Combinations of `unknowns` that the data see too weakly to be estimated, held where they were: weights in units of the
     /// arm's size for lengths, 1 rad for angles and a factor of 100 for stiffnesses, and the σ by which that moves all data.
-    pub weak: Vec<BlindCombination>,
+    pub weak: Vec<UnidentifiableCombination>,
     /// Measured coordinates that were fitted.
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of `identifiability`.

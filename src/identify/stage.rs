@@ -13,7 +13,7 @@ use crate::least_squares::solver::{
     Solution,
 };
 use crate::least_squares::{
-    BlindCombination, Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError, Steadied, Weak,
+    Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError, Steadied, UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
@@ -83,7 +83,7 @@ pub(super) struct Gauge {
     /// Part of each unknown outside of them, 0…1.
     pub visible: Vec<f64>,
     /// Those that are seen too weakly, each by itself.
-    pub weak: Vec<BlindCombination>,
+    pub weak: Vec<UnidentifiableCombination>,
 }
 
 impl<'a> Stage<'a> {
@@ -177,18 +177,18 @@ impl<'a> Stage<'a> {
         let all = self.sizes();
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
         let weak = Weak::of(&below(&seen, &found.gauge), &sizes);
-        let blind = found.gauge.nrows();
-        let count = blind + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
+        let unidentifiable = found.gauge.nrows();
+        let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
         let mut gauge = Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
         for (j, &k) in free.iter().enumerate() {
-            gauge.rows.view_mut((0, k), (blind, 1)).copy_from(&found.gauge.column(j));
+            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&found.gauge.column(j));
             gauge.visible[k] = found.visible[j];
             if let Some(weak) = &weak {
-                gauge.rows.view_mut((blind, k), (count - blind, 1)).copy_from(&weak.rows.column(j));
+                gauge.rows.view_mut((unidentifiable, k), (count - unidentifiable, 1)).copy_from(&weak.rows.column(j));
                 gauge.visible[k] = found.visible[j].min(weak.visible[j]);
             }
         }
-        let named = |own: BlindCombination| BlindCombination {
+        let named = |own: UnidentifiableCombination| UnidentifiableCombination {
             weights: own.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
             ..own
         };
@@ -198,8 +198,8 @@ impl<'a> Stage<'a> {
 
     /// Minimises from the full parameter vector `start`.
     ///
-    /// Combinations that are blind or weak at the start are held there, what becomes weak on the way is held where it is then.
-    /// What is blind at the start may be seen at the end, or decided by a bound or a constraint: then the fit goes on with that
+    /// Combinations that are unidentifiable or weak at the start are held there, what becomes weak on the way is held where it is then.
+    /// What is unidentifiable at the start may be seen at the end, or decided by a bound or a constraint: then the fit goes on with that
     /// set free.
     ///
     /// # Errors

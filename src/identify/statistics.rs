@@ -4,14 +4,14 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::active::{Held, confine};
-use super::assumed::{Assumed, IMPROBABLE};
 use super::fitting::FitEnd;
+use super::noise_model::{IMPROBABLE, NoiseModel};
 use super::outliers::Lengths;
 use super::prices::Prices;
 use super::stage::{Stage, StageError};
 use crate::least_squares::{Identifiability, Loss, Uncertainty};
 
-/// A part this large in blind combinations leaves an unknown without an error of its own.
+/// A part this large in unidentifiable combinations leaves an unknown without an error of its own.
 const PARTLY_BLIND: f64 = 1e-3;
 
 /// Errors and correlations of the unknowns of a fit.
@@ -45,7 +45,7 @@ impl Statistics {
     ///
     /// # Errors
     /// Constraints make no sense.
-    pub fn of(stage: &Stage, end: &FitEnd, assumed: Option<Assumed>) -> Result<Self, StageError> {
+    pub fn of(stage: &Stage, end: &FitEnd, noise_model: Option<NoiseModel>) -> Result<Self, StageError> {
         let triangle = stage.weighted_triangle(&end.x);
         let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
         let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
@@ -55,7 +55,7 @@ impl Statistics {
         let mut uncertainty = of(1.0);
         let coordinates = stage.count() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
-        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, assumed.map(|assumed| assumed.scale));
+        let lengths = Lengths::of(stage, &end.x, freedom / coordinates, noise_model.map(|own| own.scale));
         let robust = stage.loss != Loss::Squares;
         let counts = |place: usize| !robust || lengths.outlying(place).is_none();
         let kept = (0..lengths.values.len()).filter(|&place| counts(place));

@@ -1,4 +1,4 @@
-//! What the measurements can tell: rank, conditioning, and the combinations they are blind to.
+//! What the measurements can tell: rank, conditioning, and the combinations they cannot tell.
 //!
 //! Columns of the Jacobian are scaled to unit norm first, so that angles, lengths and logarithms compare.
 
@@ -25,16 +25,16 @@ pub struct Identifiability {
     /// Number of singular values that are not zero.
     pub rank: usize,
     /// Combinations of parameters that leave every measurement as it is.
-    pub blind: Vec<BlindCombination>,
-    /// Rows that span the blind combinations, orthonormal in the scaled unknowns, shape = (n − rank, n) [1 / unit of x].
+    pub unidentifiable: Vec<UnidentifiableCombination>,
+    /// Rows that span the unidentifiable combinations, orthonormal in the scaled unknowns, shape = (n − rank, n) [1 / unit of x].
     pub gauge: DMatrix<f64>,
-    /// Part of each unknown that lies outside the blind combinations, 0…1.
+    /// Part of each unknown that lies outside the unidentifiable combinations, 0…1.
     pub visible: Vec<f64>,
 }
 
 /// Parameters that can change together without changing any measurement.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BlindCombination {
+pub struct UnidentifiableCombination {
     /// Unknown and weight in scaled unknowns (unit norm, first weight positive), in the order of the unknowns.
     pub weights: Vec<(usize, f64)>,
     /// What the scaled Jacobian makes of it.
@@ -57,9 +57,9 @@ impl Identifiability {
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
         let null = complement(&right.columns(0, rank).into_owned());
         let visible = (0..n).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
-        let blind = named(null.clone(), &scaled);
+        let unidentifiable = named(null.clone(), &scaled);
         let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
-        Self { singular_values, rank, blind, gauge, visible }
+        Self { singular_values, rank, unidentifiable, gauge, visible }
     }
 
     /// Ratio of the largest singular value to the smallest that is not zero.
@@ -104,7 +104,7 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// The reduced row echelon form of the null space: a basis that depends on the space alone, with few unknowns in each
 /// combination. Pivots are the earliest unknowns that have a part in a combination worth the name, then any.
-fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination> {
+fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
@@ -152,7 +152,7 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<BlindCombination>
             for &(j, weight) in &weights {
                 vector[j] = weight;
             }
-            BlindCombination { weights, singular_value: (scaled * vector).norm() }
+            UnidentifiableCombination { weights, singular_value: (scaled * vector).norm() }
         })
         .collect()
 }
@@ -174,9 +174,9 @@ mod tests {
         let found = Identifiability::of(&triangle);
         assert_eq!(found.rank, 2);
         let unknowns: Vec<Vec<usize>> =
-            found.blind.iter().map(|blind| blind.weights.iter().map(|w| w.0).collect()).collect();
+            found.unidentifiable.iter().map(|own| own.weights.iter().map(|w| w.0).collect()).collect();
         assert_eq!(unknowns, [vec![0, 2], vec![1, 2, 4], vec![3]]);
-        assert!(found.blind.iter().all(|blind| blind.singular_value < 1e-12 && blind.weights[0].1 > 0.0));
+        assert!(found.unidentifiable.iter().all(|own| own.singular_value < 1e-12 && own.weights[0].1 > 0.0));
         assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
         // Orthonormal in scaled unknowns, and seen by no row there.
         let norms: Vec<f64> =

@@ -22,7 +22,7 @@ use curvature::{Slopes, by_differences};
 use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
-pub use identifiability::{BlindCombination, Identifiability};
+pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub use loss::Loss;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;

@@ -19,10 +19,10 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the blind combinations held.
+    /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the unidentifiable combinations held.
     ///
     /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's prior, `gauge` rows that
-    /// span the blind combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
+    /// span the unidentifiable combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
     /// multiplies the assumed variance of the data.
     pub fn of(
         data: &DMatrix<f64>,

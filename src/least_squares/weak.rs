@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::identifiability::BlindCombination;
+use super::identifiability::UnidentifiableCombination;
 use super::singular::SingularValues;
 use super::{Block, Linearisation, Objective, Triangle};
 
@@ -20,7 +20,7 @@ pub struct Weak {
     /// Rows that span them, as strong as what is seen best, shape = (combinations, n) [1 / unit of x].
     pub rows: DMatrix<f64>,
     /// Each by itself: weights in units of the unknowns' sizes, and the σ by which all data move with it.
-    pub combinations: Vec<BlindCombination>,
+    pub combinations: Vec<UnidentifiableCombination>,
     /// Part of each unknown that lies outside of them, 0…1.
     pub visible: Vec<f64>,
 }
@@ -67,7 +67,7 @@ impl Weak {
             let sign = row.iter().find(|weight| weight.abs() > NEGLIGIBLE).map_or(1.0, |weight| weight.signum());
             let weights = row.iter().enumerate().filter(|(_, weight)| weight.abs() > NEGLIGIBLE);
             let weights = weights.map(|(place, weight)| (sized[place].0, sign * weight)).collect();
-            BlindCombination { weights, singular_value: (&seen * row.transpose()).norm() }
+            UnidentifiableCombination { weights, singular_value: (&seen * row.transpose()).norm() }
         };
         let combinations = spanned.row_iter().map(|row| combination(row.into_owned())).collect();
         (strong < sized.len()).then_some(Self { rows, combinations, visible })

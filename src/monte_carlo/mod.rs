@@ -22,8 +22,8 @@ mod tally;
 pub use read::Request;
 pub use repetition::table;
 pub use replica::{
-    Case, Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError, ReplicaResults, Rival, Spread, readings,
-    replicate,
+    AlternativeModel, Case, Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError, ReplicaResults, Spread,
+    readings, replicate,
 };
 pub use results::{CellResult, ParameterResult, Results, Timing};
 pub use run::{RunError, collect, pending, run};

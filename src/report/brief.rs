@@ -54,11 +54,11 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
         let (n, error) = (counted(found.outliers.len(), "pose"), mm(own.error.norm(), 3));
         format!("{n} too far off to be noise, the farthest {}: {error} mm", own.location)
     }));
-    let blind = found.identifiability.blind.len();
-    if blind > 0 {
+    let unidentifiable = found.identifiability.unidentifiable.len();
+    if unidentifiable > 0 {
         points.push(format!(
             "{} of {} not identifiable",
-            counted(blind, "combination"),
+            counted(unidentifiable, "combination"),
             counted(found.unknowns.len(), "parameter")
         ));
     }

@@ -4,7 +4,7 @@ use super::detection;
 use super::document::{Block, Table};
 use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
-use super::parameters::{blind, conditioning};
+use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
 use crate::design::{Check, Elsewhere, GrowthStep, Prediction};
@@ -90,7 +90,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
             "± 1 σ: to be expected of the estimate; identified: the share that the data will give, the rest is prior or choice",
         ])),
         conditioning(&forecast.identifiability, names.len(), check.coordinates),
-        blind(&forecast.identifiability, &names, "check.json"),
+        unidentifiable(&forecast.identifiability, &names, "check.json"),
         Block::lines(prediction(check)),
         Block::lines(
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of prediction):",

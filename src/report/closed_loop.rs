@@ -13,7 +13,8 @@ use super::render::{Report, report, text};
 use super::unexplained::{correction, place, size_alone, unexplained};
 use super::{effect, findings, trace};
 use crate::diagnose::{
-    ClosedLoop, Correction, Found, Interval, Round, Says, SelectionRules, Trace, Unexplained, Verdict, Witness,
+    ClosedLoop, Correction, Found, Interval, Round, SelectionRules, Trace, Unexplained, Verdict, Witness,
+    WitnessVerdict,
 };
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
 use crate::problem::{Effect, Problem};
@@ -410,8 +411,8 @@ pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
 /// What a witness says, in a word.
 fn says(own: &Witness) -> &'static str {
     match own.says {
-        Says::Corroborated => "corroborated",
-        Says::Contradicted => "contradicted",
+        WitnessVerdict::Corroborated => "corroborated",
+        WitnessVerdict::Contradicted => "contradicted",
     }
 }
 

@@ -11,7 +11,9 @@ use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
 use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
-use super::parameters::{blind, conditioning, correlations, lower_waves, more_blind, parameters, weak};
+use super::parameters::{
+    conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
+};
 use super::quantity::{counted, decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
@@ -342,9 +344,9 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
 pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(&found.identifiability, found.unknowns.len(), found.coordinates),
-        blind(&found.identifiability, &found.unknowns, file),
+        unidentifiable(&found.identifiability, &found.unknowns, file),
     ];
-    blocks.extend(more_blind(found, file));
+    blocks.extend(more_unidentifiable(found, file));
     blocks.extend(weak(found, file));
     blocks.push(correlations(found, file));
     blocks

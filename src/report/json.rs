@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::identify::{AxisValues, ErrorSummary, Errors, PointSpread};
-use crate::least_squares::{BlindCombination, Identifiability};
+use crate::least_squares::{Identifiability, UnidentifiableCombination};
 
 /// Declares a JSON object: its keys with their types and what each is made of, in the order of the file.
 macro_rules! object {
@@ -112,7 +112,7 @@ object! {
 }
 object! {
     /// A combination that no measurement sees.
-    Unidentified<'a>(own: &BlindCombination, name: impl Fn(usize) -> &'a str) {
+    Unidentified<'a>(own: &UnidentifiableCombination, name: impl Fn(usize) -> &'a str) {
         combination: BTreeMap<&'a str, f64> = own.weights.iter().map(|&(k, weight)| (name(k), weight)).collect(),
         singular_value: f64 = own.singular_value,
     }
@@ -120,7 +120,7 @@ object! {
 
 /// Every unidentified combination, by the names of the unknowns.
 pub(super) fn unidentified<'a>(found: &Identifiability, name: impl Fn(usize) -> &'a str) -> Vec<Unidentified<'a>> {
-    found.blind.iter().map(|own| Unidentified::of(own, &name)).collect()
+    found.unidentifiable.iter().map(|own| Unidentified::of(own, &name)).collect()
 }
 
 /// JSON text that ends in a line break; text keys and numbers always serialise, numbers that are not finite as null.

@@ -7,7 +7,7 @@ use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash};
 use crate::identify::{Estimate, Identification};
 use crate::least_squares::solver::AtBound;
-use crate::least_squares::{BlindCombination, Identifiability, WEAK_BELOW};
+use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_BELOW};
 use crate::model::effect;
 use crate::model::parameter::Driver;
 use crate::problem::Problem;
@@ -17,11 +17,11 @@ use crate::quantity::Unit;
 const PLAIN: usize = 4;
 /// Decimals of any value at most.
 const MOST: usize = 6;
-/// Weights in a blind combination that are worth naming.
+/// Weights in an unidentifiable combination that are worth naming.
 const NAMED: f64 = 0.02;
-/// Terms of a blind combination that are named, the largest.
+/// Terms of an unidentifiable combination that are named, the largest.
 const MOST_NAMED: usize = 8;
-/// Blind combinations and correlations that fit on a screen.
+/// Unidentifiable combinations and correlations that fit on a screen.
 const SHOWN: usize = 12;
 /// Columns of the table of parameters.
 const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
@@ -166,25 +166,25 @@ fn is_vague(estimate: &Estimate) -> bool {
 }
 
 /// The combinations that no measurement sees; `file` holds them all.
-pub(super) fn blind<'a>(found: &Identifiability, unknowns: &[String], file: &str) -> Block<'a> {
-    let blind = &found.blind;
-    if blind.is_empty() {
+pub(super) fn unidentifiable<'a>(found: &Identifiability, unknowns: &[String], file: &str) -> Block<'a> {
+    let unidentifiable = &found.unidentifiable;
+    if unidentifiable.is_empty() {
         return Block::lines("Every combination of the parameters is identifiable there.");
     }
-    let is = if blind.len() == 1 { "is" } else { "are" };
+    let is = if unidentifiable.len() == 1 { "is" } else { "are" };
     let words = format!(
         "{} of {} combinations of parameters {is} not identifiable there (they can change together in these\n\
          proportions, each scaled by its effect, and no predicted position moves):",
-        blind.len(),
+        unidentifiable.len(),
         unknowns.len()
     );
-    let mut points = first_of(blind.iter().map(|own| blind_words(own, unknowns)), SHOWN, file);
-    points.extend(without_tracker(blind, unknowns).into_iter().map(str::to_owned));
+    let mut points = first_of(unidentifiable.iter().map(|own| combination_words(own, unknowns)), SHOWN, file);
+    points.extend(without_tracker(unidentifiable, unknowns).into_iter().map(str::to_owned));
     Block::Lines(words, points)
 }
 
 /// What contacts and distances leave open for want of a reference, in words.
-fn without_tracker(blind: &[BlindCombination], unknowns: &[String]) -> Vec<&'static str> {
+fn without_tracker(unidentifiable: &[UnidentifiableCombination], unknowns: &[String]) -> Vec<&'static str> {
     let of = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
     let is_around = |name: &str| of(name, &["point", "anchor", "surface"]);
     let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
@@ -192,24 +192,26 @@ fn without_tracker(blind: &[BlindCombination], unknowns: &[String]) -> Vec<&'sta
         let geometry = name.starts_with("joint") && ["a", "d"].contains(&&*field(name));
         geometry || of(name, &["tool"]) || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
     };
-    let holds = |own: &BlindCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().any(|&(k, _)| is(&unknowns[k]));
-    let all = |own: &BlindCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().all(|&(k, _)| is(&unknowns[k]));
-    let place = |own: &BlindCombination| {
+    let holds =
+        |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().any(|&(k, _)| is(&unknowns[k]));
+    let all =
+        |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().all(|&(k, _)| is(&unknowns[k]));
+    let place = |own: &UnidentifiableCombination| {
         holds(own, &|name| name.starts_with("base")) && all(own, &|name| name.starts_with("base") || is_around(name))
     };
     // What only shifts everything moves points along one axis; a scale moves them along all three.
-    let size = |own: &BlindCombination| {
+    let size = |own: &UnidentifiableCombination| {
         let along = |axis: &str| holds(own, &|name| is_around(name) && field(name) == axis);
         all(own, &is_length) && ["x", "y", "z"].into_iter().all(along) && holds(own, &|name| name.starts_with("joint"))
     };
     let mut words = Vec::new();
-    if blind.iter().any(place) {
+    if unidentifiable.iter().any(place) {
         words.push(
             "where the base stands: nothing is measured against a place that is known in the measuring frame; hold base.* \
              (fixed = true), or declare where a point or an anchor is (at_m)",
         );
     }
-    if blind.iter().any(size) {
+    if unidentifiable.iter().any(size) {
         words.push("the scale: no length is known; declare a [[distance]], or measure one");
     }
     words
@@ -224,20 +226,20 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
          or a factor of 100, all measured coordinates together change by less than {WEAK_BELOW} σ):",
         if count == 1 { "it" } else { "them" }
     );
-    let points = first_of(found.weak.iter().map(|own| blind_words(own, &found.unknowns)), SHOWN, file);
+    let points = first_of(found.weak.iter().map(|own| combination_words(own, &found.unknowns)), SHOWN, file);
     (count > 0).then_some(Block::Lines(words, points))
 }
 
-/// Those that [`blind`] leaves out, on the page.
-pub(super) fn more_blind<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
-    let blind = found.identifiability.blind.iter().skip(SHOWN);
-    let words: Vec<String> = blind.map(|own| blind_words(own, &found.unknowns)).collect();
+/// Those that [`unidentifiable`] leaves out, on the page.
+pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
+    let unidentifiable = found.identifiability.unidentifiable.iter().skip(SHOWN);
+    let words: Vec<String> = unidentifiable.map(|own| combination_words(own, &found.unknowns)).collect();
     let count = words.len();
     let on_paper = format!("{count} more are left out on paper: they are in {file}.");
     (count > 0).then(|| Block::Folded(format!("{count} more combinations"), vec![Block::list(words)], on_paper))
 }
 
-fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
+fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String]) -> String {
     let name = |k: usize| unknowns[k].as_str();
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));
@@ -257,12 +259,12 @@ fn blind_words(combination: &BlindCombination, unknowns: &[String]) -> String {
     terms.join(" ")
 }
 
-/// Pairs of parameters that go together, but for those that one blind combination ties: that is told by itself.
+/// Pairs of parameters that go together, but for those that one unidentifiable combination ties: that is told by itself.
 pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
         let holds =
-            |blind: &BlindCombination, name: &str| blind.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
-        found.identifiability.blind.iter().any(|blind| holds(blind, a) && holds(blind, b))
+            |own: &UnidentifiableCombination, name: &str| own.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
+        found.identifiability.unidentifiable.iter().any(|own| holds(own, a) && holds(own, b))
     };
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
 }

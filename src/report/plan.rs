@@ -3,7 +3,7 @@
 use super::document::{Block, Table};
 use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
-use super::parameters::{blind, conditioning};
+use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, number, or_dash};
 use super::render::text;
 use super::separation;
@@ -105,7 +105,7 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
     ];
     blocks.extend(gain);
     blocks.push(conditioning(&planned.identifiability, names.len(), 3 * planned.poses));
-    blocks.push(blind(&planned.identifiability, &names, "plan.json"));
+    blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
     blocks.extend(assumptions(problem, &planned.expected, Some(planned.poses)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
     text(&blocks)

@@ -6,7 +6,7 @@ use super::json::{Summary, object, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::ErrorSummary;
-use crate::monte_carlo::{Case, Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
+use crate::monte_carlo::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 use crate::paper::Misprint;
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
 
@@ -40,12 +40,12 @@ object! {
         payload_kg: Option<f64> = case.load.and_then(|load| load.payload),
         #[serde(rename = "hoist_N")]
         hoist: Option<f64> = case.load.and_then(|load| load.hoist),
-        specimens: Vec<Specimen<'a>> = found.of_case(case).map(|own| Specimen::of(own, found)).collect(),
+        specimens: Vec<SimulatedArmEntry<'a>> = found.of_case(case).map(|own| SimulatedArmEntry::of(own, found)).collect(),
     }
 }
 object! {
     /// Held-out errors of one specimen; null where an iteration does not converge.
-    Specimen<'a>(own: &'a Replica, found: &'a ReplicaResults) {
+    SimulatedArmEntry<'a>(own: &'a Replica, found: &'a ReplicaResults) {
         scale: f64 = own.scale,
         before: Summary = Summary::of(&own.before),
         rigid: Option<Summary> = own.rigid.as_ref().map(Summary::of),
@@ -54,7 +54,8 @@ object! {
         joint_both_loads: Summary = Summary::of(&own.joint_twice),
         readings: Vec<ReadingEntry<'a>> =
             found.readings.iter().zip(&own.by_reading).map(|(named, left)| ReadingEntry::of(&named.name, left)).collect(),
-        rivals: Vec<RivalEntry<'a>> = Rival::EACH.into_iter().zip(&own.by_rival).map(RivalEntry::of).collect(),
+        rivals: Vec<AlternativeEntry<'a>> =
+            AlternativeModel::EACH.into_iter().zip(&own.by_rival).map(AlternativeEntry::of).collect(),
     }
 }
 object! {
@@ -67,7 +68,7 @@ object! {
     }
 }
 object! {
-    RivalEntry<'a>(own: (Rival, &Left)) {
+    AlternativeEntry<'a>(own: (AlternativeModel, &Left)) {
         rival: &'a str = own.0.words().0,
         held_out: Option<Summary> = own.1.as_ref().map(Summary::of),
     }
@@ -208,7 +209,7 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         .enumerate()
         .map(|(place, named)| row(&named.name, &named.summary, &|own| own.left(place, 0)))
         .collect();
-    rows.extend(Rival::EACH.map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))));
+    rows.extend(AlternativeModel::EACH.map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))));
     let [with, without] = [&WITH_ELASTICITY, &IGNORING_IT];
     let paper = [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
     let [ratio, along, largest] = paper;

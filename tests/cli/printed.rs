@@ -33,9 +33,9 @@ fn identify_prints_a_table_and_writes_the_estimate() {
         assert!(!stiffness[key].is_null(), "{key}");
     }
     assert!(stiffness["at_bound"].is_null());
-    let blind = &json["unidentified"][0];
-    assert!((blind["combination"]["joint1.beta"].as_f64().unwrap() - 0.5_f64.sqrt()).abs() < 1e-6);
-    assert!(blind["singular_value"].as_f64().unwrap() < 1e-9);
+    let unidentifiable = &json["unidentified"][0];
+    assert!((unidentifiable["combination"]["joint1.beta"].as_f64().unwrap() - 0.5_f64.sqrt()).abs() < 1e-6);
+    assert!(unidentifiable["singular_value"].as_f64().unwrap() < 1e-9);
 }
 
 /// Arms to look at, each with measurements: its own, or from the rig.

@@ -82,7 +82,7 @@ fn what_contacts_cannot_tell_is_named() {
     for name in ["base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"] {
         assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
     }
-    assert!(found.identifiability.blind.len() >= 6);
+    assert!(found.identifiability.unidentifiable.len() >= 6);
 }
 
 #[test]

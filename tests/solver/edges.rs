@@ -63,7 +63,7 @@ fn redundant_unknowns_take_the_shortest_solution() {
     assert!(solution.termination.converged());
     assert!((&solution.x - &expected).norm() < 1e-12 * expected.norm());
     assert!(solution.iterations <= 3);
-    // From elsewhere the blind combinations x₁ − x₄ and x₂ stay as they were.
+    // From elsewhere the unidentifiable combinations x₁ − x₄ and x₂ stay as they were.
     let start = DVector::from_fn(6, |j, _| 1.0 + j as f64);
     let solution = minimise(Fit::new(&problem), start, &Settings::default());
     assert!((solution.x[1] - solution.x[4] + 3.0).abs() < 1e-12);

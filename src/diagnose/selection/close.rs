@@ -8,7 +8,7 @@ use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
 use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
-use super::super::witness::{Says, Witness, witness};
+use super::super::witness::{Witness, WitnessVerdict, witness};
 use super::alternatives::Replacements;
 use super::harmonics;
 use super::interval;
@@ -55,7 +55,7 @@ pub struct Found {
 impl Found {
     /// Whether data that took no part speak against it.
     pub fn is_contradicted(&self) -> bool {
-        self.witness.as_ref().is_some_and(|witness| witness.says == Says::Contradicted)
+        self.witness.as_ref().is_some_and(|witness| witness.says == WitnessVerdict::Contradicted)
     }
 
     /// Whether it is named as found: its law is surer than `stated`, and no witness contradicts it. Otherwise a place is found, and the

@@ -1,6 +1,6 @@
 //! The paper's procedure on some poses, and what it leaves of others.
 
-use super::shot::Shot;
+use super::measured_pose::MeasuredPose;
 use crate::identify::{ErrorSummary, IdentifyError};
 use crate::measurement::{Dataset, DatasetError};
 use crate::paper::{self, EndPoint, Identified, Measured, Options, Parameters, Reading};
@@ -24,30 +24,35 @@ pub enum ReplicaError {
 }
 
 /// The paper's procedure on some poses.
-pub(super) fn fitted(problem: &Problem, shots: &[Shot], options: &Options) -> Result<Identified, ReplicaError> {
-    let poses: Vec<Measured> = shots.iter().map(Shot::measured).collect();
+pub(super) fn fitted(problem: &Problem, poses: &[MeasuredPose], options: &Options) -> Result<Identified, ReplicaError> {
+    let poses: Vec<Measured> = poses.iter().map(MeasuredPose::measured).collect();
     Ok(paper::identify(problem, &poses, options)?)
 }
 
 /// What an arm leaves of some poses, predicted by the paper's closed forms.
-pub(super) fn judged(problem: &Problem, shots: &[Shot], parameters: &Parameters, reading: &Reading) -> ErrorSummary {
-    let error = |shot: &Shot| {
-        shot.position - EndPoint::new(problem, parameters, &shot.conditions.view(), reading).position(parameters)
+pub(super) fn judged(
+    problem: &Problem,
+    poses: &[MeasuredPose],
+    parameters: &Parameters,
+    reading: &Reading,
+) -> ErrorSummary {
+    let error = |pose: &MeasuredPose| {
+        pose.position - EndPoint::new(problem, parameters, &pose.conditions.view(), reading).position(parameters)
     };
-    ErrorSummary::of(&shots.iter().map(error).collect::<Vec<_>>())
+    ErrorSummary::of(&poses.iter().map(error).collect::<Vec<_>>())
 }
 
 /// Poses to identify with, and those that are held out.
-pub(super) fn dataset(shots: &[Shot], held_out: &[Shot]) -> Result<Dataset, DatasetError> {
-    let all = || shots.iter().chain(held_out);
-    let of = |value: fn(&Shot) -> Option<f64>| all().map(value).collect::<Option<Vec<f64>>>();
-    let configurations = all().map(|shot| shot.conditions.configuration.clone());
-    let mut builder = Dataset::builder(configurations, all().map(|shot| shot.position).collect::<Vec<_>>())
-        .held_out(shots.len()..shots.len() + held_out.len());
-    if let Some(payload) = of(|shot| shot.conditions.payload) {
+pub(super) fn dataset(poses: &[MeasuredPose], held_out: &[MeasuredPose]) -> Result<Dataset, DatasetError> {
+    let all = || poses.iter().chain(held_out);
+    let of = |value: fn(&MeasuredPose) -> Option<f64>| all().map(value).collect::<Option<Vec<f64>>>();
+    let configurations = all().map(|pose| pose.conditions.configuration.clone());
+    let mut builder = Dataset::builder(configurations, all().map(|pose| pose.position).collect::<Vec<_>>())
+        .held_out(poses.len()..poses.len() + held_out.len());
+    if let Some(payload) = of(|pose| pose.conditions.payload) {
         builder = builder.payload(payload);
     }
-    if let Some(hoist) = of(|shot| shot.conditions.hoist) {
+    if let Some(hoist) = of(|pose| pose.conditions.hoist) {
         builder = builder.hoist(hoist);
     }
     builder.build()

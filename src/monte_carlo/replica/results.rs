@@ -1,7 +1,7 @@
 //! What the replicas showed.
 
+use super::alternative::AlternativeModel;
 use super::reading::NamedReading;
-use super::rival::Rival;
 use super::study::Case;
 use crate::identify::ErrorSummary;
 
@@ -21,7 +21,7 @@ pub struct Replica {
     pub rigid: Left,
     /// By each reading of the paper: stiffness known, as declared, from positions, from load differences.
     pub by_reading: Vec<[Left; 4]>,
-    /// By each rival, formulas corrected, in the order of [`Rival::EACH`].
+    /// By each rival, formulas corrected, in the order of [`AlternativeModel::EACH`].
     pub by_rival: Vec<Left>,
     /// By geometry alone, stiffness as declared, with the model of this library.
     pub geometry_only: ErrorSummary,
@@ -84,8 +84,8 @@ impl Replica {
     }
 
     /// What a rival leaves.
-    pub fn rival(&self, rival: Rival) -> Left {
-        let place = Rival::EACH.iter().position(|own| *own == rival)?;
+    pub fn rival(&self, rival: AlternativeModel) -> Left {
+        let place = AlternativeModel::EACH.iter().position(|own| *own == rival)?;
         *self.by_rival.get(place)?
     }
 

@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
+use super::alternative::AlternativeModel;
 use super::fit::{ReplicaError, dataset, fitted, judged};
+use super::measured_pose::MeasuredPose;
 use super::reading::{NamedReading, readings};
 use super::results::{Left, Replica, ReplicaResults};
-use super::rival::Rival;
-use super::shot::Shot;
+use super::simulated_arm::SimulatedArm;
 use super::size::sizes;
-use super::specimen::Specimen;
 use super::study::{Case, MisprintStudy};
 use crate::identify::{ErrorSummary, Options as FitOptions, Strategy, identify};
 use crate::paper::{Form, Options, Parameters, Reading, StiffnessStage};
@@ -40,11 +40,11 @@ fn replica(
 ) -> Result<Replica, ReplicaError> {
     use rand::Rng as _;
     let seed = stream(study.seed, index as u64).next_u64();
-    let own = Specimen::find(study, case, seed)?;
+    let own = SimulatedArm::find(study, case, seed)?;
     let twice = [own.identification.as_slice(), own.again.as_slice()].concat();
-    let left = |problem: &Problem, shots: &[Shot], reading: &Reading, stage| -> Result<Left, ReplicaError> {
+    let left = |problem: &Problem, poses: &[MeasuredPose], reading: &Reading, stage| -> Result<Left, ReplicaError> {
         let options = Options::new(*reading, stage);
-        let found = fitted(problem, shots, &options)?;
+        let found = fitted(problem, poses, &options)?;
         let judged = || judged(problem, &own.held_out, &found.parameters, &options.reading);
         Ok(found.iteration.termination.converged().then(judged))
     };
@@ -57,17 +57,18 @@ fn replica(
             left(&own.declared, &twice, reading, StiffnessStage::LoadDifferences)?,
         ])
     };
-    let rival = |rival: Rival| -> Result<Left, ReplicaError> {
+    let rival = |rival: AlternativeModel| -> Result<Left, ReplicaError> {
         let assumed = rival.assumed(own.known.clone());
-        let seen =
-            |shots: &[Shot]| -> Vec<Shot> { shots.iter().map(|shot| shot.under(rival.loads(), &assumed)).collect() };
+        let seen = |poses: &[MeasuredPose]| -> Vec<MeasuredPose> {
+            poses.iter().map(|pose| pose.under(rival.loads(), &assumed)).collect()
+        };
         let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
         let found = fitted(&assumed, &seen(&own.identification), &options)?;
         let judged = || judged(&assumed, &seen(&own.held_out), &found.parameters, &options.reading);
         Ok(found.iteration.termination.converged().then(judged))
     };
-    let fit = |shots: &[Shot], strategy| -> Result<ErrorSummary, ReplicaError> {
-        let (data, mut problem) = (dataset(shots, &own.held_out)?, own.declared.clone());
+    let fit = |poses: &[MeasuredPose], strategy| -> Result<ErrorSummary, ReplicaError> {
+        let (data, mut problem) = (dataset(poses, &own.held_out)?, own.declared.clone());
         problem.data.position_sigma = Some(study.truth.noise_sigma);
         let found = identify(&problem, &data, &FitOptions::default().with_strategy(strategy))?;
         Ok(found.fitted.held_out)
@@ -79,7 +80,7 @@ fn replica(
         before: judged(&own.declared, &own.held_out, &Parameters::rigid(&own.declared), &Reading::default()),
         rigid,
         by_reading: readings.iter().map(by_stage).collect::<Result<_, _>>()?,
-        by_rival: Rival::EACH.into_iter().map(rival).collect::<Result<_, _>>()?,
+        by_rival: AlternativeModel::EACH.into_iter().map(rival).collect::<Result<_, _>>()?,
         geometry_only: fit(&own.identification, Strategy::GeometryOnly)?,
         joint: fit(&own.identification, Strategy::Joint)?,
         joint_twice: fit(&twice, Strategy::Joint)?,

@@ -7,7 +7,7 @@ use super::frame::{
     ACCENT, Area, BELOW, Drawing, FAINT, Failure, GRID, INK, MUTED, Mark, WARM, WIDTH, figure, legend, line, px,
     radius, write,
 };
-use crate::monte_carlo::{Case, Left, MisprintStudy, Replica, ReplicaResults, Rival, Spread};
+use crate::monte_carlo::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
 use crate::report::quantity::number;
 
@@ -31,7 +31,7 @@ pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
     let named = found.readings.iter().enumerate();
     let mut rows: Vec<Row> =
         named.map(|(place, named)| (named.name.clone(), spreads(&|own| own.left(place, 0)))).collect();
-    rows.extend(Rival::EACH.map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))));
+    rows.extend(AlternativeModel::EACH.map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))));
     let caption = "Mean error of the held-out poses over that of the rigid fit, mean and standard deviation over specimens, stiffness \
                    known: each misprint alone, their combinations, and below them other explanations. Colours: how links and joints \
                    share the flexibility, and one load in place of many. The line is the paper's 2.136/3.967; a misprint \

@@ -17,10 +17,10 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
     let values: Vec<(f64, f64)> =
         found.singular_values.iter().enumerate().map(|(k, value)| (k as f64 + 1.0, relative(*value))).collect();
     let lowest = values.iter().map(|at| at.1).fold(0.0, f64::min).floor().min(-2.0);
-    let blind = found.blind.len();
+    let unidentifiable = found.unidentifiable.len();
     let svg = figure((WIDTH, HEIGHT), "Singular values", |area| {
         let entries = [("identifiable", ACCENT, Mark::Dot), ("not identifiable", WARM, Mark::Dot)];
-        let body = legend(area, 20, if blind > 0 { &entries } else { &entries[..1] })?;
+        let body = legend(area, 20, if unidentifiable > 0 { &entries } else { &entries[..1] })?;
         let x = Axis::linear((0.0, values.len() as f64 + 1.0), "combination of parameters, best identified first");
         let y = Axis::logarithmic((lowest, 0.3), "singular value / largest");
         let mut chart = chart(&body, &x, &y)?;
@@ -31,7 +31,7 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         }
         Ok(())
     });
-    let tells = match blind {
+    let tells = match unidentifiable {
         0 => "every combination is identifiable".to_owned(),
         1 => "one combination is not identifiable: it can change and no predicted position moves".to_owned(),
         n => format!("{n} combinations are not identifiable: they can change and no predicted position moves"),

@@ -5,7 +5,7 @@ use crate::problem::{Joint, Problem};
 /// A mistake in the model of the arm, its formulas corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Rival {
+pub enum AlternativeModel {
     /// Everything a quarter too stiff.
     QuarterTooStiff,
     /// Everything twice as stiff as it is.
@@ -24,7 +24,7 @@ pub enum Rival {
     NoPayload,
 }
 
-impl Rival {
+impl AlternativeModel {
     /// All of them.
     pub const EACH: [Self; 8] = [
         Self::QuarterTooStiff,

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::alternative::stiffen;
 use super::fit::{ReplicaError, fitted, judged};
-use super::rival::stiffen;
-use super::shot::Shot;
+use super::measured_pose::MeasuredPose;
 use super::study::{Case, MisprintStudy};
 use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};
@@ -17,7 +17,7 @@ const TRIALS: usize = 40;
 
 /// One arm and its measurements.
 #[derive(Debug, Clone)]
-pub struct Specimen {
+pub struct SimulatedArm {
     /// The arm as declared, as elastic as specimens are on average.
     pub declared: Problem,
     /// The same with the true stiffness of this one.
@@ -25,15 +25,15 @@ pub struct Specimen {
     /// By what the declared flexibilities were multiplied, those of links by `links_over_joints` more.
     pub scale: f64,
     /// Poses that judge.
-    pub held_out: Vec<Shot>,
+    pub held_out: Vec<MeasuredPose>,
     /// Poses to identify with.
-    pub identification: Vec<Shot>,
+    pub identification: Vec<MeasuredPose>,
     /// The same under the second load.
-    pub again: Vec<Shot>,
+    pub again: Vec<MeasuredPose>,
 }
 
-impl Specimen {
-    /// Specimen of a seed, its flexibility scaled until the rigid fit leaves what the study says.
+impl SimulatedArm {
+    /// Arm of a seed, its flexibility scaled until the rigid fit leaves what the study says.
     pub fn find(study: &MisprintStudy, case: &Case, seed: u64) -> Result<Self, ReplicaError> {
         let mut scale = 1.0;
         for _ in 0..TRIALS {
@@ -66,19 +66,19 @@ impl Specimen {
             }
         }
         let rig = Rig::new(arm.clone(), study.truth.effects.clone()).with_segments(study.truth.segments);
-        let shot = |conditions: &PoseConditions, noise: &Vector3<f64>| -> Result<Shot, NoRest> {
-            Ok(Shot { conditions: conditions.clone(), position: rig.position(conditions)? + noise })
+        let pose = |conditions: &PoseConditions, noise: &Vector3<f64>| -> Result<MeasuredPose, NoRest> {
+            Ok(MeasuredPose { conditions: conditions.clone(), position: rig.position(conditions)? + noise })
         };
-        let taken = |rows: &[Row]| -> Result<Vec<Shot>, NoRest> {
-            rows.iter().map(|row| shot(&row.conditions, &row.position)).collect()
+        let taken = |rows: &[Row]| -> Result<Vec<MeasuredPose>, NoRest> {
+            rows.iter().map(|row| pose(&row.conditions, &row.position)).collect()
         };
         let (judging, others) = rows.split_at(held_out);
         let (first, second) = others.split_at(identification);
         let again = first
             .iter()
             .zip(second)
-            .map(|(row, noise)| shot(&study.second_load.put_on(&row.conditions), &noise.position));
-        let again = again.collect::<Result<Vec<Shot>, NoRest>>()?;
+            .map(|(row, noise)| pose(&study.second_load.put_on(&row.conditions), &noise.position));
+        let again = again.collect::<Result<Vec<MeasuredPose>, NoRest>>()?;
         let (held_out, identification) = (taken(judging)?, taken(first)?);
         Ok(Self { known: with_geometry(arm, &declared), declared, scale, held_out, identification, again })
     }

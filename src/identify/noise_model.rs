@@ -7,14 +7,14 @@ pub(super) const LEAST_NOISE: f64 = 1e-9;
 
 /// What a fit makes of the σ of each row: √((scale σ)² + e²).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Assumed {
+pub(super) struct NoiseModel {
     /// 1, or less where the declared σ is too large; more where rows of several kinds scatter more than declared.
     pub scale: f64,
     /// 1 σ of the model's own error e, beside the noise \[m\].
     pub model_error: f64,
 }
 
-impl Assumed {
+impl NoiseModel {
     /// As declared.
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
@@ -55,11 +55,11 @@ mod tests {
     #[test]
     fn a_model_error_adds_to_every_sigma_and_a_sigma_too_large_is_scaled() {
         let declared = [1e-5, 2e-5, 4e-5];
-        let more = Assumed::raised(&declared, &declared, 100.0);
+        let more = NoiseModel::raised(&declared, &declared, 100.0);
         let ratio: f64 = declared.iter().map(|&own| (more.of(own) / own).powi(2)).sum::<f64>() / 3.0;
         assert!((more.scale - 1.0).abs() < 1e-15 && (ratio - 100.0).abs() < 1e-9, "{more:?}");
-        let less = Assumed::raised(&declared, &declared, 0.01);
+        let less = NoiseModel::raised(&declared, &declared, 0.01);
         assert!((less.scale - 0.1).abs() < 1e-12 && less.model_error == 0.0, "{less:?}");
-        assert!((Assumed::DECLARED.of(0.3) - 0.3).abs() < 1e-15);
+        assert!((NoiseModel::DECLARED.of(0.3) - 0.3).abs() < 1e-15);
     }
 }

@@ -16,7 +16,7 @@ use crate::problem::{Observation, Problem};
 const BODY: usize = 6;
 
 /// What the poses are enough for.
-pub(super) struct Enough {
+pub(super) struct PoseSufficiency {
     /// What they are not enough for, priors or not.
     pub flag: Option<QualityFlag>,
     /// Whether priors decide most.
@@ -27,7 +27,7 @@ pub(super) struct Enough {
     pub several_targets: bool,
 }
 
-impl Enough {
+impl PoseSufficiency {
     /// For the parameters `unknowns` of a fit that begins at the full parameter vector `at`.
     pub fn of(fitting: &Fitting, problem: &Problem, unknowns: &[&Parameter], at: &DVector<f64>) -> Self {
         let Fitting { model, measurements, placement, held_out_only, split, .. } = fitting;
