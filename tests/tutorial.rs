@@ -201,7 +201,11 @@ fn panda_urdf() -> String {
     let mut text = "<robot name=\"panda\">\n<link name=\"panda_link0\"/>\n".to_owned();
     for (k, ([x, y, z], roll)) in origins.into_iter().enumerate() {
         let (number, kind) = (k + 1, if k < 7 { "revolute" } else { "fixed" });
-        let (lower, upper) = if number == 4 { (-3.07, -0.07) } else { (-2.9, 2.9) };
+        let (lower, upper) = match number {
+            4 => (-3.07, -0.07),
+            6 => (-0.02, 3.75),
+            _ => (-2.9, 2.9),
+        };
         writeln!(
             text,
             "<link name=\"panda_link{number}\"/>\n<joint name=\"panda_joint{number}\" type=\"{kind}\">\n  \

@@ -84,7 +84,12 @@ fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
 /// Lines of words, each ending in a line break; a break in the words stays one.
 fn wrapped(words: &str, (first, further): (&str, &str), width: usize) -> String {
     let plain = plain(words);
-    let options = textwrap::Options::new(width).initial_indent(first).subsequent_indent(further).break_words(false);
+    // Names of effects and files stay whole, to be copied.
+    let options = textwrap::Options::new(width)
+        .initial_indent(first)
+        .subsequent_indent(further)
+        .break_words(false)
+        .word_splitter(textwrap::WordSplitter::NoHyphenation);
     textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
