@@ -56,7 +56,7 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
     if let (Some(after), Some(before)) = (document.mean_miss_mm, document.mean_miss_before_mm) {
         let _ = write!(
             words,
-            ": {} mm from them on average with these commands, {} mm with those in the file,\n\
+            ": {} mm from them on average with these commands, {} mm with those in the file, \
              as the identified arm predicts",
             number(after, 4),
             number(before, 4)
