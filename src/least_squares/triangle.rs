@@ -7,10 +7,10 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 use super::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 use super::{Block, Linearisation};
 
-/// Reflectors applied together as matrix products.
-const WIDE: usize = 32;
-/// Columns behind which products are worth their preparation.
-const WORTH_PRODUCTS: usize = 128;
+/// Reflectors applied together as matrix products, where so many columns are left: a wide panel costs more itself, and fewer passes
+/// over what is behind it.
+const WIDE: [(usize, usize); 2] = [(WIDEST, 384), (32, 128)];
+const WIDEST: usize = 96;
 
 /// The triangular factor of all rows absorbed so far.
 ///
@@ -106,12 +106,13 @@ impl Triangle {
             return;
         }
         let mut first = 0;
-        while n - first >= WORTH_PRODUCTS {
-            let used = filled(first + WIDE).min(m);
-            let mut factors = [0.0; WIDE];
-            self.reduce_columns(block, first..first + WIDE, first + WIDE, |_| used, &mut factors);
-            self.apply(block, first, used, &factors);
-            first += WIDE;
+        while let Some(&(wide, _)) = WIDE.iter().find(|(_, least)| n - first >= *least) {
+            let used = filled(first + wide).min(m);
+            let mut factors = [0.0; WIDEST];
+            let factors = &mut factors[..wide];
+            self.reduce_columns(block, first..first + wide, first + wide, |_| used, factors);
+            self.apply(block, first, used, factors);
+            first += wide;
         }
         self.reduce_columns(block, first..n, n + 1, filled, &mut []);
     }
@@ -153,18 +154,19 @@ impl Triangle {
     ///
     /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R − W, C ← C − V W
     /// [Schreiber and Van Loan 1989]
-    fn apply(&mut self, block: &mut Block, first: usize, used: usize, factors: &[f64; WIDE]) {
+    fn apply(&mut self, block: &mut Block, first: usize, used: usize, factors: &[f64]) {
+        let wide = factors.len();
         let (n, m) = (self.parameters, block.rows);
-        let (panel, trailing) = block.values[first * m..].split_at_mut(WIDE * m);
-        let behind = n + 1 - first - WIDE;
-        let vectors = DMatrixView::from_slice_with_strides(panel, used, WIDE, 1, m);
+        let (panel, trailing) = block.values[first * m..].split_at_mut(wide * m);
+        let behind = n + 1 - first - wide;
+        let vectors = DMatrixView::from_slice_with_strides(panel, used, wide, 1, m);
         let transposed = vectors.transpose();
         let mut columns = DMatrixViewMut::from_slice_with_strides_mut(trailing, used, behind, 1, m);
-        let corner = &mut self.rows[first * (n + 1) + first + WIDE..];
-        let mut rows = DMatrixViewMut::from_slice_with_strides_mut(corner, WIDE, behind, n + 1, 1);
-        let mut products = DMatrix::zeros(WIDE, WIDE);
+        let corner = &mut self.rows[first * (n + 1) + first + wide..];
+        let mut rows = DMatrixViewMut::from_slice_with_strides_mut(corner, wide, behind, n + 1, 1);
+        let mut products = DMatrix::zeros(wide, wide);
         products.gemm(1.0, &transposed, &vectors, 0.0);
-        let mut triangle = DMatrix::zeros(WIDE, WIDE);
+        let mut triangle = DMatrix::zeros(wide, wide);
         for (i, &factor) in factors.iter().enumerate() {
             for j in 0..i {
                 let turned: f64 = (j..i).map(|l| triangle[(j, l)] * products[(l, i)]).sum();
@@ -270,7 +272,7 @@ mod tests {
 
     #[test]
     fn absorbs_blocks_of_any_shape() {
-        for n in [1, 2, 3, 4, 5, 7, 8, 13, 127, 128, 150, 201] {
+        for n in [1, 2, 3, 4, 5, 7, 8, 13, 127, 128, 150, 201, 390] {
             let mut triangle = Triangle::new(n);
             let mut stacked = DMatrix::zeros(0, n + 1);
             for (k, rows) in [1, 3, 4, 30, 257].into_iter().enumerate() {
