@@ -305,11 +305,17 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
     }
     for share in ["1/3", "2/3", "3/3"] {
         // In one folder, and each in its own.
-        bench.flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share]).success();
+        let done = format!("done/{}", &share[..1]);
+        bench.flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done]).success();
+        assert_eq!(fs::read_to_string(bench.path(&done)).unwrap(), "flexcal study: done\n");
         let own = format!("own-{}", &share[..1]);
         bench.flexcal(&["study", "STUDY.toml", "--out", &own, "--shard", share, "--quiet"]).success();
         assert!(!bench.path("shared/study.csv").exists() && bench.parts(&own) == PARTS / 3);
     }
+    // What was true before is not true until it is again; another file stays.
+    bench.flexcal(&["study", "no-such.toml", "--done", "done/1"]).code(2);
+    bench.flexcal(&["study", "STUDY.toml", "--done", "STUDY.toml"]).code(2);
+    assert!(!bench.path("done/1").exists() && bench.path("STUDY.toml").exists());
     let assert = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "own-1"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("8 of 12 parts of the study are missing"));
     let json = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "shared", "--json"]).success();

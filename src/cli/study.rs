@@ -1,9 +1,11 @@
 //! `flexcal study`.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use flexcal::files::Ready;
 use flexcal::monte_carlo::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 use flexcal::report::{self, shell_word};
 
@@ -32,6 +34,9 @@ pub struct Arguments {
     /// Do the i-th of n shares alone, and write no results: that is for `study merge`
     #[arg(long, value_name = "i/n", conflicts_with = "json")]
     shard: Option<Shard>,
+    /// Write FILE once all is done, with exit status 0: what a workflow waits for; one of before is taken away first
+    #[arg(long, value_name = "FILE")]
+    done: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -53,6 +58,34 @@ struct Common {
     study: PathBuf,
     #[command(flatten)]
     flags: Flags,
+}
+
+/// The file of `--done`.
+struct Sign<'a>(&'a Path);
+
+impl<'a> Sign<'a> {
+    /// What it says.
+    const TEXT: &'static str = "flexcal study: done\n";
+
+    /// The file at `path`, which is taken away until it is true; a file of anything else is left where it is.
+    fn claim(path: &'a Path) -> Result<Self, WriteError> {
+        let io = |source| WriteError::Io { path: path.to_owned(), source };
+        if path.symlink_metadata().is_ok() {
+            if fs::read(path).map_err(io)? != Self::TEXT.as_bytes() {
+                return Err(WriteError::InTheWay {
+                    path: path.to_owned(),
+                    why: "a file that --done did not write is there",
+                });
+            }
+            fs::remove_file(path).map_err(io)?;
+        }
+        Ok(Self(path))
+    }
+
+    fn put(self) -> Result<(), WriteError> {
+        let ready = Ready::new(self.0, Self::TEXT).and_then(Ready::put);
+        ready.map_err(|source| WriteError::Io { path: self.0.to_owned(), source })
+    }
 }
 
 /// A folder of shares that is not there.
@@ -92,9 +125,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     // Without a subcommand clap asks for these.
     let Some(common) = &arguments.common else { return Ok(Outcome::Done) };
+    let sign = arguments.done.as_deref().map(Sign::claim).transpose()?;
+    let outcome = work(common, arguments.shard)?;
+    if let (Some(sign), Outcome::Done) = (sign, &outcome) {
+        sign.put()?;
+    }
+    Ok(outcome)
+}
+
+/// Does the fits of a study, or of a share of it.
+fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>> {
     let study = match Request::read(&common.study)? {
         Request::Fits(study) => *study,
-        Request::Misprints(study) if arguments.shard.is_none() => return misprints(common, &study),
+        Request::Misprints(study) if shard.is_none() => return misprints(common, &study),
         // Reads it as what has shares, which says what is wrong.
         Request::Misprints(_) => Study::read(&common.study)?,
     };
@@ -103,8 +146,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let results = common.results(&study)?;
     let store = Store::new(&results.folder);
-    fit(common, &study, &store, arguments.shard.unwrap_or(Shard::WHOLE))?;
-    if arguments.shard.is_none() {
+    fit(common, &study, &store, shard.unwrap_or(Shard::WHOLE))?;
+    if shard.is_none() {
         return finish(common, &study, &results, &[store]);
     }
     if common.flags.talks() {
