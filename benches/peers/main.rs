@@ -2,6 +2,8 @@
 //!
 //!     peers write <poses> <unknowns> <csv>       data of `benches/fit.rs`; unknowns: 25 identifiable, or all 33
 //!     peers fit <poses> <unknowns> <repeats>     median time [ms] on one thread, final cost, steps tried
+//!     peers serve <name>                         a problem of `tests/cases/bounded`: limits and flexcal's optimum, then for each line x
+//!                                                a line of residuals and derivatives
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
@@ -11,15 +13,19 @@
     reason = "a program for run.sh"
 )]
 
+#[path = "../../tests/common/bounded.rs"]
+mod bounded;
 #[path = "../common/mod.rs"]
 mod common;
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::time::Instant;
 
+use bounded::Bounded;
 use common::ur10::{NOISE, Ur10};
-use flexcal::least_squares::Fit;
-use flexcal::least_squares::solver::{Settings, minimise};
+use flexcal::least_squares::solver::{Settings, minimise, minimise_constrained};
+use flexcal::least_squares::{Fit, jacobian, residual_vector};
 use nalgebra::DVector;
 
 fn main() {
@@ -34,7 +40,10 @@ fn main() {
             let ur10 = Ur10::new(poses.parse().unwrap());
             time(&ur10, chosen(&ur10, unknowns), repeats.parse().unwrap());
         }
-        _ => eprintln!("for run.sh: peers write <poses> <unknowns> <csv> | peers fit <poses> <unknowns> <repeats>"),
+        ["serve", name] => serve(&Bounded::read(name)),
+        _ => eprintln!(
+            "peers write <poses> <unknowns> <csv> | peers fit <poses> <unknowns> <repeats> | peers serve <name>"
+        ),
     }
 }
 
@@ -71,4 +80,33 @@ fn time(ur10: &Ur10, unknowns: &[usize], repeats: usize) {
     });
     times.sort_by(f64::total_cmp);
     println!("{:.4} {:.9e} {}", times[times.len() / 2], solution.cost, solution.iterations);
+}
+
+fn words<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
+    values.into_iter().map(f64::to_string).collect::<Vec<String>>().join(" ")
+}
+
+/// Lower and upper bounds; the number of constraints and for each its limits and coefficients; flexcal's steps, cost and optimum.
+/// Then, for each line x, the whitened residuals with those of the priors, and the Jacobian row after row.
+fn serve(own: &Bounded) {
+    let residuals = own.residuals();
+    let fit = own.fit(&residuals);
+    let found = minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}\n{}\n{}", words(own.bounds.lower()), words(own.bounds.upper()), own.rows.len()).unwrap();
+    for i in 0..own.rows.len() {
+        let (lower, upper) = (own.rows.lower()[i], own.rows.upper()[i]);
+        writeln!(out, "{lower} {upper} {}", words(&own.rows.matrix().row(i).clone_owned())).unwrap();
+    }
+    writeln!(out, "{} {} {}", found.iterations, found.cost, words(&found.x)).unwrap();
+    let priors = own.priors();
+    for line in std::io::stdin().lines() {
+        let line = line.unwrap();
+        let x = DVector::from_iterator(found.x.len(), line.split_whitespace().map(|word| word.parse().unwrap()));
+        let (data, own) = (residual_vector(&residuals, &x), &priors.matrix * &x);
+        // Column after column of the transpose: row after row.
+        let slopes = (jacobian(&residuals, &x).transpose(), priors.matrix.transpose());
+        let rows = data.iter().chain(own.iter()).chain(slopes.0.iter()).chain(slopes.1.iter());
+        writeln!(out, "{}", words(rows)).unwrap();
+    }
 }

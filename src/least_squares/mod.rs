@@ -125,6 +125,11 @@ pub trait Objective {
         by_differences(slopes, x, within)
     }
 
+    /// How far each unknown may plausibly go, where that is known.
+    fn reach(&self) -> Vec<Option<f64>> {
+        vec![None; self.parameters()]
+    }
+
     /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or not finite.
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         let _ = (x, step);
@@ -147,6 +152,10 @@ impl<O: Objective + ?Sized> Objective for &O {
 
     fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
         (**self).curvature(x, within)
+    }
+
+    fn reach(&self) -> Vec<Option<f64>> {
+        (**self).reach()
     }
 
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {

@@ -203,6 +203,18 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         linearisation
     }
 
+    /// 1 σ of the prior of each unknown that has one: a linear row a x + b of it alone, σ = 1/|a|.
+    fn reach(&self) -> Vec<Option<f64>> {
+        let mut reach = vec![None; self.parameters()];
+        for row in self.rows.iter().flat_map(|rows| rows.matrix.row_iter()) {
+            let mut entries = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+            if let (Some((j, value)), None) = (entries.next(), entries.next()) {
+                reach[j] = Some(value.abs().recip());
+            }
+        }
+        reach
+    }
+
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         let mut total = DVector::zeros(x.len());
         let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);

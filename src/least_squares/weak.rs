@@ -115,6 +115,10 @@ impl<O: Objective> Objective for Steadied<'_, O> {
         self.objective.curvature(x, within)
     }
 
+    fn reach(&self) -> Vec<Option<f64>> {
+        self.objective.reach().into_iter().zip(self.sizes).map(|(known, size)| known.or(*size)).collect()
+    }
+
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         self.objective.bend(x, step)
     }

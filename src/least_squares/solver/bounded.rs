@@ -150,11 +150,20 @@ impl Subproblem for Constrained {
     }
 
     fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-        let model = self.model.as_ref().filter(|_| self.steps == Steps::ActiveSet)?;
+        let model = self.model.as_ref()?;
         let factor = model.bent(bend)?;
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let guess = self.guess.clone().unwrap_or_else(|| polyhedron.touched.clone());
-        let PolyhedronSolution { q, faces } = PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping);
+        let PolyhedronSolution { q, faces } = match self.steps {
+            Steps::ActiveSet => {
+                let guess = self.guess.clone().unwrap_or_else(|| polyhedron.touched.clone());
+                PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping)
+            }
+            Steps::InteriorPoint => {
+                let (q, _) = interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
+                polyhedron.within(q, NEAR)
+            }
+            Steps::Clamped => return None,
+        };
         let mut point = x + q.component_div(&model.scale);
         self.bounds.hold(&mut point, &faces.bounds);
         Some(point)

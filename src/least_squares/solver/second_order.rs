@@ -6,11 +6,13 @@ use crate::least_squares::Linearisation;
 
 /// A gain outside this range of its forecast is a miss.
 const FORECAST: std::ops::RangeInclusive<f64> = 0.5..=1.5;
+/// The same of an undamped step with S, which near an optimum knows all there is.
+const CLOSE_FORECAST: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// Misses after which steps are bent.
 const BENDING_MISSES: usize = 2;
 /// Misses, and slow steps, of linearised residuals after which S is formed; for many unknowns, such a part of their number, since
 /// forming S costs about as many linearisations as there are unknowns.
-const MISSES: usize = 6;
+const MISSES: usize = 15;
 const MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
 const SLOW_STEPS: usize = 3;
 const SLOW_STEPS_PER_UNKNOWN: f64 = 1.0 / 12.0;
@@ -83,7 +85,8 @@ impl SecondOrder {
 
     /// Takes in a step of length ‖D p‖; whether S should be formed at the point where the solver is now.
     pub fn judge(&mut self, ratio: f64, taken: bool, (length, damping): (f64, f64), unknowns: usize) -> bool {
-        let missed = !FORECAST.contains(&ratio);
+        let near = self.matrix.is_some() && damping == 0.0;
+        let missed = !(if near { CLOSE_FORECAST } else { FORECAST }).contains(&ratio);
         let slow = taken && damping == 0.0 && self.last.is_some_and(|last| length > SLOW * last);
         self.last = (taken && damping == 0.0).then_some(length);
         self.misses += usize::from(missed);

@@ -93,13 +93,17 @@ pub trait Subproblem {
 /// Trust-region least squares after Moré, over any choice of step.
 ///
 /// Dⱼ is the largest ‖Jⱼ‖ seen so far, so the path does not depend on the units of the unknowns. Radius and gain
-/// ratio follow MINPACK's `lmder` [Moré 1978].
+/// ratio follow MINPACK's `lmder` [Moré 1978]. From the first step that limits hold back, Dⱼ is 1 over how far unknown j may
+/// plausibly go, where that is known: residuals that limits keep large go with combinations of which they say little, and ‖Jⱼ‖ would let
+/// these run where linearised residuals are not valid.
 #[derive(Debug, Clone)]
 pub struct TrustRegion<S> {
     subproblem: S,
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
+    /// Whether D has been taken from what unknowns may plausibly do.
+    measured: bool,
     second_order: SecondOrder,
     /// The linearised problem at x, and the model with second derivatives that steps come from instead.
     linearisation: Option<Linearisation>,
@@ -115,6 +119,7 @@ impl<S: Subproblem> TrustRegion<S> {
             settings,
             scale: DVector::zeros(0),
             radius: None,
+            measured: false,
             second_order: SecondOrder::default(),
             linearisation: None,
             convex: None,
@@ -151,10 +156,11 @@ impl<S: Subproblem> TrustRegion<S> {
             return Some(Termination::DerivativesNotFinite);
         }
         let lengths = norms.map(|norm| if norm == 0.0 { 1.0 } else { norm });
-        self.scale = match self.radius {
-            None => lengths.clone(),
-            Some(_) => self.scale.sup(&norms),
-        };
+        if self.radius.is_none() {
+            self.scale.clone_from(&lengths);
+        } else if !self.measured {
+            self.scale = self.scale.sup(&norms);
+        }
         let residual = (2.0 * cost).sqrt();
         let mut gradient = DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
         self.subproblem.hold_back(x, &lengths, &mut gradient);
@@ -216,6 +222,25 @@ impl<S: Subproblem> TrustRegion<S> {
             *radius = step.length * (BENT / share).clamp(0.1, 0.5);
             bendings -= 1;
         }
+    }
+
+    /// Takes D from how far each unknown may plausibly go; one of which that is not known, from what takes away all of the residual.
+    ///
+    /// False where nothing is known and D stays as it is.
+    fn measure<O: Objective>(&mut self, problem: &mut Problem<O>, x: &DVector<f64>) -> Result<bool, Error> {
+        let reach = problem.problem("reach_count", |o| Ok(o.reach()))?;
+        let Some(Linearisation { cost, triangle, .. }) = &self.linearisation else { return Ok(false) };
+        if reach.iter().all(Option::is_none) {
+            return Ok(false);
+        }
+        let residual = (2.0 * cost).sqrt();
+        let lengths = reach.iter().zip(triangle.column_iter());
+        let lengths = lengths.map(|(reach, column)| reach.map_or(column.norm() / residual, f64::recip));
+        let lengths = lengths.map(|length| if length.is_normal() { length } else { 1.0 });
+        self.scale = DVector::from_iterator(x.len(), lengths);
+        self.measured = true;
+        self.prepare(x);
+        Ok(true)
     }
 
     /// The tests of MINPACK after a step, with relative reductions.
@@ -331,7 +356,11 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let cost = state.get_cost();
         let first = state.get_iter() == 0;
         let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
-        let (step, share) = self.step(problem, &x, &mut radius)?;
+        let (mut step, mut share) = self.step(problem, &x, &mut radius)?;
+        if self.subproblem.is_confined() && !self.measured && self.measure(problem, &x)? {
+            radius = self.scale.component_mul(&(&step.point - &x)).norm();
+            (step, share) = self.step(problem, &x, &mut radius)?;
+        }
         if first {
             radius = radius.min(step.length);
         }
