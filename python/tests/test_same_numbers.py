@@ -58,7 +58,7 @@ position_sigma_mm = 0.05
 distance_sigma_mm = 0.05
 surface_sigma_mm = 0.05
 tilt_sigma_deg = 0.01
-held_out = { fraction = 0.2, seed = 1 }
+held_out = { column = "split" }
 """
 AROUND_TRUTH = """
 [parameters]
@@ -66,6 +66,8 @@ AROUND_TRUTH = """
 "anchor[A].x" = { mm = 1500 }
 "anchor[A].y" = { mm = 500 }
 "anchor[A].z" = { mm = 1200 }
+"surface[table].rx" = { deg = 0 }
+"surface[table].ry" = { deg = 0 }
 "surface[table].d" = { mm = 200 }
 [noise]
 position_sigma_mm = 0.05
@@ -85,9 +87,11 @@ def test_observations_without_a_tracker(command: Command, tmp_path: Path) -> Non
     (tmp_path / "TRUTH.toml").write_text(AROUND_TRUTH)
     run, made = command("simulate", tmp_path, "--truth", tmp_path, "--poses", 80, "--seed", 1)
     assert run.returncode == 0, run.stderr
-    # The tilt of a level tool, beside them.
-    tilts = pd.DataFrame([{f"q{k}_deg": 0.0 for k in range(1, 7)} | {"tilt_x_deg": 0.0, "tilt_y_deg": 0.0}])
-    measured = pd.concat([pd.read_csv(made / "measurements.csv"), tilts])
+    # The tilt of a tool, beside them.
+    table = pd.read_csv(made / "measurements.csv")
+    others = {"x_mm", "y_mm", "z_mm", "distance_mm", "offset_mm", "anchor", "surface", "point"} & set(table)
+    tilt = table.tail(1).assign(time_s=table["time_s"].max() + 60, **dict.fromkeys(others, np.nan), **{f"q{k}_deg": 0.0 for k in range(1, 7)})
+    measured = pd.concat([table, tilt.assign(tilt_x_deg=0.0, tilt_y_deg=0.0)])
     measured.to_csv(tmp_path / "all.csv", index=False)
     run, out = command("identify", tmp_path, "--data", tmp_path / "all.csv")
     residuals = flexcal.Problem(AROUND).identify(tmp_path / "all.csv").residuals
