@@ -75,8 +75,7 @@ impl Identification {
     /// What to ask about the input.
     #[getter]
     fn cautions(&self) -> Vec<String> {
-        let few = self.found.too_few_poses.iter().map(ToString::to_string);
-        few.chain(self.found.cautions.iter().map(ToString::to_string)).collect()
+        self.found.reasons_to_ask()
     }
 
     /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two has no standard error.

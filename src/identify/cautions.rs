@@ -55,6 +55,9 @@ impl fmt::Display for Caution {
             Self::HeldOutCopies { copies, of } => {
                 write!(f, "{copies} of {of} held-out rows are identification rows again: they judge nothing")
             }
+            Self::FarOff { rms, .. } if !rms.is_finite() => {
+                f.write_str("the nominal arm misses the measurements by more than numbers hold; check their units")
+            }
             Self::FarOff { rms, spread } => write!(
                 f,
                 "the nominal arm misses the measurements by {:.1} mm, {:.0} % of their spread, wherever its base stands; check \

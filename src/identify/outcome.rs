@@ -144,6 +144,12 @@ impl Identification {
         self.quality_flag.is_none()
     }
 
+    /// What to ask about the fit, in words: whether priors decide most of it, and its cautions.
+    pub fn reasons_to_ask(&self) -> Vec<String> {
+        let few = self.too_few_poses.iter().map(ToString::to_string);
+        few.chain(self.cautions.iter().map(ToString::to_string)).collect()
+    }
+
     /// A parameter by its name: `joint2.stiffness`.
     pub fn estimate(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)

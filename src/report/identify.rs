@@ -69,7 +69,7 @@ object! {
         correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
         active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
         outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
-        cautions: Vec<String> = found.cautions.iter().map(ToString::to_string).collect(),
+        cautions: Vec<String> = found.reasons_to_ask(),
     }
 }
 object! {
@@ -230,9 +230,7 @@ pub(super) fn counts(found: &Identification) -> String {
 
 /// What the terminal warns of, apart from a fit that is not to be trusted; nothing to say without any.
 pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
-    let of_fit = found.too_few_poses.iter().map(ToString::to_string);
-    let own = of_fit.chain(found.cautions.iter().map(ToString::to_string));
-    let points: Vec<String> = plots.warnings.iter().map(ToString::to_string).chain(own).collect();
+    let points: Vec<String> = plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
