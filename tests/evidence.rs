@@ -222,3 +222,21 @@ fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
         assert_eq!(stated(&evidence), Vec::<String>::new(), "{:?}", evidence.best());
     }
 }
+
+#[test]
+fn an_outlier_among_few_poses_is_set_aside_and_named() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let (data, _) = Dataset::read_files(&[cases.join("a-none.csv")], &problem).unwrap();
+    for (place, error) in [(3, [3.2, 3.6, 0.2]), (10, [-1.0, 2.0, 2.5]), (20, [0.0, -2.5, 1.0])] {
+        let Dataset { mut measurements, split } = data.clone();
+        let row = split.identification[place];
+        measurements.positions[row] += Vector3::from(error) * 1e-3;
+        let data = Dataset::new(measurements, split);
+        let closure = close(&problem, &data, &Options::default()).unwrap();
+        assert_eq!(closure.set_aside, [data.measurements.location(row)]);
+        assert!(closure.effects.is_empty() && closure.unexplained.is_empty(), "{:?}", closure.unexplained);
+        let text = flexcal::report::loop_text(&problem, &closure);
+        assert!(text.contains("1 pose too far off to be noise took no part in the choice of effects: "), "{text}");
+    }
+}

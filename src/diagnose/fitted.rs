@@ -1,6 +1,6 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::data::Data;
 use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
@@ -15,7 +15,9 @@ const WITHOUT_WEIGHT: f64 = 1e6;
 /// Median of |r|² of one, two and three normal coordinates of unit scatter.
 const MEDIAN: [f64; 3] = [0.455, 1.386, 2.366];
 /// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
-const TIMES: usize = 5;
+const TIMES: usize = 10;
+/// Part of the variance of a pose that is left where it decides a direction alone.
+const DECIDED: f64 = 1e-3;
 
 /// A fitted problem.
 #[derive(Clone)]
@@ -61,12 +63,11 @@ impl Fitted {
                 found.sigma_scale * placement.sigma(data.measurements, data.rows(), &problem)
             }
         };
-        let set_aside = found.outliers.iter().map(|outlier| outlier.row).collect();
-        let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside };
-        // The rounds on many poses fit too often for it.
-        if fitted.problem.robust.is_none() && data.rows().len() <= data.rules.weighed_poses {
-            fitted.set_aside = outliers(&fitted, data);
-        }
+        let outliers_of_fit: Vec<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
+        let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new() };
+        // The rounds on many poses fit too often to look for them.
+        let looks = fitted.problem.robust.is_none() && data.rows().len() <= data.rules.weighed_poses;
+        fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
         Ok(fitted)
     }
 
@@ -199,47 +200,71 @@ impl Fitted {
 }
 
 /// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood of the fit without them.
+///
+/// The trimmed fit without as many rows as may be outliers, from which on those farthest off are left out until they stay the same
+/// [Rousseeuw and Van Driessen 2006], shows what bends a fit to itself; those beyond `gross` then leave, and no others.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let rows = data.rows();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
     let most = (data.rules.few * rows.len() as f64) as usize;
-    let numbers: Vec<usize> = rows.iter().map(|&row| data.measurements.observation(row).coordinates()).collect();
-    // The worst first.
-    let far = |residual: &DVector<f64>| -> Vec<usize> {
-        let squares: Vec<f64> = (0..rows.len()).map(|k| residual.fixed_rows::<3>(3 * k).norm_squared()).collect();
-        let mut order: Vec<usize> = (0..rows.len()).collect();
+    let linearised = fitted.linearised(data, &[]);
+    let distances = |aside: &[usize]| distances(fitted, &linearised, aside);
+    let worst = |squares: &[f64], count: usize| -> Vec<usize> {
+        let mut order: Vec<usize> = (0..squares.len()).collect();
         order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
-        let mut ratios: Vec<f64> = (0..rows.len()).map(|k| squares[k] / MEDIAN[numbers[k] - 1]).collect();
-        ratios.sort_by(|a, b| b.total_cmp(a));
-        let scatter = ratios.get(rows.len() / 2).copied().unwrap_or(0.0);
-        order.retain(|&k| squares[k] > data.rules.gross * scatter);
+        order.truncate(count);
+        order.sort_unstable();
         order
     };
-    let whitened = |aside: &[usize]| {
-        let here = fitted.linearised(data, &[]);
-        let without: Vec<usize> = aside.iter().map(|&k| rows[k]).collect();
-        let rest = Fitted { set_aside: without, ..fitted.clone() };
-        let step = rest.neighbourhood(&rest.linearised(data, &[])).step().clone();
-        here.residual() + here.fitted() * step
-    };
-    let poses = fitted.poses(data, rows);
-    let errors = fitted.model.residuals(poses.clone(), &fitted.found.x);
-    let plain: Vec<f64> =
-        errors.iter().zip(&poses).flat_map(|(r, pose)| (r / pose.sigma).iter().copied().collect::<Vec<_>>()).collect();
-    let mut all = far(&DVector::from_vec(plain));
+    let mut aside = Vec::new();
     for _ in 0..TIMES {
-        let mut aside: Vec<usize> = all.iter().copied().take(most).collect();
-        if aside.is_empty() {
+        let next = worst(&distances(&aside), most);
+        if next == aside {
             break;
         }
-        aside.sort_unstable();
-        let next = far(&whitened(&aside));
-        let same = next.len() == aside.len() && next.iter().all(|k| aside.contains(k));
-        all = next;
-        if same {
-            break;
-        }
+        aside = next;
     }
-    let few = all.len() <= most;
-    all.into_iter().filter(|_| few).map(|k| rows[k]).collect()
+    for _ in 0..TIMES {
+        let squares = distances(&aside);
+        let far = squares.iter().filter(|square| **square > data.rules.gross).count();
+        if far > most {
+            return Vec::new();
+        }
+        let next = worst(&squares, far);
+        if next == aside {
+            break;
+        }
+        aside = next;
+    }
+    aside.into_iter().map(|k| rows[k]).collect()
+}
+
+/// |r|² of each pose in units of the others' scatter, in the fit without those `aside`: rᵀ C⁻¹ r with C = 1 − H of a pose in the fit and
+/// 1 + A (AᵀA)⁻¹ Aᵀ of one beside it, over the median of all.
+fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
+    let (whole, residual) = (linearised.fitted(), linearised.residual());
+    let (mut columns, mut here) = (whole.clone(), residual.clone());
+    for &pose in aside {
+        columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
+        here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
+    }
+    let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
+    let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
+    let (left, along) = (residual + &whole * fit.step(), fit.fitted());
+    let square = |pose: usize| {
+        let (own, r) = (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
+        let hat = Matrix3::from_fn(|i, j| own.row(i).dot(&own.row(j)));
+        let covariance = if aside.contains(&pose) {
+            Matrix3::identity() + hat * WITHOUT_WEIGHT.powi(2)
+        } else {
+            Matrix3::identity() * (1.0 + DECIDED) - hat
+        };
+        covariance.cholesky().map_or(0.0, |factor| r.dot(&factor.solve(&r)))
+    };
+    let numbers = |pose: usize| (0..3).filter(|k| whole.row(3 * pose + k).amax() > 0.0).count().max(1);
+    let squares: Vec<f64> = (0..left.len() / 3).map(square).collect();
+    let mut ratios: Vec<f64> = squares.iter().enumerate().map(|(pose, own)| own / MEDIAN[numbers(pose) - 1]).collect();
+    ratios.sort_by(|a, b| b.total_cmp(a));
+    let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
+    squares.into_iter().map(|own| if scatter > 0.0 { own / scatter } else { 0.0 }).collect()
 }

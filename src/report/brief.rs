@@ -1,6 +1,6 @@
 //! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
 
-use super::closed_loop::{called, errors, quality_flag, verdict};
+use super::closed_loop::{called, errors, quality_flag, set_aside, verdict};
 use super::document::{Block, Point};
 use super::findings;
 use super::identify::{errors_by_axis, headline, noise};
@@ -90,6 +90,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
+    blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
     let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let last = end.lines().count();

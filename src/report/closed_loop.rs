@@ -16,6 +16,7 @@ use crate::diagnose::{
     ClosedLoop, Correction, Found, Interval, Round, SelectionRules, Trace, Unexplained, Verdict, Witness,
     WitnessVerdict,
 };
+use crate::error::Location;
 use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
 use crate::problem::{Effect, Problem};
 
@@ -38,6 +39,8 @@ object! {
         held_out_gain_mm: IntervalEntry = IntervalEntry::of(&closure.gain),
         effects: Vec<FoundEntry<'a>> = closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
         unexplained: Option<UnexplainedEntry> = closure.unexplained.first().map(|left| UnexplainedEntry::of(left, &closure.before)),
+        /// Rows too far off to be noise, which took no part in the choice of effects.
+        set_aside: Vec<RowEntry> = closure.set_aside.iter().map(RowEntry::of).collect(),
         /// Further structure without a known law.
         further: Vec<UnexplainedEntry> = closure.unexplained.iter().skip(1).map(|left| UnexplainedEntry::of(left, &closure.before)).collect(),
         /// 1 σ of the prior that waves of joints were given \[rad\].
@@ -52,6 +55,12 @@ object! {
         #[serde(flatten)]
         errors: Both = Both::of(&fit.fitted),
         reduced_chi2: Option<f64> = fit.reduced_chi2,
+    }
+}
+object! {
+    RowEntry(row: &Location) {
+        file: String = row.file.display().to_string(),
+        line: Option<usize> = row.line,
     }
 }
 object! {
@@ -124,6 +133,25 @@ pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
     to_text(&Document::of(problem, closure))
 }
 
+/// Rows that took no part in the choice of effects; nothing to say without any.
+pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
+    const SHOWN: usize = 3;
+    let rows = &closure.set_aside;
+    let named: Vec<String> = rows.iter().take(SHOWN).map(ToString::to_string).collect();
+    let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
+    let treatment = if problem.robust.is_some() {
+        "The robust loss keeps the fit from them"
+    } else {
+        "The fit counts them in full; a section [robust] would limit them"
+    };
+    let words = format!(
+        "{} too far off to be noise took no part in the choice of effects: {}{more}. {treatment}.",
+        counted(rows.len(), "pose"),
+        named.join(", ")
+    );
+    (!rows.is_empty()).then_some(Block::Text(words))
+}
+
 /// What the loop came to as text, ending in a line break.
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let poses = &closure.before.fit.fitted;
@@ -133,6 +161,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
+    blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
@@ -168,6 +197,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
     blocks.extend(quality_flag(closure));
+    blocks.extend(set_aside(problem, closure));
     blocks.extend(beware(after, plots));
     blocks.extend([
         Block::Table(errors(closure)),

@@ -14,6 +14,7 @@ use super::harmonics;
 use super::interval;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
+use crate::error::Location;
 use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
@@ -88,6 +89,8 @@ pub struct ClosedLoop {
     pub unexplained: Vec<Unexplained>,
     /// Mean reduction of the error on held-out poses \[m\].
     pub gain: Interval,
+    /// Identification rows too far off to be noise: they took no part in the choice of effects.
+    pub set_aside: Vec<Location>,
 }
 
 impl ClosedLoop {
@@ -156,6 +159,7 @@ pub fn close_by(
         (true, false) => Verdict::Explained,
     };
     let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &data.split.held_out));
+    let set_aside = fitted.set_aside.iter().map(|&row| data.measurements.location(row)).collect();
     Ok(ClosedLoop {
         verdict,
         before,
@@ -167,6 +171,7 @@ pub fn close_by(
         harmonic_sigma,
         unexplained,
         gain,
+        set_aside,
     })
 }
 
