@@ -82,7 +82,8 @@ pub struct SelectionRules {
     pub left_out: usize,
     /// Odds to another effect from which on it is named as an alternative.
     pub beside: f64,
-    /// |r|² of an outlier in units of the others' scatter of a coordinate: by chance one pose in a million is beyond.
+    /// |r|² of an outlier in units of the others' scatter of a coordinate: ten times that scatter, for what a cause does to single ones of
+    /// few poses is mostly less, and a wrong reading mostly more.
     pub gross: f64,
     /// Part of the poses that may be outliers; where more are far off, they are no outliers.
     pub few: f64,
@@ -167,7 +168,7 @@ impl SelectionRules {
         drawn_again: 20,
         left_out: 5,
         beside: 0.05,
-        gross: 30.0,
+        gross: 100.0,
         few: 0.1,
         crowd: 16,
         covered: 0.95,
