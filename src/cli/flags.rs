@@ -7,12 +7,12 @@ use clap::Args;
 use super::output::{Results, WriteError};
 
 /// Where results go, and who reads along.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Flags {
     /// Folder for results [default: out/<name of the problem>]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    /// Replace files that this command or the problem reads, and files that flexcal did not write or that were changed since
     #[arg(long)]
     pub force: bool,
     /// Print the result as JSON on standard output, and nothing else

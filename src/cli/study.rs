@@ -18,6 +18,7 @@ use super::progress::FitBar;
 /// Arguments of `flexcal study`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(mut_arg("out", |arg| arg.help("Folder for results [default: out/<name of the study>]")))]
 #[command(after_help = "Finished parts are kept in DIR/cells: what was interrupted goes on where it stopped.
 
 Examples:
@@ -29,12 +30,15 @@ Examples:
 pub struct Arguments {
     #[command(subcommand)]
     merge: Option<Merge>,
+    /// A STUDY.toml, or the folder that holds one
+    #[arg(required = true)]
+    study: Option<PathBuf>,
     #[command(flatten)]
-    common: Option<Common>,
+    flags: Flags,
     /// Do the i-th of n shares alone, and write no results: that is for `study merge`
     #[arg(long, value_name = "i/n", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// Write FILE once all is done, with exit status 0: what a workflow waits for; one of before is taken away first
+    /// Write FILE once all is done, with exit status 0: what a workflow waits for; an older FILE is removed first
     #[arg(long, value_name = "FILE")]
     done: Option<PathBuf>,
 }
@@ -61,13 +65,13 @@ struct Common {
 }
 
 /// The file of `--done`.
-struct Sign<'a>(&'a Path);
+struct Sentinel<'a>(&'a Path);
 
-impl<'a> Sign<'a> {
+impl<'a> Sentinel<'a> {
     /// What it says.
     const TEXT: &'static str = "flexcal study: done\n";
 
-    /// The file at `path`, which is taken away until it is true; a file of anything else is left where it is.
+    /// The file at `path`, removed until the work is done; what `--done` did not write is an error.
     fn claim(path: &'a Path) -> Result<Self, WriteError> {
         let io = |source| WriteError::Io { path: path.to_owned(), source };
         if path.symlink_metadata().is_ok() {
@@ -124,11 +128,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return finish(common, &study, &results, &stores);
     }
     // Without a subcommand clap asks for these.
-    let Some(common) = &arguments.common else { return Ok(Outcome::Done) };
-    let sign = arguments.done.as_deref().map(Sign::claim).transpose()?;
+    let Some(study) = arguments.study.clone() else { return Ok(Outcome::Done) };
+    let common = &Common { study, flags: arguments.flags.clone() };
+    let sentinel = arguments.done.as_deref().map(Sentinel::claim).transpose()?;
     let outcome = work(common, arguments.shard)?;
-    if let (Some(sign), Outcome::Done) = (sign, &outcome) {
-        sign.put()?;
+    if let (Some(sentinel), Outcome::Done) = (sentinel, &outcome) {
+        sentinel.put()?;
     }
     Ok(outcome)
 }

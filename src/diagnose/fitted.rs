@@ -201,8 +201,8 @@ impl Fitted {
 
 /// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood of the fit without them.
 ///
-/// The trimmed fit without as many rows as may be outliers, from which on those farthest off are left out until they stay the same
-/// [Rousseeuw and Van Driessen 2006], shows what bends a fit to itself; those beyond `gross` then leave, and no others.
+/// From the fit to all on, as many rows as may be outliers, those farthest off, are left out until they stay the same, as in one start of
+/// the trimmed squares of [Rousseeuw and Van Driessen 2006]: that shows what bends a fit to itself; those beyond `gross` then leave, and no others.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let rows = data.rows();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a count")]
@@ -261,10 +261,12 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
         };
         covariance.cholesky().map_or(0.0, |factor| r.dot(&factor.solve(&r)))
     };
-    let numbers = |pose: usize| (0..3).filter(|k| whole.row(3 * pose + k).amax() > 0.0).count().max(1);
+    let numbers = |pose: usize| linearised.poses()[pose].observation.coordinates();
     let squares: Vec<f64> = (0..left.len() / 3).map(square).collect();
     let mut ratios: Vec<f64> = squares.iter().enumerate().map(|(pose, own)| own / MEDIAN[numbers(pose) - 1]).collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
-    let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
+    // No less than a σ that was declared: beside rounding everything is far off.
+    let least = if fitted.found.noise == Noise::Declared { 1.0 } else { 0.0 };
+    let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0).max(least);
     squares.into_iter().map(|own| if scatter > 0.0 { own / scatter } else { 0.0 }).collect()
 }

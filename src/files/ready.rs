@@ -99,13 +99,20 @@ impl Kept {
 #[cfg(target_os = "linux")]
 const PASSING: &str = ".flexcal-";
 
-/// Takes away what processes left that are no more.
+/// Nothing takes so long between two names.
+#[cfg(target_os = "linux")]
+const LEFT: std::time::Duration = std::time::Duration::from_secs(60);
+
+/// Takes away what processes left that are no more. On a folder that several machines share a number may be that of another one's: what is
+/// younger than [`LEFT`] stays.
 #[cfg(target_os = "linux")]
 fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let process = name.to_str().and_then(|name| name.strip_prefix(PASSING)?.split_once('-')?.0.parse::<u32>().ok());
-        if process.is_some_and(|process| !Path::new("/proc").join(process.to_string()).exists()) {
+        let is_gone = |process: u32| !Path::new("/proc").join(process.to_string()).exists();
+        let is_old = || entry.metadata()?.modified()?.elapsed().map_err(io::Error::other).map(|age| age > LEFT);
+        if process.is_some_and(is_gone) && is_old().unwrap_or(false) {
             _ = fs::remove_file(entry.path());
         }
     }
@@ -117,13 +124,13 @@ fn name(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd as _;
 
     use rustix::fs::{AtFlags, CWD, linkat};
-    clear(folder);
     let nameless = format!("/proc/self/fd/{}", file.as_raw_fd());
     let link = |to: &Path| linkat(CWD, &nameless, CWD, to, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
     match link(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         done => return done,
     }
+    clear(folder);
     let new = tempfile::Builder::new().prefix(&format!("{PASSING}{}-", std::process::id())).make_in(folder, link)?;
     fs::rename(new.path(), path)?;
     // It is gone under this name already.

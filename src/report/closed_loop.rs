@@ -140,9 +140,9 @@ pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<B
     let named: Vec<String> = rows.iter().take(SHOWN).map(ToString::to_string).collect();
     let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
     let treatment = if problem.robust.is_some() {
-        "The robust loss keeps the fit from them"
+        "The robust loss keeps the fit from such rows"
     } else {
-        "The fit counts them in full; a section [robust] would limit them"
+        "The fit counts such rows in full; a section [robust] would limit them"
     };
     let words = format!(
         "{} too far off to be noise took no part in the choice of effects: {}{more}. {treatment}.",

@@ -35,7 +35,7 @@ pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>
 pub(super) fn assumptions<'a>(problem: &Problem, expected: &[Expected], fitted: Option<usize>) -> Option<Block<'a>> {
     let mut points = Vec::new();
     if let (Some(HeldOut::Fraction { fraction, .. }), Some(fitted)) = (&problem.data.held_out, fitted) {
-        let (share, measured) = (100.0 * fraction, (fitted as f64 / (1.0 - fraction)).ceil());
+        let (share, measured) = (100.0 * fraction, (fitted as f64 / (1.0 - fraction) - 1e-9).ceil());
         points.push(format!(
             "All {} are fitted; held_out in [data] takes {} % of what is measured from the fit, so that it takes {measured} \
              poses to fit as many.",

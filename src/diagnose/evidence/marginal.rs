@@ -153,7 +153,8 @@ impl Coefficients {
     }
 }
 
-/// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the most probable of its sizes.
+/// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the most probable of its sizes, that of all
+/// columns together.
 ///
 /// Where its k columns may be at work one without the others, all together and each alone have the same chance 1/(k + 1): otherwise
 /// what one column of two explains would be held by another effect of that one column, for its prior is the narrower.

@@ -202,8 +202,13 @@ impl Evidence {
             explanation.hypotheses.iter().any(|other| other.law == of.law && other.part == of.part)
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
-        let law =
-            self.explanations.iter().filter(has_law).map(|explanation| explanation.probability).sum::<f64>().min(1.0);
+        let law = self
+            .explanations
+            .iter()
+            .filter(has_law)
+            .map(|explanation| explanation.probability)
+            .fold(0.0, |sum, own| sum + own)
+            .min(1.0);
         Claims { place: (of.part, place), depends_on: (of.depends_on.clone(), depends_on), law: (of.clone(), law) }
     }
 }
@@ -316,13 +321,18 @@ fn blocks(
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }
+    let is_declared = fitted.found.noise == Noise::Declared;
     let of_candidate = |candidate: &&Candidate| {
         let design = candidate.design.clone().without(left_out);
-        Block::new(design, &neighbourhood, candidate.ln_prior, candidate.coefficients.clone())
+        let mut coefficients = candidate.coefficients.clone();
+        if !is_declared {
+            // A σ from a residual that holds the effect says nothing of how large that is.
+            coefficients.largest.fill(f64::INFINITY);
+        }
+        Block::new(design, &neighbourhood, candidate.ln_prior, coefficients)
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
     let rows = data.thinned(data.rules.weighed_poses);
-    let is_declared = fitted.found.noise == Noise::Declared;
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();
     let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
