@@ -240,3 +240,15 @@ fn an_outlier_among_few_poses_is_set_aside_and_named() {
         assert!(text.contains("1 pose too far off to be noise took no part in the choice of effects: "), "{text}");
     }
 }
+
+#[test]
+fn a_fit_that_is_not_to_be_trusted_gets_no_correction() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let (Dataset { mut measurements, split }, _) = Dataset::read_files(&[cases.join("a-none.csv")], &problem).unwrap();
+    let joints = measurements.joints;
+    // Degrees taken for radians.
+    measurements.configurations.iter_mut().skip(2).step_by(joints).for_each(|q| *q = q.to_degrees());
+    let closure = close(&problem, &Dataset::new(measurements, split), &Options::default()).unwrap();
+    assert!(!closure.after.is_trusted() && closure.unexplained.iter().all(|left| left.correction.is_none()));
+}

@@ -21,7 +21,8 @@ pub struct Unexplained {
     pub p_value: f64,
     /// Probabilities of what is said; `None` where only the residual tests see it.
     pub claims: Option<Claims>,
-    /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out.
+    /// What an empirical correction gains; `None` where it takes less than 5 % off the error of poses that were left out, and beside a fit
+    /// that is not to be trusted.
     pub correction: Option<Correction>,
 }
 
@@ -86,8 +87,9 @@ pub(super) fn without_law(
     }
     let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
     all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
+    // What misses the arm altogether is no prediction to improve: a function of the measured position would hold the answer itself.
     let first = all.iter().position(|(hypothesis, _)| hypothesis.law != Law::PerPose);
-    if let Some(first) = first {
+    if let Some(first) = first.filter(|_| fitted.found.is_trusted()) {
         let hypothesis = all[first].0.clone();
         all[first].1.correction = correction(fitted, data, best, &hypothesis);
     }
