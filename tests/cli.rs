@@ -7,6 +7,10 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 
+#[path = "cli/compensate.rs"]
+mod compensate;
+#[path = "cli/example.rs"]
+mod example;
 #[path = "cli/input.rs"]
 mod input;
 #[path = "cli/printed.rs"]

@@ -14,6 +14,8 @@ mod derivatives;
 mod edges;
 #[path = "solver/inequalities.rs"]
 mod inequalities;
+#[path = "solver/more_garbow_hillstrom.rs"]
+mod more_garbow_hillstrom;
 #[path = "solver/nist.rs"]
 mod nist;
 #[path = "solver/robust.rs"]

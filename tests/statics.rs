@@ -6,6 +6,10 @@ mod common;
 
 #[path = "statics/bench.rs"]
 mod bench;
+#[path = "statics/derivatives.rs"]
+mod derivatives;
+#[path = "statics/golden.rs"]
+mod golden;
 #[path = "statics/limits.rs"]
 mod limits;
 #[path = "statics/reciprocity.rs"]

@@ -32,7 +32,7 @@ impl Class {
         Self::MoreGarbowHillstrom,
     ];
 
-    /// Heading of its section, which `tests/auto_solver.rs` reads.
+    /// Heading of its section, which `tests/fit/auto_solver.rs` reads.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identifiable => "rigid, identifiable",

@@ -9,7 +9,7 @@ use super::family::Term;
 use crate::problem::{Custom, Effect, Problem};
 
 /// An effect that no catalogue holds: declared in a problem by [`Effect::custom`], it is fitted, traced and added by the loop
-/// like those of the catalogue. `tests/custom_effect.rs` is the example.
+/// like those of the catalogue. `tests/loop/custom_effect.rs` is the example.
 pub trait CustomEffect: Debug + Send + Sync {
     /// Name, by which parameters go: that of no effect of the catalogue and of no beam.
     fn name(&self) -> &str;

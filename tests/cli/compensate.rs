@@ -1,0 +1,216 @@
+//! Commands that bring the arm to where it should be, tried on the virtual rig.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use flexcal::identify::{Options, Placement, compensate, identify};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::model::Model;
+use flexcal::problem::{PoseView, Problem};
+use flexcal::report::{commands_csv, poses_csv};
+use flexcal::simulate::{Truth, simulate};
+use nalgebra::Vector3;
+
+fn case(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
+}
+
+/// Measurements from CSV text, as the problem reads them.
+fn measured(text: &str, problem: &Problem) -> Measurements {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("measurements.csv");
+    fs::write(&file, text).unwrap();
+    Measurements::read(&[file], problem).unwrap().0
+}
+
+fn model(problem: &Problem, rows: &Measurements) -> Model {
+    let placement = Placement::of(rows);
+    Model::new(problem, &placement.bases, &placement.targets).unwrap()
+}
+
+#[test]
+fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
+    let problem = Problem::read(&case("problem.toml")).unwrap();
+    let truth = Truth::read(&case("truth.toml"), &problem).unwrap();
+    let simulation = simulate(&problem, &truth, 78, 7).unwrap();
+    let data = Dataset::of(&problem, measured(&simulation.csv(), &problem)).unwrap();
+    let rows = &data.measurements;
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+
+    // Where the nominal arm would be in the held-out configurations is where the true arm should be.
+    let nominal = Arm::nominal(&problem);
+    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let mut targets = rows.clone();
+    for row in 0..rows.len() {
+        let set = &simulation.rows[row].conditions;
+        let setup = PoseView { payload: set.payload, hoist: set.hoist, ..PoseView::of(&set.configuration) };
+        nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
+        targets.positions[row] = rest.frame.point(&problem.tool.target);
+    }
+    let commands = compensate(&problem, &model(&problem, rows), &found.x, &targets).unwrap();
+    let mut misses = Vec::new();
+    for &row in &data.split.held_out {
+        let command = &commands[row];
+        assert!(command.is_reached(), "row {row}");
+        let miss = |configuration: &[f64]| {
+            let mut set = simulation.rows[row].conditions.clone();
+            set.configuration = configuration.to_vec();
+            (simulation.rig.position(&set).unwrap() - targets.positions[row]).norm() * 1e3
+        };
+        misses.push([miss(rows.configuration(row)), miss(&command.configuration)]);
+    }
+    let mean = |k: usize| misses.iter().map(|miss| miss[k]).sum::<f64>() / misses.len() as f64;
+    println!("{} targets: {:.3} mm before, {:.4} mm after", misses.len(), mean(0), mean(1));
+    assert_eq!(misses.len(), 50);
+    assert!(mean(0) > 10.0 && mean(1) < 0.2);
+}
+
+/// The case's problem with one piece of its text replaced.
+fn changed(from: &str, to: &str) -> String {
+    let text = fs::read_to_string(case("problem.toml")).unwrap();
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1)
+}
+
+#[test]
+fn the_digest_is_of_what_predictions_depend_on() {
+    let digest = |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
+    let own = digest("", "");
+    // On every machine.
+    assert_eq!(own, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
+    for (from, to) in [
+        ("name = \"elbow\"", "name = \"knee\"\nmax_deg = 300"),
+        ("a_m = 1.95", "a_mm = 1950"),
+        ("position_sigma_mm = 0.05", "position_sigma_mm = 0.5"),
+        ("\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_mm = 6.0 }"),
+        ("reference_temperature_C = 20.0", "reference_temperature_C = 25.0"),
+        ("a-none.csv", "other.csv"),
+    ] {
+        assert_eq!(digest(from, to), own, "{to}");
+    }
+    let drift = "[[effect]]\njoint-thermal-drift = { joint = 2 }\n[parameters]";
+    let mut seen = vec![own];
+    for (from, to) in [
+        ("a_m = 1.95", "a_m = 1.950001"),
+        ("stiffness_N_m_per_rad = 5.2e4", ""),
+        ("mass_kg = 4.2", "mass_kg = 4.3"),
+        // Two that exchange their names exchange their estimates.
+        ("name = \"A\"", "name = \"C\""),
+        ("beam_elements = 1", "beam_elements = 2"),
+        ("-9.80665", "-9.81"),
+        ("[tool]\n", "[tool]\npayload_kg = 1\n"),
+        ("[parameters]", drift),
+    ] {
+        seen.push(digest(from, to));
+    }
+    let warm =
+        changed("[parameters]", drift).replace("reference_temperature_C = 20.0", "reference_temperature_C = 25.0");
+    seen.push(Problem::parse(&warm, Path::new("problem.toml")).unwrap().digest());
+    let count = seen.len();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), count);
+}
+
+#[test]
+fn an_estimate_of_another_arm_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(folder.path()).args(arguments).assert()
+    };
+    fs::write(path("problem.toml"), changed("", "")).unwrap();
+    fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
+    run(&["identify", ".", "--quiet", "--out", "."]).success();
+    let text = fs::read_to_string(path("estimate.json")).unwrap();
+    let few: Vec<String> =
+        fs::read_to_string(path("a-none.csv")).unwrap().lines().take(4).map(|line| format!("{line}\n")).collect();
+    fs::write(path("targets.csv"), few.concat()).unwrap();
+    let compensate =
+        || run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
+    compensate().success();
+    fs::write(path("problem.toml"), changed("mass_kg = 4.2", "mass_kg = 4.3")).unwrap();
+    let assert = compensate().code(2);
+    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+    assert!(message.contains("estimate.json: was identified with another declared arm"), "{message}");
+    // What older versions wrote says nothing of the arm.
+    let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(old.as_object_mut().unwrap().remove("arm_digest").is_some());
+    fs::write(path("estimate.json"), old.to_string()).unwrap();
+    compensate().success();
+}
+
+#[test]
+fn limits_are_kept_and_targets_out_of_reach_are_named() {
+    let mut problem = Problem::read(&case("problem.toml")).unwrap();
+    problem.joints[1].limits = (-0.2, 0.3);
+    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0;
+    let arm = model(&problem, &rows);
+    let mut targets = rows.clone();
+    targets.positions[0] = Vector3::new(9.0, 0.0, 0.0);
+    let x = nalgebra::DVector::zeros(arm.parameters.len());
+    let commands = compensate(&problem, &arm, &x, &targets).unwrap();
+    assert!(!commands[0].is_reached() && commands[0].miss.norm() > 4.0);
+    assert!(commands.iter().all(|command| (-0.2..=0.3).contains(&command.configuration[1])));
+    // Where the shoulder starts well inside its range, a correction is enough.
+    let inside = commands.iter().skip(1).filter(|command| (-0.15..=0.25).contains(&rows.configuration(command.row)[1]));
+    let inside: Vec<bool> = inside.map(flexcal::identify::Command::is_reached).collect();
+    assert!(inside.len() > 10 && inside.iter().all(|reached| *reached));
+}
+
+#[test]
+fn redundancy_stays_near_the_seed() {
+    let problem = Problem::read(&case("problem.toml")).unwrap();
+    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0;
+    let arm = model(&problem, &rows);
+    let x = nalgebra::DVector::zeros(arm.parameters.len());
+    for command in compensate(&problem, &arm, &x, &rows).unwrap() {
+        // Four joints and three coordinates: the way is a correction, not another posture.
+        let seed = rows.configuration(command.row);
+        let step: f64 = command.configuration.iter().zip(seed).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        assert!(command.is_reached() && step < 0.2, "row {}: {step} rad", command.row);
+    }
+}
+
+#[test]
+fn words_with_a_comma_stay_one_cell() {
+    let problem = Problem::read(&case("problem.toml")).unwrap();
+    let mut targets = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);
+    targets.session.names = vec!["bench \"A\", east".to_owned()];
+    let arm = model(&problem, &targets);
+    let x = nalgebra::DVector::zeros(arm.parameters.len());
+    let commands = compensate(&problem, &arm, &x, &targets).unwrap();
+    for text in [commands_csv(&problem, &targets, &commands), poses_csv(&problem, &targets)] {
+        let mut table = csv::Reader::from_reader(text.as_bytes());
+        let place = table.headers().unwrap().iter().position(|name| name == "session").unwrap();
+        let words: Vec<String> = table.records().map(|row| row.unwrap()[place].to_owned()).collect();
+        assert_eq!(words, ["bench \"A\", east"; 3], "{text}");
+    }
+}
+
+#[test]
+fn errors_of_the_instrument_are_no_errors_of_the_arm() {
+    let text = fs::read_to_string(case("problem.toml")).unwrap();
+    let text = text + "\n[[effect]]\ntracker-scale = true\n\n[[effect]]\ntracker-drift = true\n";
+    let problem = Problem::parse(&text, &case("problem.toml")).unwrap();
+    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[3, 40]);
+    let model = model(&problem, &rows);
+    let mut x = nalgebra::DVector::zeros(model.parameters.len());
+    let seen = |name: &str| model.parameters.iter().position(|parameter| parameter.name == name).unwrap();
+    x[seen("joint2.theta")] = 2e-3;
+    let arm = x.clone();
+    (x[seen("tracker-scale.error")], x[seen("tracker-drift.z")]) = (1e-3, 1e-6);
+    let mut reached = rows.clone();
+    for command in compensate(&problem, &model, &x, &rows).unwrap() {
+        assert!(command.is_reached());
+        let n = rows.joints;
+        reached.configurations[command.row * n..(command.row + 1) * n].copy_from_slice(&command.configuration);
+    }
+    let placement = Placement::of(&rows);
+    for (target, there) in rows.positions.iter().zip(model.predict(placement.poses(&reached, &[0, 1], 1.0), &arm)) {
+        assert!((target - there).norm() < 1e-8, "{} m off", (target - there).norm());
+    }
+}

@@ -1,0 +1,162 @@
+//! The solver that `auto` takes, held against the table of `benches/RESULTS.md`.
+
+#![expect(clippy::panic, reason = "a test that fails may panic")]
+
+use std::fs;
+
+use crate::common::arms::{path, with_parameters};
+use crate::common::bounded::Bounded;
+use argmin::core::observers::Observe;
+use flexcal::identify::SolverChoice;
+use flexcal::least_squares::solver::{Settings, Solution, State, minimise_within};
+use flexcal::model::Model;
+use flexcal::problem::Problem;
+
+/// The solver of `auto` takes at most this many times as long, summed over a class, as the fastest that reaches every optimum.
+const SLOWER: f64 = 2.0;
+
+/// The classes of the table, and whether their models have bounds.
+const CLASSES: [(&str, bool); 7] = [
+    ("rigid, identifiable", false),
+    ("rigid, redundant", false),
+    ("elastic", false),
+    ("bounded", true),
+    ("sequential", false),
+    ("NIST", false),
+    ("Moré–Garbow–Hillstrom", false),
+];
+
+/// A row of the table.
+struct Row<'a> {
+    solver: &'a str,
+    problem: &'a str,
+    optimum: &'a str,
+    /// [ms]
+    time: f64,
+}
+
+/// The rows of a section.
+fn rows<'a>(page: &'a str, class: &str) -> Vec<Row<'a>> {
+    let (_, section) = page.split_once(&format!("\n## {class}\n")).unwrap();
+    let section = section.split("\n## ").next().unwrap();
+    let cells = section.lines().filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |"));
+    let cells = cells.map(|line| line.split(" | ").collect::<Vec<&str>>()).skip(1);
+    cells
+        .map(|cells| {
+            let [problem, solver, optimum, .., time] = cells[..] else { panic!("{class}: {cells:?}") };
+            Row { solver, problem, optimum, time: time.parse().unwrap() }
+        })
+        .collect()
+}
+
+fn auto(bounded: bool) -> (SolverChoice, Option<&'static str>) {
+    let file = "problems/lunar-sampler/problem.toml";
+    let problem = if bounded {
+        with_parameters(file, "\"joint*.theta\" = { sigma_deg = 1, min_deg = -1, max_deg = 1 }\n")
+    } else {
+        Problem::read(&path(file)).unwrap()
+    };
+    let model = Model::new(&problem, &[String::new()], &[String::new()]).unwrap();
+    assert_eq!(model.is_bounded(), bounded);
+    (SolverChoice::Auto.decide(&model), SolverChoice::Auto.reason(&model))
+}
+
+/// What the solver named `pick` does in these rows that it should not.
+fn faults(rows: &[Row], pick: &str) -> Vec<String> {
+    let of = |solver: &str| rows.iter().filter(|row| row.solver == solver).collect::<Vec<_>>();
+    let missed = |rows: &[&Row]| rows.iter().filter(|row| !row.optimum.starts_with("yes")).count();
+    let total = |rows: &[&Row]| rows.iter().map(|row| row.time).sum::<f64>();
+    let picked = of(pick);
+    if picked.is_empty() {
+        return vec![format!("{pick} is not in the table")];
+    }
+    let lost = picked.iter().filter(|row| !row.optimum.starts_with("yes"));
+    let mut faults: Vec<String> = lost.map(|row| format!("{pick} on {}: {}", row.problem, row.optimum)).collect();
+    for row in rows {
+        let others = of(row.solver);
+        if missed(&others) == 0 && total(&picked) > SLOWER * total(&others) {
+            faults.push(format!("{pick} takes {} ms, {} only {} ms", total(&picked), row.solver, total(&others)));
+        }
+    }
+    faults.dedup();
+    faults
+}
+
+#[test]
+fn auto_takes_what_the_table_recommends() {
+    let page = fs::read_to_string(path("benches/RESULTS.md")).unwrap();
+    for (class, bounded) in CLASSES {
+        let rows = rows(&page, class);
+        let faults = faults(&rows, auto(bounded).0.as_str());
+        assert!(faults.is_empty(), "{class}:\n{}", faults.join("\n"));
+    }
+    let sections = page.lines().filter(|line| line.starts_with("## ")).count();
+    assert_eq!(sections, CLASSES.len() + 1, "every section but the summary is a class");
+}
+
+/// As the table says, with fits made here: what `auto` takes comes to the optimum, by no more evaluations than twice those of the
+/// thriftiest that does.
+#[test]
+fn auto_is_best_where_bounds_bind() {
+    for (name, solvers) in [("stiffness", 4), ("tight-geometry", 4), ("mild-constraints", 2)] {
+        let own = Bounded::read(name);
+        let residuals = own.residuals();
+        let fit = own.fit(&residuals);
+        let solve = |solver: SolverChoice| {
+            let (within, limits) = (solver.within().unwrap(), (&own.bounds, &own.rows));
+            let found = minimise_within(within, &fit, own.nominal(), limits, &Settings::default(), None::<Silent>);
+            let (steps, count) = (found.iterations, found.evaluations());
+            println!("{name}, {}: {steps} steps, {count} evaluations, cost {:.12e}", solver.as_str(), found.cost);
+            assert!(
+                (0..found.x.len()).all(|j| own.bounds.lower()[j] <= found.x[j] && found.x[j] <= own.bounds.upper()[j])
+            );
+            found
+        };
+        let keeps = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&own.model));
+        let found: Vec<Solution> = keeps.map(solve).collect();
+        assert_eq!(found.len(), solvers);
+        let auto = solve(SolverChoice::Auto.decide(&own.model));
+        let best = found.iter().map(|found| found.cost).fold(f64::INFINITY, f64::min);
+        assert!(auto.cost <= best * (1.0 + 1e-8), "{name}: {:.12e} against {best:.12e}", auto.cost);
+        let reached = found.iter().filter(|found| found.cost <= best * (1.0 + 1e-8));
+        let counts: Vec<u64> = reached.map(Solution::evaluations).collect();
+        assert!(counts.len() + 1 >= solvers, "{name}: only the naive way may stop short");
+        let least = counts.into_iter().min().unwrap();
+        assert!(auto.evaluations() <= 2 * least, "{name}: {} evaluations, the thriftiest {least}", auto.evaluations());
+    }
+}
+
+struct Silent;
+
+impl Observe<State> for Silent {}
+
+#[test]
+fn the_rule_is_written_down() {
+    let rule = fs::read_to_string(path("docs/solvers.md")).unwrap();
+    assert!(rule.contains(&format!("at most {SLOWER} times")));
+    for bounded in [false, true] {
+        let (solver, reason) = auto(bounded);
+        let line = format!("| {} | `{}` |", reason.unwrap(), solver.as_str());
+        assert!(rule.contains(&line), "{line}");
+    }
+    for (class, _) in CLASSES {
+        assert!(rule.contains(class), "{class}");
+    }
+}
+
+#[test]
+fn a_solver_that_fails_or_is_slow_is_found() {
+    let row = |problem, solver, optimum, time| Row { solver, problem, optimum, time };
+    let table = [
+        row("a", "fast", "yes", 1.0),
+        row("b", "fast", "yes (iteration-limit)", 1.0),
+        row("a", "slow", "yes", 2.0),
+        row("b", "slow", "yes", 2.5),
+        row("a", "wrong", "yes", 0.1),
+        row("b", "wrong", "no: diverged", 0.1),
+    ];
+    assert!(faults(&table, "fast").is_empty());
+    assert_eq!(faults(&table, "slow"), ["slow takes 4.5 ms, fast only 2 ms"]);
+    assert_eq!(faults(&table, "wrong"), ["wrong on b: no: diverged"]);
+    assert_eq!(faults(&table, "other"), ["other is not in the table"]);
+}

@@ -1,0 +1,186 @@
+//! What cannot be meant is said: held-out rows that do not belong to the fit, sessions that are not tied down, gross mistakes
+//! without priors, targets counted as poses.
+
+use crate::common::arms::parse;
+use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
+use flexcal::identify::{Caution, Identification, Options, QualityFlag, identify};
+use flexcal::measurement::Dataset;
+use flexcal::problem::{Problem, Robust, RobustLoss};
+use flexcal::quantity::Unit;
+use flexcal::report::estimate_text;
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+const SIGMA: f64 = 5e-5;
+const PRIORS: &str = "'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'tool.*' = { sigma_mm = 2 }";
+const FREE: &str = "'joint*.a' = { free = true }\n'joint*.d' = { free = true }\n'joint*.theta' = { free = true }\n\
+                    'joint*.alpha' = { free = true }\n'tool.*' = { free = true }\n'base.*' = { free = true }";
+
+fn arm(parameters: &str) -> Problem {
+    parse(&format!(
+        "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\na_m = 0.15\n[[joint]]\na_m = 0.6\n[[joint]]\nalpha_deg = -90\n\
+         a_m = 0.12\nd_m = 0.62\n[[joint]]\nalpha_deg = 90\n[tool]\ntarget_m = [0.05, 0.02, 0.12]\n[parameters]\n{parameters}\n\
+         [data]\nposition_sigma_mm = 0.05\n"
+    ))
+}
+
+/// Sixty poses to identify and thirty held out.
+fn measured(problem: &Problem, seed: u64) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut rows = at_random(problem, 90, 2.0, &mut rng);
+    let size = |unit| if unit == Unit::Length { 1e-3 } else { 2e-3 };
+    let truth = draw(&model_of(problem, &rows), size, &mut rng);
+    measure(problem, &mut rows, &truth, SIGMA, &mut rng);
+    divided(60, &rows)
+}
+
+fn fit(problem: &Problem, data: &Dataset) -> Identification {
+    identify(problem, data, &Options::default()).unwrap()
+}
+
+#[test]
+fn held_out_rows_are_judged() {
+    let problem = arm(PRIORS);
+    let clean = measured(&problem, 1);
+    let found = fit(&problem, &clean);
+    assert!(found.is_trusted() && found.cautions.is_empty(), "{:?} {:?}", found.quality_flag, found.cautions);
+    let with = |edit: &dyn Fn(&mut Dataset)| {
+        let mut data = clean.clone();
+        edit(&mut data);
+        fit(&problem, &data)
+    };
+    let shifted = with(&|data| data.measurements.positions[60..].rotate_left(1));
+    assert!(matches!(shifted.quality_flag, Some(QualityFlag::HeldOutMisses { .. })), "{:?}", shifted.quality_flag);
+    let copied = with(&|data| {
+        let rows: Vec<usize> = (0..60).chain(0..30).collect();
+        data.measurements = data.measurements.select(&rows);
+    });
+    assert_eq!(copied.quality_flag, Some(QualityFlag::HeldOutCopied));
+    let some = with(&|data| {
+        let rows: Vec<usize> = (0..60).chain(0..10).chain(70..90).collect();
+        data.measurements = data.measurements.select(&rows);
+    });
+    assert!(some.is_trusted());
+    assert_eq!(some.cautions, [Caution::HeldOutCopies { copies: 10, of: 30 }]);
+    for by in [1e-3, 0.3, 1e147] {
+        let wrong = with(&|data| data.measurements.positions[77].y += by);
+        let [Caution::HeldOutOutliers { rows, of: 30 }] = wrong.cautions.as_slice() else {
+            panic!("{by}: {:?}", wrong.cautions)
+        };
+        assert!(rows.len() == 1 && rows[0].row == 77 && wrong.is_trusted(), "{by}: {rows:?}");
+        let words = wrong.cautions[0].to_string();
+        assert!(words.contains("1 of 30 held-out poses is too far off") && words.len() < 200, "{words}");
+        let text = estimate_text(&problem, &wrong);
+        assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
+    }
+}
+
+#[test]
+fn a_fit_that_is_worse_than_none_where_it_was_not_made_is_not_trusted() {
+    // What the model lacks, the few poses at one end of the range turn into wrong parameters.
+    let problem = arm("'joint*' = { sigma_deg = 1, sigma_mm = 20 }\n'tool.*' = { sigma_mm = 20 }");
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let near = at_random(&problem, 20, 0.4, &mut rng);
+    let wide = at_random(&problem, 40, 2.0, &mut rng);
+    let mut all: Vec<Vec<f64>> = (0..20).map(|row| near.configuration(row).to_vec()).collect();
+    all.extend((0..40).map(|row| wide.configuration(row).to_vec()));
+    let mut rows = Dataset::builder(all, vec![Vector3::zeros(); 60]).measurements().unwrap();
+    let zero = nalgebra::DVector::zeros(model_of(&problem, &rows).parameters.len());
+    measure(&problem, &mut rows, &zero, SIGMA, &mut rng);
+    for row in 0..60 {
+        let q = rows.configuration(row)[1];
+        rows.positions[row] += 4e-4 * Vector3::new((9.0 * q).sin(), (7.0 * q).cos(), (8.0 * q).sin());
+    }
+    let found = fit(&problem, &divided(20, &rows));
+    assert!(matches!(found.quality_flag, Some(QualityFlag::HeldOutWorse { .. })), "{:?}", found.quality_flag);
+    assert!(found.fitted.held_out.rms.norm > 1.5 * found.registered.held_out.rms.norm);
+}
+
+#[test]
+fn a_session_needs_points_that_tie_its_base_down() {
+    let problem = arm(&format!("{PRIORS}\n'base.*' = {{ free = true }}"));
+    // Rows 60 and later are held out; session B has these rows.
+    let with = |rows: &[usize]| {
+        let mut data = measured(&problem, 2);
+        let word = |row| if rows.contains(&row) { "B" } else { "A" };
+        data.measurements.session = labels((0..90).map(word));
+        // Each session has a tool of its own: that of B is not fitted here.
+        data.measurements.target = Some(labels((0..90).map(|_| "t")));
+        fit(&problem, &data).quality_flag
+    };
+    let few = QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 6 };
+    assert_eq!(with(&[70, 71]), Some(few));
+    assert_eq!(with(&[70, 71, 72]), None);
+    let open = QualityFlag::Undetermined { of: "base[B]".to_owned(), poses: 2 };
+    assert_eq!(with(&[10, 11]), Some(open.clone()));
+    assert!(open.to_string().contains("leaves a turn"), "{open}");
+    assert_eq!(with(&[10, 11, 12]), None);
+}
+
+#[test]
+fn gross_mistakes_are_asked_about_without_priors_too() {
+    let problem = arm(FREE);
+    let clean = measured(&problem, 3);
+    let found = fit(&problem, &clean);
+    assert!(found.is_trusted() && found.cautions.is_empty(), "{:?} {:?}", found.quality_flag, found.cautions);
+    let edited = |edit: &dyn Fn(&mut Vector3<f64>)| {
+        let mut data = clean.clone();
+        data.measurements.positions.iter_mut().for_each(edit);
+        fit(&problem, &data)
+    };
+    for (what, factor) in [("inches", 1.0 / 25.4), ("metres", 1e-3), ("nothing", 0.0), ("micrometres", 1e3)] {
+        let found = edited(&|position| *position *= factor);
+        assert!(
+            matches!(found.quality_flag, Some(QualityFlag::OtherSize { .. } | QualityFlag::Misses { .. })),
+            "{what}: {:?}",
+            found.quality_flag
+        );
+    }
+    // The same numbers read by the other convention: Rz(θ) Tz(d) Tx(a) Rx(α).
+    let mut standard = problem.clone();
+    let n = standard.joints.len();
+    for joint in 0..n {
+        let before =
+            if joint == 0 { (0.0, 0.0) } else { (problem.joints[joint - 1].alpha, problem.joints[joint - 1].a) };
+        (standard.joints[joint].alpha, standard.joints[joint].a) = before;
+    }
+    let found = fit(&standard, &clean);
+    let asked = found.cautions.iter().any(|caution| matches!(caution, Caution::FarOff { .. }));
+    assert!(asked || !found.is_trusted(), "{:?}", found.cautions);
+}
+
+#[test]
+fn what_a_robust_loss_sets_aside_is_no_reason_for_distrust() {
+    let mut problem = arm(PRIORS);
+    let mut data = measured(&problem, 4);
+    for row in [3, 20, 41] {
+        data.measurements.positions[row].x += 2.0;
+    }
+    assert!(matches!(fit(&problem, &data).quality_flag, Some(QualityFlag::Misses { .. })));
+    problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
+    let found = fit(&problem, &data);
+    assert!(found.is_trusted() && found.outliers.len() == 3, "{:?} {:?}", found.quality_flag, found.outliers);
+    assert!(found.fitted.held_out.rms.norm < 3.0 * SIGMA);
+}
+
+#[test]
+fn targets_of_one_pose_are_points_not_poses() {
+    // Seven poses of three targets: 42 coordinates of the arm and 3 of the targets' shape, not 63.
+    let problem = arm(&format!("{PRIORS}\n'base.*' = {{ free = true }}"));
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let poses = at_random(&problem, 17, 2.0, &mut rng);
+    let configurations: Vec<Vec<f64>> = (0..51).map(|row| poses.configuration(row / 3).to_vec()).collect();
+    let mut rows = Dataset::builder(configurations, vec![Vector3::zeros(); 51]).measurements().unwrap();
+    rows.target = Some(labels((0..51).map(|row| ["left", "right", "top"][row % 3])));
+    let model = model_of(&problem, &rows);
+    let truth = draw(&model, |_| 1e-3, &mut rng);
+    measure(&problem, &mut rows, &truth, SIGMA, &mut rng);
+    let found = fit(&problem, &divided(21, &rows));
+    assert!(found.poses == 7 && found.several_targets);
+    assert_eq!(model.parameters.len(), 40);
+    assert_eq!(found.too_few_poses.map(|few| few.coordinates), None);
+    assert!(estimate_text(&problem, &found).contains("from 21 points in 7 different poses"));
+    let fewer = fit(&problem, &divided(18, &rows)).too_few_poses.unwrap();
+    assert_eq!((fewer.poses, fewer.coordinates, fewer.parameters), (6, 39, 40));
+}

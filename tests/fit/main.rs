@@ -1,0 +1,20 @@
+//! What a fit finds, what it claims, and what it says of data that cannot be meant.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod auto_solver;
+mod blind;
+mod constraints;
+mod coverage;
+mod dataset;
+mod identified;
+mod judged;
+mod orientation;
+mod recovery;
+mod robust;
+mod runaway;
+mod sigma;
+mod trust;

@@ -1,0 +1,112 @@
+//! Gross errors in the lunar sampler's data: what they do to a fit, with and without a robust loss.
+
+use std::path::{Path, PathBuf};
+
+use flexcal::diagnose::{Verdict, close};
+use flexcal::identify::{Identification, Options, identify};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
+use nalgebra::Vector3;
+
+/// Length of a gross error [m].
+const GROSS: f64 = 5e-3;
+
+fn lunar(case: &str) -> (Problem, Dataset) {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases).unwrap();
+    let files: [PathBuf; 1] = [cases.join(case)];
+    let (measurements, _) = Measurements::read(&files, &problem).unwrap();
+    let data = Dataset::of(&problem, measurements).unwrap();
+    (problem, data)
+}
+
+/// Moves every 33rd identification row by 5 mm, each in another direction; the rows moved.
+fn spoil(Dataset { measurements, split }: &mut Dataset) -> Vec<usize> {
+    let rows: Vec<usize> = split.identification.iter().copied().skip(7).step_by(33).collect();
+    for (k, &row) in rows.iter().enumerate() {
+        let angle = 2.4 * k as f64;
+        measurements.positions[row] += GROSS * Vector3::new(0.6 * angle.cos(), 0.6 * angle.sin(), 0.8);
+    }
+    rows
+}
+
+fn rows(result: &Identification) -> Vec<usize> {
+    result.outliers.iter().map(|outlier| outlier.row).collect()
+}
+
+#[test]
+fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
+    let (mut problem, mut data) = lunar("h-none-large.csv");
+    assert_eq!(data.split.identification.len(), 200);
+    let clean = identify(&problem, &data, &Options::default()).unwrap();
+    assert!(clean.outliers.is_empty(), "{:?}", clean.outliers);
+    let clean_rms = clean.fitted.held_out.rms.norm;
+    let spoiled = spoil(&mut data);
+    assert_eq!(spoiled.len(), 6);
+
+    let squares = identify(&problem, &data, &Options::default()).unwrap();
+    let ratio = squares.fitted.held_out.rms.norm / clean_rms;
+    println!("clean {:.4} mm; squares {ratio:.3} times that, {:?}", clean_rms * 1e3, rows(&squares));
+    assert!(ratio > 1.3);
+    for loss in [RobustLoss::Huber, RobustLoss::L1] {
+        problem.robust = Some(Robust { loss, threshold: None });
+        let robust = identify(&problem, &data, &Options::default()).unwrap();
+        let ratio = robust.fitted.held_out.rms.norm / clean_rms;
+        println!(
+            "{loss:?}: {ratio:.3} times the clean rms; {} after {} steps; χ² {:.3}; {:.3} s (squares {} steps, {:.3} s)",
+            robust.termination,
+            robust.iterations,
+            robust.reduced_chi2.unwrap(),
+            robust.seconds,
+            squares.iterations,
+            squares.seconds
+        );
+        assert!(robust.is_trusted() && ratio < 1.3);
+        assert_eq!(rows(&robust), spoiled);
+        for outlier in &robust.outliers {
+            assert!((outlier.error.norm() / GROSS - 1.0).abs() < 0.1 && outlier.distance > 50.0);
+            assert_eq!(outlier.location, data.measurements.location(outlier.row));
+        }
+        assert!((robust.reduced_chi2.unwrap() - 1.0).abs() < 0.25 && robust.noise_factor < 1.5);
+        // Errors of a robust fit are a little larger than those of a clean one, by what the loss gives away.
+        for (robust, clean) in robust.estimates.iter().zip(&clean.estimates) {
+            if let (Some(robust_error), Some(error)) = (robust.std_error, clean.std_error) {
+                let ratio = robust_error / error;
+                assert!((0.95..1.35).contains(&ratio), "{}: {ratio}", robust.name);
+                let off = (robust.estimate - clean.estimate) / error;
+                assert!(off.abs() < 1.5, "{}: {off} σ", robust.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_robust_loss_costs_little_on_clean_data() {
+    let (mut problem, data) = lunar("h-none-large.csv");
+    let squares = identify(&problem, &data, &Options::default()).unwrap();
+    problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: Some(1e3) });
+    let wide = identify(&problem, &data, &Options::default()).unwrap();
+    assert!((&wide.x - &squares.x).amax() < 1e-9);
+    problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
+    let huber = identify(&problem, &data, &Options::default()).unwrap();
+    let ratio = huber.fitted.held_out.rms.norm / squares.fitted.held_out.rms.norm;
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+}
+
+#[test]
+fn gross_errors_hide_no_effect_from_the_loop() {
+    let (mut problem, mut data) = lunar("b-joint-harmonic.csv");
+    for (row, along) in [(data.split.identification[5], Vector3::x()), (data.split.identification[19], Vector3::z())] {
+        data.measurements.positions[row] += 10.0 * GROSS * along;
+    }
+    let found = |problem: &Problem| close(problem, &data, &Options::default()).unwrap();
+    let is_wave = |effect: &Effect| matches!(effect, Effect::JointHarmonic { joint: 2, .. });
+    let squares = found(&problem);
+    let rows = [5, 19].map(|place| data.measurements.location(data.split.identification[place]));
+    assert_eq!(squares.set_aside, rows);
+    assert!(squares.effects.iter().all(|own| is_wave(&own.effect)), "{:?}", squares.effects);
+    problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
+    let robust = found(&problem);
+    assert_eq!(robust.verdict, Verdict::Explained);
+    assert!(robust.effects.len() == 1 && is_wave(&robust.effects[0].effect), "{:?}", robust.effects);
+}

@@ -1,0 +1,119 @@
+//! A declared σ that the residual contradicts decides nothing: priors and data are weighed by the scatter there is.
+
+use crate::common::arms::{measured, path};
+use flexcal::diagnose::{Verdict, close};
+use flexcal::identify::{Identification, Options, identify};
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+use flexcal::report::estimate_text;
+use flexcal::simulate::{Truth, simulate};
+
+/// The lunar sampler with another declared σ [m], and the measurements of a case.
+fn case(name: &str, sigma: f64) -> (Problem, Dataset) {
+    let mut problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
+    problem.data.position_sigma = Some(sigma);
+    let rows = measured(&problem, &[&format!("tests/cases/{name}.csv")]);
+    let data = Dataset::of(&problem, rows).unwrap();
+    (problem, data)
+}
+
+fn fit(name: &str, sigma: f64) -> (Problem, Identification) {
+    let (problem, data) = case(name, sigma);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    (problem, found)
+}
+
+/// Largest difference of two fits in standard errors of the first, and largest ratio of the standard errors.
+fn apart(one: &Identification, other: &Identification) -> (f64, f64) {
+    let pairs = one.estimates.iter().zip(&other.estimates);
+    let both = pairs.filter_map(|(a, b)| Some((a.estimate - b.estimate, a.std_error?, b.std_error?)));
+    both.fold((0.0_f64, 1.0_f64), |(far, ratio), (difference, a, b)| {
+        (far.max(difference.abs() / a), ratio.max(a / b).max(b / a))
+    })
+}
+
+#[test]
+fn a_sigma_that_fits_is_taken_as_declared() {
+    for name in ["a-none", "h-none-large"] {
+        let (problem, found) = fit(name, 5e-5);
+        assert_eq!((found.noise_factor, found.sigma_scale), (1.0, 1.0), "{name}");
+        assert!((found.sigma_taken / 5e-5 - 1.0).abs() < 1e-12, "{name}");
+        assert!(estimate_text(&problem, &found).contains("explains the data to the declared σ"));
+    }
+}
+
+#[test]
+fn a_sigma_that_is_wrong_changes_no_estimate() {
+    for (name, right) in
+        [("a-none", 5e-5), ("h-none-large", 5e-5), ("c-link-thermal-bending", 3e-4), ("e-payload-mass", 4.5e-4)]
+    {
+        let (_, expected) = fit(name, right);
+        assert!((0.5..2.0).contains(&expected.reduced_chi2.unwrap()), "{name}: {:?}", expected.reduced_chi2);
+        for factor in [0.01, 0.1, 10.0, 100.0] {
+            let (problem, found) = fit(name, factor * right);
+            let (far, ratio) = apart(&expected, &found);
+            // The scatter is known to about 10 %.
+            assert!(far < 0.4 && ratio < 1.3, "{name} × {factor}: {far} σ, {ratio}");
+            assert!((found.sigma_taken / right - 1.0).abs() < 0.25, "{name} × {factor}: {}", found.sigma_taken);
+            let chi2 = found.reduced_chi2.unwrap();
+            assert!((chi2 * factor * factor / expected.reduced_chi2.unwrap() - 1.0).abs() < 0.2, "{name}: {chi2}");
+            let text = estimate_text(&problem, &found);
+            let cause = if factor > 1.0 { "which is too large" } else { "the model lacks something" };
+            assert!(text.contains(cause) && text.contains("; chance gives "), "{text}");
+        }
+    }
+}
+
+#[test]
+fn a_sigma_of_each_row_is_raised_by_the_model_s_error() {
+    let (problem, mut data) = case("c-link-thermal-bending", 5e-5);
+    let rows = data.measurements.len();
+    let all = (0..rows).map(|row| if row % 2 == 0 { 5e-5 } else { 5e-7 }).collect();
+    data.measurements.sigma = Some(all);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let (_, alike) = fit("c-link-thermal-bending", 5e-5);
+    // Half of the rows do not rule the other half: the model's error is the same for all.
+    assert!(apart(&alike, &found).0 < 0.5, "{:?}", apart(&alike, &found));
+}
+
+/// What made the loop see a scale of the tracker in noise.
+const TRUTH: &str = "[random]
+'joint*' = { sigma_deg = 0.1, sigma_mm = 1 }
+'tool.*' = { sigma_mm = 1 }
+[noise]
+position_sigma_mm = 0.05
+[poses]
+q1_deg = [-150, 150]
+q2_deg = [-120, 0]
+q3_deg = [-120, 120]
+q4_deg = [-150, 150]
+q5_deg = [-150, 150]
+q6_deg = [-180, 180]
+identification = 60
+";
+
+#[test]
+fn a_sigma_too_large_makes_the_loop_invent_nothing() {
+    let arm = |sigma: f64| {
+        crate::common::arms::parse(&format!(
+            "name = 'elbow'\n[[joint]]\nd_m = 0.1273\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = -0.612\n[[joint]]\n\
+             a_m = -0.5723\nd_m = 0.163941\n[[joint]]\nalpha_deg = 90\nd_m = 0.1157\n[[joint]]\nalpha_deg = -90\n\
+             d_m = 0.0922\n[tool]\ntarget_m = [0.03, 0.02, 0.109]\n[parameters]\n'joint*' = {{ sigma_deg = 0.5, sigma_mm = 3 }}\n\
+             'tool.*' = {{ sigma_mm = 3 }}\n[data]\nposition_sigma_mm = {sigma}\n"
+        ))
+    };
+    for seed in [2, 4] {
+        let problem = arm(0.05);
+        let truth = Truth::parse(TRUTH, std::path::Path::new("truth.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 110, seed).unwrap().rows;
+        let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
+        let split = flexcal::measurement::Split { identification, held_out };
+        let data = Dataset::new(flexcal::monte_carlo::table(&rows), split);
+        for factor in [1.0, 10.0, 100.0] {
+            let closed = close(&arm(0.05 * factor), &data, &Options::default()).unwrap();
+            assert_eq!(closed.verdict, Verdict::NothingFound, "seed {seed} × {factor}: {:?}", closed.effects);
+            let size = closed.findings.tests.first().unwrap();
+            assert_eq!(size.to_string().contains("overstated"), factor > 1.0, "{size}");
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! From a fit to the cause of what it leaves: screening, evidence, rules, checks, the command.
+
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cases;
+mod checks;
+mod command;
+mod custom_effect;
+mod evidence;
+mod harmonics;
+mod screening;
+mod selection_rules;

@@ -1,0 +1,121 @@
+//! Positions from an independent finite-segment simulator (`tests/golden`): no formula in common with the closed forms.
+
+use crate::common::arms::{golden, golden_problem, table_2};
+use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::problem::PoseView;
+use flexcal::problem::{Equilibrium, Problem};
+use nalgebra::Vector3;
+
+struct Row {
+    q: Vec<f64>,
+    payload: f64,
+    hoist: f64,
+    values: Vec<f64>,
+}
+
+impl Row {
+    fn setup(&self) -> PoseView<'_> {
+        PoseView { payload: Some(self.payload), hoist: Some(self.hoist), ..PoseView::of(&self.q) }
+    }
+
+    fn vector(&self, k: usize) -> Vector3<f64> {
+        Vector3::new(self.values[3 * k], self.values[3 * k + 1], self.values[3 * k + 2]) * 1e-3
+    }
+}
+
+fn rows(name: &str) -> Vec<Row> {
+    let mut reader = csv::Reader::from_path(golden(name)).unwrap();
+    reader
+        .records()
+        .map(|record| {
+            let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
+            Row {
+                q: v[..4].iter().map(|q| q.to_radians()).collect(),
+                payload: v[4],
+                hoist: v[5],
+                values: v[6..].to_vec(),
+            }
+        })
+        .collect()
+}
+
+fn rigid(mut arm: Arm<f64>) -> Arm<f64> {
+    for joint in &mut arm.joints {
+        joint.flexibility = None;
+        joint.beam = None;
+    }
+    arm
+}
+
+fn position(arm: &Arm<f64>, problem: &Problem, row: &Row) -> Vector3<f64> {
+    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    arm.equilibrate(&row.setup(), &mut ws, &mut rest).unwrap();
+    rest.frame.point(&problem.tool.target)
+}
+
+/// Largest distance [mm] between the arm's positions and column group `k` of the rows.
+fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[Row], k: usize) -> f64 {
+    rows.iter().map(|row| (position(arm, problem, row) - row.vector(k)).norm() * 1e3).fold(0.0, f64::max)
+}
+
+#[test]
+fn rigid_positions_agree_to_a_nanometre() {
+    let problem = golden_problem();
+    let nominal = rigid(Arm::nominal(&problem));
+    let rows = rows("rigid.csv");
+    assert!(worst(&nominal, &problem, &rows, 0) < 1e-6);
+    assert!(worst(&table_2(nominal.clone()), &problem, &rows, 1) < 1e-6);
+}
+
+#[test]
+fn first_order_displacements_agree_for_each_part() {
+    let problem = golden_problem();
+    let nominal = Arm::nominal(&problem);
+    let rows = rows("first_order.csv");
+    // Deflections a million times smaller are in the linear limit; scaled back they keep ten digits.
+    let soft = 1e-6;
+    let parts = [
+        ("joints", true, false, false),
+        ("link A", false, true, false),
+        ("link B", false, false, true),
+        ("all", true, true, true),
+    ];
+    for (k, (name, joints, link_a, link_b)) in parts.into_iter().enumerate() {
+        let mut arm = nominal.clone();
+        arm.equilibrium = Equilibrium::Undeflected;
+        for (i, joint) in arm.joints.iter_mut().enumerate() {
+            joint.flexibility = joint.flexibility.map(|c| if joints { c * soft } else { 0.0 });
+            if let Some(beam) = &mut joint.beam {
+                let keep = if i == 2 { link_a } else { link_b };
+                let factor = if keep { soft } else { 0.0 };
+                let all = &mut beam.flexibility;
+                for flexibility in [&mut all.axial, &mut all.about_y, &mut all.about_z, &mut all.twist] {
+                    *flexibility *= factor;
+                }
+            }
+        }
+        let straight = rigid(nominal.clone());
+        let worst = rows
+            .iter()
+            .map(|row| {
+                let moved = (position(&arm, &problem, row) - position(&straight, &problem, row)) / soft;
+                (moved - row.vector(k)).norm() * 1e3
+            })
+            .fold(0.0, f64::max);
+        println!("first order, {name}: {worst:.5} mm");
+        assert!(worst < 0.003, "{name}: {worst} mm");
+    }
+}
+
+#[test]
+fn equilibrium_positions_agree_with_one_element_and_better_with_more() {
+    let problem = golden_problem();
+    let rows = rows("equilibrium.csv");
+    for (elements, limit) in [(1, 0.02), (2, 0.006), (8, 0.003)] {
+        let mut nominal = Arm::nominal(&problem);
+        nominal.beam_elements = elements;
+        let worst = worst(&nominal, &problem, &rows, 0).max(worst(&table_2(nominal.clone()), &problem, &rows, 1));
+        println!("equilibrium, {elements} elements: {worst:.5} mm");
+        assert!(worst < limit, "{elements} elements: {worst} mm");
+    }
+}
