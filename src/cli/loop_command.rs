@@ -79,11 +79,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&told)?;
         let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
-        let closed = results.path("problem.closed.toml");
-        output::print(&format!(
-            "Next: flexcal identify {} -v lists the parameters of the final fit\n",
-            shell_word(&closed)
-        ))?;
+        if closure.after.is_trusted() {
+            let closed = shell_word(&results.path("problem.closed.toml"));
+            output::print(&format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n"))?;
+        }
     }
     Ok(diagnostic::judged(&closure.after, common.quiet))
 }

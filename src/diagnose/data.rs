@@ -68,6 +68,16 @@ impl<'a> Data<'a> {
         (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
     }
 
+    /// Whether evidence leads the choice of effects, weighed on all rows.
+    pub fn is_led(&self) -> bool {
+        self.rows().len() <= self.rules.led_poses
+    }
+
+    /// Rows on which hypotheses are weighed: all where evidence leads, else some, taken evenly.
+    pub fn weighed(&self) -> Vec<usize> {
+        self.thinned(if self.is_led() { self.rules.led_poses } else { self.rules.weighed_poses })
+    }
+
     /// Time of each identification row \[s\].
     pub fn time(&self) -> Vec<f64> {
         self.pick(&self.measurements.time)
@@ -97,7 +107,8 @@ impl<'a> Data<'a> {
             temperature: problem.data.reference_temperature.is_some() && temperature.is_some_and(varies),
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
-            payload: payload.map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
+            payload: payload.as_ref().map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
+            payload_varies: payload.is_some_and(varies),
             ranges: (0..n).map(column).collect(),
             covariates: self.own_covariates().map(varies).collect(),
             times: self.shift_times(),

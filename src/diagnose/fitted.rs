@@ -65,8 +65,8 @@ impl Fitted {
         };
         let outliers_of_fit: Vec<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
         let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new() };
-        // The rounds on many poses fit too often to look for them.
-        let looks = fitted.problem.robust.is_none() && data.rows().len() <= data.rules.weighed_poses;
+        // Rounds on many poses fit too often to look for them.
+        let looks = fitted.problem.robust.is_none() && data.is_led();
         fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
         Ok(fitted)
     }

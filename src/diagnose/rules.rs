@@ -91,7 +91,10 @@ pub struct SelectionRules {
     pub crowd: usize,
     /// Part of the resamples within that interval.
     pub covered: f64,
-    /// Poses, taken evenly, on which hypotheses are weighed against each other at most: with more, rounds find the effects.
+    /// Poses up to which evidence leads the choice of effects, weighed on all of them; with more, rounds find the effects.
+    pub led_poses: usize,
+    /// Poses, taken evenly, on which hypotheses are weighed against each other where rounds found the effects; up to so many rounds are
+    /// not tried.
     pub weighed_poses: usize,
     /// Chance of a family of functions of unknown law, over that of a family of effects: the catalogue holds what is common.
     pub unknown_law: f64,
@@ -172,6 +175,7 @@ impl SelectionRules {
         few: 0.1,
         crowd: 16,
         covered: 0.95,
+        led_poses: 1500,
         weighed_poses: 240,
         unknown_law: 0.25,
         sure: 0.95,
@@ -223,6 +227,7 @@ impl SelectionRules {
             ("time_step", size(self.time_step)),
             ("resamples", (1..=10_000_000).contains(&self.resamples)),
             ("covered", part(self.covered)),
+            ("led_poses", self.led_poses >= self.weighed_poses),
             ("weighed_poses", self.weighed_poses >= 1),
             ("unknown_law", size(self.unknown_law)),
             ("sure", part(self.sure)),

@@ -121,7 +121,7 @@ fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hyp
     }
     let fitted = &whole;
     let (here, there) = (data.rows(), &data.split.held_out);
-    let weighed = data.thinned(data.rules.weighed_poses);
+    let weighed = data.weighed();
     let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
     let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;
     let rows = [here, there.as_slice()].concat();

@@ -85,6 +85,7 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
         match effect {
             Effect::StationShift { at_time } => Some(f64::from(time >= *at_time)),
             Effect::TrackerDrift => Some(time - first),
+            Effect::TrackerSettling { time_constant } => Some(1.0 - ((first - time) / time_constant).exp()),
             _ => None,
         }
     };

@@ -9,7 +9,7 @@ use super::Model;
 use super::driven::Commands;
 use super::elastic::Elastic;
 use super::inputs::inputs;
-use super::instrument::Instrument;
+use super::instrument::{Instrument, strained};
 use super::observation::{FixtureAt, Slopes, between};
 use super::parts::{Base, Inner, Target};
 use super::pose::Pose;
@@ -28,6 +28,8 @@ pub(super) struct Linearised {
     instrument: Instrument,
     /// Columns of what the measurement does: scale, and shifts by axis and driver.
     scale: Option<usize>,
+    /// Entry of the strain and column.
+    strains: Vec<(usize, usize)>,
     shifts: Vec<(usize, Driver, usize)>,
     /// The same of turns of the bases.
     turns: Vec<(usize, Driver, usize)>,
@@ -50,7 +52,7 @@ impl Linearised {
         let places = model.target_positions(x.as_slice()).into_iter().zip(model.target_rotations(x.as_slice()));
         let mut targets: Vec<Target> = places.map(|(position, rotation)| Target::new(position, &rotation)).collect();
         let mut fixtures: Vec<_> = model.fixtures(x.as_slice()).into_iter().map(|own| (own, [None; 4])).collect();
-        let (mut scale, mut shifts, mut turns) = (None, Vec::new(), Vec::new());
+        let (mut scale, mut strains, mut shifts, mut turns) = (None, Vec::new(), Vec::new(), Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
             let parameter = &model.parameters[k];
             match parameter.slot {
@@ -58,6 +60,7 @@ impl Linearised {
                 Slot::Target { target, axis } => targets[target].columns[axis] = Some(column),
                 Slot::Fixture { fixture, axis, .. } => fixtures[fixture].1[axis] = Some(column),
                 Slot::Scale => scale = Some(column),
+                Slot::Strain { entry } => strains.push((entry, column)),
                 Slot::Shift { axis } => shifts.push((axis, parameter.driver, column)),
                 Slot::Turn { axis } => turns.push((axis, parameter.driver, column)),
                 Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
@@ -78,7 +81,7 @@ impl Linearised {
             (false, true) => 0,
         };
         let probe = Block::zeros(probed, unknowns.len());
-        Self { commands, instrument, scale, shifts, turns, bases, targets, fixtures, tilts, inner, probe }
+        Self { commands, instrument, scale, strains, shifts, turns, bases, targets, fixtures, tilts, inner, probe }
     }
 
     /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros, six where its orientation
@@ -183,8 +186,14 @@ impl Linearised {
             return;
         };
         let predicted = placed(&last, base, target, &mut rows);
+        if let Some(strain) = self.instrument.strains() {
+            rows.turn(&strain);
+        }
         rows.scale = per_sigma;
         rows.put_if(self.scale, || predicted);
+        for &(entry, column) in &self.strains {
+            rows.put(column, &(strained(entry) * predicted));
+        }
         for &(axis, driver, column) in &self.shifts {
             rows.put(column, &Vector3::ith(axis, driver.value(&pose.setup)));
         }

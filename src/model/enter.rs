@@ -48,7 +48,8 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
         | Slot::Fixture { .. }
         | Slot::Shift { .. }
         | Slot::Turn { .. }
-        | Slot::Scale => {}
+        | Slot::Scale
+        | Slot::Strain { .. } => {}
     }
 }
 
@@ -108,7 +109,8 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
         | Slot::Fixture { .. }
         | Slot::Shift { .. }
         | Slot::Turn { .. }
-        | Slot::Scale => {}
+        | Slot::Scale
+        | Slot::Strain { .. } => {}
     }
 }
 

@@ -1,17 +1,19 @@
 //! What the measuring instrument makes of a position, and what turns under it.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::model::parameter::{Driver, Parameter, Slot};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
-/// Errors of the measuring instrument: p (1 + s) + Σ dᵢ·driverᵢ; and turns of all bases by the rotation vector Σ ωᵢ·driverᵢ, about the
+/// Errors of the measuring instrument: p (1 + s) + E p + Σ dᵢ·driverᵢ; and turns of all bases by the rotation vector Σ ωᵢ·driverᵢ, about the
 /// measuring frame's origin.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
     /// s.
     pub scale: f64,
+    /// E; `None` where nobody asks.
+    strain: Option<Matrix3<f64>>,
     /// Axis, driver and size [m per unit of the driver].
     shifts: Vec<(usize, Driver, f64)>,
     /// The same of turns [rad per unit of the driver].
@@ -25,6 +27,9 @@ impl Instrument {
         for (parameter, &x) in parameters.iter().zip(x) {
             match parameter.slot {
                 Slot::Scale => instrument.scale += x,
+                Slot::Strain { entry } => {
+                    *instrument.strain.get_or_insert_with(Matrix3::zeros) += strained(entry) * x;
+                }
                 Slot::Shift { axis } => instrument.shifts.push((axis, parameter.driver, x)),
                 Slot::Turn { axis } => instrument.turns.push((axis, parameter.driver, x)),
                 _ => {}
@@ -38,17 +43,25 @@ impl Instrument {
         let moves = |all: &[(usize, Driver, f64)]| {
             all.iter().filter(|(_, driver, _)| matches!(driver, Driver::Covariate(_))).copied().collect()
         };
-        Self { scale: 0.0, shifts: moves(&self.shifts), turns: moves(&self.turns) }
+        Self { scale: 0.0, strain: None, shifts: moves(&self.shifts), turns: moves(&self.turns) }
     }
 
     /// What is measured of a position, measuring frame \[m\].
     #[inline]
     pub fn of(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {
         let mut seen = position * (1.0 + self.scale);
+        if let Some(strain) = self.strain {
+            seen += strain * position;
+        }
         for &(axis, driver, size) in &self.shifts {
             seen[axis] += size * driver.value(setup);
         }
         seen
+    }
+
+    /// What the strain makes of derivatives that the scale is already in; `None` where there is none.
+    pub fn strains(&self) -> Option<Matrix3<f64>> {
+        self.strain.map(|strain| Matrix3::identity() + strain / (1.0 + self.scale))
     }
 
     /// Whether bases turn.
@@ -79,4 +92,14 @@ impl Instrument {
         }
         slope
     }
+}
+
+/// ∂E by one of its entries, in the order of [`Slot::Strain`].
+pub(super) fn strained(entry: usize) -> Matrix3<f64> {
+    let mut matrix = Matrix3::zeros();
+    const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+    if let Some(place) = PLACES.get(entry) {
+        matrix[*place] = 1.0;
+    }
+    matrix
 }

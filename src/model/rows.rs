@@ -1,6 +1,6 @@
 //! Where the derivatives of one pose are written.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::inputs::Input;
 use crate::least_squares::Block;
@@ -19,6 +19,15 @@ impl Rows<'_> {
     pub fn put(&mut self, column: usize, derivative: &Vector3<f64>) {
         let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
         out.copy_from_slice((derivative * self.scale).as_slice());
+    }
+
+    /// What is there already, multiplied by a matrix from the left.
+    pub fn turn(&mut self, by: &Matrix3<f64>) {
+        for column in 0..self.block.parameters() {
+            let own = &mut self.block.column_mut(column)[self.row..self.row + 3];
+            let turned = by * Vector3::new(own[0], own[1], own[2]);
+            own.copy_from_slice(turned.as_slice());
+        }
     }
 
     #[inline]

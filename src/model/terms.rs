@@ -82,6 +82,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
     let driven = match parameter.driver {
         Driver::Command(joint)
         | Driver::Travel(joint)
+        | Driver::LoadedSide(joint)
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
         | Driver::Spline { of: Quantity::Command(joint), .. }
@@ -94,7 +95,8 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Unit
         | Driver::Warming { .. }
         | Driver::Elapsed
-        | Driver::Since(_) => true,
+        | Driver::Since(_)
+        | Driver::Settling(_) => true,
         Driver::Covariate(which) => which < problem.data.covariates.len(),
     };
     driven
@@ -110,6 +112,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
                 problem.fixtures.get(fixture).is_some_and(|own| own.kind == kind && axis < kind.fields().len())
             }
             Slot::Shift { axis } | Slot::Turn { axis } => axis < 3,
+            Slot::Strain { entry } => entry < 6,
             Slot::Arm(_) | Slot::Scale => true,
         }
 }
@@ -120,7 +123,7 @@ fn is_declared(slot: Slot) -> bool {
         Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
         Slot::Beam { field, .. } => field.is_rigidity() && field != BeamField::Flexibility,
         Slot::Base { .. } | Slot::Target { .. } | Slot::Fixture { .. } => true,
-        Slot::Arm(_) | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale => false,
+        Slot::Arm(_) | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale | Slot::Strain { .. } => false,
     }
 }
 

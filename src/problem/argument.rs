@@ -202,6 +202,13 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let base = key.strip_suffix("_s").unwrap_or(key);
         self.section.number(base, Unit::Time)?.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
     }
+
+    /// A time above zero \[s\]; its key ends in the unit.
+    pub fn duration(&mut self, key: &str) -> Result<f64, InputError> {
+        let base = key.strip_suffix("_s").unwrap_or(key);
+        let found = self.section.positive(base, Unit::Time, |value| InputErrorKind::NotPositive { value })?;
+        found.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
+    }
 }
 
 /// Examples of the same kinds on an arm, as TOML writes them.
@@ -262,5 +269,9 @@ impl<'s> Examples<'s> {
     #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
     pub fn time(&self) -> String {
         "600.0".to_owned()
+    }
+
+    pub fn duration(&self) -> String {
+        self.time()
     }
 }

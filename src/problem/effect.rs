@@ -100,6 +100,8 @@ effects! {
     GearRatio "gear-ratio" { joint: usize = moving_joint }
     /// Δθ = (b/2)·approach; without directions of approach the moment decides.
     Backlash "backlash" { joint: usize = moving_joint }
+    /// Play that opens with the payload m: Δθ = (w m / 2)·approach.
+    PayloadBacklash "payload-backlash" { joint: usize = moving_joint }
     /// Δθ = c₃ `M_z`³ beyond the linear torsion.
     JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = any_joint }
     /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
@@ -130,10 +132,14 @@ effects! {
     DeflectedEquilibrium "deflected-equilibrium"
     /// Measured positions are scaled by 1 + s.
     TrackerScale "tracker-scale"
+    /// Positions are measured as p + E p, E upper triangular: scales and squareness of the axes.
+    FrameStrain "frame-strain"
     /// Measured positions move by v (t − `t_first`).
     TrackerDrift "tracker-drift"
     /// Measured positions are moved by d from a time on.
     StationShift "station-shift" { at_time: f64 = time as "at_time_s" }
+    /// Measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
+    TrackerSettling "tracker-settling" { time_constant: f64 = duration as "time_constant_s" }
     /// Δθ of a joint, or a small motion of the base, in proportion to one of the problem's own covariates.
     Covariate "covariate" { joint: Mount = mount, of: String = covariate }
 }
@@ -187,12 +193,12 @@ impl Effect {
 
     /// Whether it depends on the side from which joints come.
     pub fn has_sides(&self) -> bool {
-        matches!(self, Self::Backlash { .. })
+        matches!(self, Self::Backlash { .. } | Self::PayloadBacklash { .. })
     }
 
     /// Whether it follows time rather than what poses can be chosen for.
     pub fn follows_time(&self) -> bool {
-        matches!(self, Self::TrackerDrift | Self::StationShift { .. })
+        matches!(self, Self::TrackerDrift | Self::StationShift { .. } | Self::TrackerSettling { .. })
     }
 
     /// An order that this and another harmonic of one joint share.

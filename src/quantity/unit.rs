@@ -40,6 +40,10 @@ pub enum Unit {
     AnglePerDegree,
     /// [m/K]
     LengthPerDegree,
+    /// [rad/kg]
+    AnglePerMass,
+    /// [m/kg]
+    LengthPerMass,
     /// [1/m]
     PerLength,
     /// [m/s]
@@ -148,6 +152,14 @@ impl Unit {
             Self::LengthPerDegree => {
                 let suffixes = const { &[si("m_per_C"), suffix("mm_per_C", |x| x / 1000.0)] };
                 row("a length per °C", "m/K", suffixes, As(1e3, "mm/K"))
+            }
+            Self::AnglePerMass => {
+                let suffixes = const { &[suffix("deg_per_kg", f64::to_radians), si("rad_per_kg")] };
+                row("an angle per kg", "rad/kg", suffixes, As(DEGREES, "°/kg"))
+            }
+            Self::LengthPerMass => {
+                let suffixes = const { &[si("m_per_kg"), suffix("mm_per_kg", |x| x / 1000.0)] };
+                row("a length per kg", "m/kg", suffixes, As(1e3, "mm/kg"))
             }
             Self::PerLength => row("a number per length", "1/m", const { &[si("per_m")] }, Plain),
             Self::Speed => {

@@ -291,19 +291,24 @@ fn verdict_word(verdict: Verdict) -> &'static str {
 
 /// The outcome in a sentence or two.
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
+    if !closure.after.is_trusted() {
+        return "Nothing is claimed of causes: the fit is not to be trusted. Mend first what stands below.".to_owned();
+    }
     let stated = SelectionRules::DEFAULT.stated;
     let (contradicted, others): (Vec<&Found>, Vec<&Found>) =
         closure.effects.iter().partition(|found| found.is_contradicted());
     let (named, such): (Vec<&Found>, Vec<&Found>) = others.into_iter().partition(|found| found.is_named(stated));
+    let only_such = named.is_empty();
     let named = match named.as_slice() {
         [] => "No effect was found".to_owned(),
         [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
         several => format!("{} effects were found", several.len()),
     };
-    let found = match such.len() {
-        0 => named,
-        1 => format!("{named}; of one cause the place is known and the law not sure"),
-        more => format!("{named}; of {more} causes the places are known and the laws not sure"),
+    let found = match such.as_slice() {
+        [] => named,
+        [one] if only_such => format!("No effect is sure; most probable is {}", probable(closure, one)),
+        [one] => format!("{named}; one more is probable: {}", probable(closure, one)),
+        several => format!("{named}; {} more are probable, their laws not sure", several.len()),
     };
     let found = match contradicted.as_slice() {
         [] => found,
@@ -323,6 +328,14 @@ pub(super) fn verdict(closure: &ClosedLoop) -> String {
         (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
         (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
     }
+}
+
+/// A cause whose law is not sure, how probable it is, and what it may be instead.
+fn probable(closure: &ClosedLoop, found: &Found) -> String {
+    let own = closure.before.describe(&found.effect);
+    let sure = found.claims.as_ref().map(|claims| format!(" ({} %)", number(claims.law.1 * 100.0, 0)));
+    let rival = found.alternatives.first().map(|other| format!(", or else {}", closure.before.describe(other)));
+    format!("{own}{}{}", sure.unwrap_or_default(), rival.unwrap_or_default())
 }
 
 fn lower(words: &str) -> String {

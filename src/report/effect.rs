@@ -117,12 +117,17 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
 
 fn group(members: &[Effect]) -> String {
     let name = members[0].name();
-    if let (Effect::StationShift { .. }, true) = (&members[0], members.len() > 1) {
-        return format!("{} at {} times", code(name), members.len());
+    match (&members[0], members.len()) {
+        (Effect::StationShift { .. }, 2..) => return format!("{} at {} times", code(name), members.len()),
+        (Effect::TrackerSettling { .. }, 2..) => {
+            return format!("{} of {} time constants", code(name), members.len());
+        }
+        _ => {}
     }
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
         Effect::StationShift { at_time } => format!("{at_time} s"),
+        Effect::TrackerSettling { time_constant } => format!("{time_constant} s"),
         other => other.place(),
     };
     let places = members.iter().map(place).collect::<Vec<_>>().join(", ");

@@ -34,6 +34,11 @@ impl Rig {
                     0.5 * width
                         * conditions.approach.as_ref().and_then(|sides| sides.get(number - 1)).copied().unwrap_or(0.0)
                 }
+                (Effect::PayloadBacklash { joint }, [width]) if *joint == number => {
+                    let sides = conditions.approach.as_ref().and_then(|sides| sides.get(number - 1));
+                    let payload = conditions.payload.unwrap_or(0.0);
+                    sides.map_or(0.0, |side| payload * width * side / 2.0)
+                }
                 (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),
                 (Effect::Covariate { joint: Mount::Joint(joint), of }, [rate]) if *joint == number => {
                     rate * self.covariate(of, conditions)

@@ -102,6 +102,9 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::JointCompliance { .. } => named(&[("compliance", Unit::Compliance)]),
         Effect::GearRatio { .. } | Effect::HoistForce | Effect::TrackerScale => named(&[("error", Unit::Ratio)]),
         Effect::Backlash { joint } => named(&[("width", coordinate(joint))]),
+        Effect::PayloadBacklash { joint } => {
+            named(&[("width", if slides(joint) { Unit::LengthPerMass } else { Unit::AnglePerMass })])
+        }
         Effect::JointNonlinearStiffness { .. } => named(&[("cubic", Unit::CubicCompliance)]),
         Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => about_xy(Unit::Compliance),
         Effect::JointThermalDrift { joint } => {
@@ -121,7 +124,8 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::GravityDirection => about_xy(Unit::Angle),
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
-        Effect::StationShift { .. } => xyz(Unit::Length),
+        Effect::StationShift { .. } | Effect::TrackerSettling { .. } => xyz(Unit::Length),
+        Effect::FrameStrain => named(&["xx", "yy", "zz", "xy", "xz", "yz"].map(|name| (name, Unit::Ratio))),
         Effect::Covariate { joint: Mount::Joint(joint), .. } => {
             named(&[("rate", if slides(joint) { Unit::LengthPerUnit } else { Unit::AnglePerUnit })])
         }

@@ -118,6 +118,13 @@ impl Rig {
         for part in self.effects.iter().filter_map(TrueEffect::parts) {
             match part {
                 (Effect::TrackerScale, [error]) => scale += error,
+                (Effect::FrameStrain, [xx, yy, zz, xy, xz, yz]) => {
+                    let [x, y, z] = [seen.x, seen.y, seen.z];
+                    moved += Vector3::new(xx * x + xy * y + xz * z, yy * y + yz * z, zz * z);
+                }
+                (Effect::TrackerSettling { time_constant }, [x, y, z]) => {
+                    moved += Vector3::new(*x, *y, *z) * (1.0 - 1.0 / (conditions.elapsed / time_constant).exp());
+                }
                 (Effect::TrackerDrift, [x, y, z]) => {
                     moved += Vector3::new(*x, *y, *z) * conditions.elapsed;
                 }

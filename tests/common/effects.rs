@@ -28,6 +28,9 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
         (Effect::GravityDirection, vec![0.01, 0.02]),
         (Effect::DeflectedEquilibrium, vec![1.0]),
         (Effect::TrackerScale, vec![5e-5]),
+        (Effect::FrameStrain, vec![2e-4, -1e-4, 0.0, 3e-4, 0.0, -2e-4]),
+        (Effect::TrackerSettling { time_constant: 300.0 }, vec![2e-4, -1e-4, 3e-4]),
+        (Effect::PayloadBacklash { joint: 3 }, vec![4e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
     ]

@@ -96,7 +96,13 @@ fn every_effect_on_elastic_arms() {
                     arm.statics.equilibrium = equilibrium;
                     for effect in &all {
                         let slides = matches!(effect.0, Effect::Backlash { joint: 4 }) && what == "odd arm";
-                        let silent: &[&str] = if slides && !approaches { &["backlash[4].width"] } else { &[] };
+                        let silent: &[&str] = match &effect.0 {
+                            _ if approaches => &[],
+                            Effect::Backlash { .. } if slides => &["backlash[4].width"],
+                            Effect::PayloadBacklash { joint: 3 } => &["payload-backlash[3].width"],
+                            Effect::PayloadBacklash { .. } => &["payload-backlash[4].width"],
+                            _ => &[],
+                        };
                         check(what, &arm, std::slice::from_ref(effect), &rows, false, silent);
                     }
                 }
@@ -126,6 +132,8 @@ fn what_drives_the_joints_of_a_rigid_arm() {
         (Effect::JointCoupling { joint: 5, from: 4 }, vec![3e-4]),
         (Effect::JointThermalDrift { joint: 1 }, vec![1e-5]),
         (Effect::TrackerScale, vec![5e-5]),
+        (Effect::FrameStrain, vec![2e-5, -1e-5, 0.0, 3e-5, 0.0, -2e-5]),
+        (Effect::TrackerSettling { time_constant: 300.0 }, vec![2e-4, -1e-4, 3e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
     ];

@@ -28,8 +28,11 @@ fn truths(prefix: &str) -> Vec<(String, Value)> {
     all.into_iter().filter(|(name, _)| name.starts_with(prefix)).collect()
 }
 
-fn of(problem: &str, name: &str) -> Evidence {
-    let problem = Problem::read(&folder().join(problem)).unwrap();
+/// With rules before those of the problem.
+fn of(problem: &str, rules: &str, name: &str) -> Evidence {
+    let path = folder().join(problem);
+    let text = fs::read_to_string(&path).unwrap().replacen("[parameters]\n", &format!("[parameters]\n{rules}"), 1);
+    let problem = Problem::parse(&text, &path).unwrap();
     let (data, _) = Dataset::read_files(&[folder().join(format!("{name}.csv"))], &problem).unwrap();
     trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap()
 }
@@ -42,12 +45,18 @@ fn stated(evidence: &Evidence) -> Vec<String> {
     evidence.best().iter().filter(stated).filter_map(name).collect()
 }
 
+/// Families that hold a cause of the cases outside the catalogue, switched off.
+const UNKNOWN: &str = "'frame-strain*' = { fixed = true }\n'payload-backlash*' = { fixed = true }\n'tracker-settling*' = { fixed = true }\n";
+/// The causes that they hold.
+const BY_NOW: [(&str, &str); 3] =
+    [("out-frame", "frame-strain"), ("out-payload", "payload-backlash"), ("out-settling", "tracker-settling")];
+
 #[test]
 fn causes_outside_the_catalogue_are_located_and_get_no_law() {
     let (mut lost, mut wrong) = (Vec::new(), Vec::new());
     let cases = truths("out-");
     for (name, truth) in &cases {
-        let evidence = of("out.toml", name);
+        let evidence = of("out.toml", UNKNOWN, name);
         let mut depends_on: Vec<&str> =
             truth["depends_on"].as_array().unwrap().iter().map(|word| word.as_str().unwrap()).collect();
         depends_on.sort_unstable();
@@ -69,9 +78,19 @@ fn causes_outside_the_catalogue_are_located_and_get_no_law() {
 }
 
 #[test]
+fn causes_that_the_catalogue_holds_by_now_are_named() {
+    let cases = truths("out-");
+    for (cause, law) in BY_NOW {
+        for (name, _) in cases.iter().filter(|(name, _)| name.starts_with(cause)) {
+            assert_eq!(stated(&of("out.toml", "", name)), [law], "{name}");
+        }
+    }
+}
+
+#[test]
 fn effects_of_a_heavy_arm_are_named() {
     for (name, truth) in truths("six-") {
-        let evidence = of("six.toml", &name);
+        let evidence = of("six.toml", "", &name);
         let names = stated(&evidence);
         let effects = truth["effects"].as_array().unwrap();
         if effects.is_empty() {
@@ -242,7 +261,7 @@ fn an_outlier_among_few_poses_is_set_aside_and_named() {
 }
 
 #[test]
-fn a_fit_that_is_not_to_be_trusted_gets_no_correction() {
+fn beside_a_fit_that_is_not_to_be_trusted_nothing_is_claimed() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&cases.join("problem.toml")).unwrap();
     let (Dataset { mut measurements, split }, _) = Dataset::read_files(&[cases.join("a-none.csv")], &problem).unwrap();
@@ -251,4 +270,5 @@ fn a_fit_that_is_not_to_be_trusted_gets_no_correction() {
     measurements.configurations.iter_mut().skip(2).step_by(joints).for_each(|q| *q = q.to_degrees());
     let closure = close(&problem, &Dataset::new(measurements, split), &Options::default()).unwrap();
     assert!(!closure.after.is_trusted() && closure.unexplained.iter().all(|left| left.correction.is_none()));
+    assert!(closure.effects.is_empty() && closure.closed.effects.is_empty(), "{:?}", closure.effects);
 }

@@ -29,7 +29,7 @@ type Change = fn(&mut SelectionRules);
 fn rules_that_make_no_sense_are_refused() {
     let problem = Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler")).unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
-    let change: [(&str, Change); 9] = [
+    let change: [(&str, Change); 10] = [
         ("resamples", |rules| rules.resamples = 0),
         ("blocks", |rules| rules.blocks = 0),
         ("level", |rules| rules.level = f64::NAN),
@@ -37,6 +37,7 @@ fn rules_that_make_no_sense_are_refused() {
         ("sure", |rules| rules.sure = 1.5),
         ("stated", |rules| rules.stated = 0.0),
         ("covered", |rules| rules.covered = 1.0),
+        ("led_poses", |rules| rules.led_poses = 0),
         ("weighed_poses", |rules| rules.weighed_poses = 0),
         ("time_step", |rules| rules.time_step = f64::INFINITY),
     ];

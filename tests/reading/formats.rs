@@ -158,6 +158,9 @@ fn every_effect_has_its_arguments() {
         ("gravity-direction = {}", Effect::GravityDirection),
         ("deflected-equilibrium = {}", Effect::DeflectedEquilibrium),
         ("tracker-scale = {}", Effect::TrackerScale),
+        ("frame-strain = {}", Effect::FrameStrain),
+        ("payload-backlash = { joint = 1 }", Effect::PayloadBacklash { joint: 1 }),
+        ("tracker-settling = { time_constant_s = 600 }", Effect::TrackerSettling { time_constant: 600.0 }),
         ("tracker-drift = {}", Effect::TrackerDrift),
         ("station-shift = { at_time_s = 60 }", Effect::StationShift { at_time: 60.0 }),
     ];

@@ -110,6 +110,11 @@ pub fn catalogue() -> Vec<Lacking> {
     all.push(Lacking::new(Effect::DeflectedEquilibrium, &[1.0]));
     all.push(Lacking::new(Effect::TrackerScale, &[1e-4]));
     all.push(Lacking::new(Effect::TrackerScale, &[3e-4]));
+    all.push(Lacking::new(Effect::FrameStrain, &[3e-4, -3e-4, 0.0, 0.0, 0.0, 0.0]));
+    all.push(Lacking::new(Effect::FrameStrain, &[0.0, 0.0, 0.0, 0.0, 4e-4, 0.0]));
+    all.push(Lacking::new(Effect::TrackerSettling { time_constant: 800.0 }, &[4e-4, 0.0, -2e-4]));
+    all.push(Lacking::new(Effect::PayloadBacklash { joint: 2 }, &[0.04 * DEGREE]));
+    all.push(Lacking::new(Effect::PayloadBacklash { joint: 3 }, &[0.04 * DEGREE]));
     let per_hour = 1e-3 / 3600.0;
     all.push(Lacking::new(Effect::TrackerDrift, &[0.1 * per_hour, -0.1 * per_hour, 0.05 * per_hour]));
     all.push(Lacking::new(Effect::TrackerDrift, &[0.3 * per_hour, 0.2 * per_hour, 0.0]));

@@ -55,6 +55,9 @@ fn acts_along_axes(terms: &[Term]) -> bool {
     terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
 }
 
+/// Largest displacement, in units of σ, by a parameter that moves nothing: above zero, for sizes have a reciprocal.
+const NOTHING: f64 = 1e-9;
+
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
 /// Everything that may explain a residual.
@@ -136,7 +139,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             for (k, mut column) in columns.column_iter_mut().enumerate() {
                 let length = column.rows(0, 3 * self.weighed).norm();
                 let most = terms.get(k).map_or(f64::INFINITY, |term| self.rules.plausible * term.size);
-                largest.push(if length > 0.0 { most * length / ((3 * self.weighed) as f64).sqrt() } else { 1e-9 });
+                largest.push(if length > 0.0 { most * length / ((3 * self.weighed) as f64).sqrt() } else { NOTHING });
                 if length > 0.0 {
                     column /= length;
                 }
@@ -334,7 +337,11 @@ impl<'a, 'l> Columns<'a, 'l> {
         });
         let hypothesis =
             |law| Hypothesis { law, part: Part::Measurement, slot: None, depends_on: vec![Covariate::Position] };
-        self.add("field", 1.0, hypothesis(Law::Linear), || times(&at, &linear));
+        // Where the strain of the frame is looked for, that is the linear law.
+        let strain = |own: &Candidate| own.hypothesis.effect() == Some(&Effect::FrameStrain);
+        if !self.candidates.iter().any(strain) {
+            self.add("field", 1.0, hypothesis(Law::Linear), || times(&at, &linear));
+        }
         if let [x, y, z] = coordinates.as_slice() {
             let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
             self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));

@@ -45,7 +45,7 @@ impl Part {
             }
             Slot::Base { .. } | Slot::Turn { .. } => Self::Base,
             Slot::Target { .. } => Self::Payload,
-            Slot::Fixture { .. } | Slot::Shift { .. } | Slot::Scale => Self::Measurement,
+            Slot::Fixture { .. } | Slot::Shift { .. } | Slot::Scale | Slot::Strain { .. } => Self::Measurement,
         }
     }
 }
@@ -82,6 +82,16 @@ pub enum Law {
     Sag,
 }
 
+impl Law {
+    /// Whether it is the same law: of an effect that is searched at whatever time.
+    pub(super) fn is_of(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Effect(own), Self::Effect(other)) if own.is_searched() => own.name() == other.name(),
+            _ => self == other,
+        }
+    }
+}
+
 /// One explanation of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
@@ -102,7 +112,7 @@ impl Hypothesis {
         let part = terms.first().map_or(Part::Arm, |term| Part::of(term.slot));
         let mut depends_on: Vec<Covariate> = terms
             .iter()
-            .map(|term| covariate(term.slot, term.driver, problem, (approach_known, time_measured)))
+            .flat_map(|term| covariates(term.slot, term.driver, problem, (approach_known, time_measured)))
             .collect();
         depends_on.sort();
         depends_on.dedup();
@@ -123,6 +133,14 @@ impl Hypothesis {
     }
 }
 
+/// The same of a parameter that two covariates drive, too.
+fn covariates(slot: Slot, driver: Driver, problem: &Problem, known: (bool, bool)) -> Vec<Covariate> {
+    match driver {
+        Driver::LoadedSide(joint) => vec![Covariate::Approach(joint), Covariate::Payload],
+        _ => vec![covariate(slot, driver, problem, known)],
+    }
+}
+
 /// What a parameter depends on by what drives it, or by the physics of where it enters.
 fn covariate(
     slot: Slot,
@@ -136,7 +154,7 @@ fn covariate(
             Covariate::Command(joint)
         }
         Driver::Warming { .. } => Covariate::Temperature,
-        Driver::Elapsed | Driver::Since(_) => time,
+        Driver::Elapsed | Driver::Since(_) | Driver::Settling(_) => time,
         Driver::Covariate(which) => Covariate::own(which, problem),
         Driver::Spline { of, .. } | Driver::Bump { of, .. } | Driver::Step { of, .. } => {
             Covariate::of(of, problem, time_measured)
@@ -149,7 +167,7 @@ fn covariate(
                 Covariate::Temperature
             }
             Slot::Arm(crate::model::parameter::ArmField::Payload) => Covariate::Payload,
-            Slot::Scale => Covariate::Position,
+            Slot::Scale | Slot::Strain { .. } => Covariate::Position,
             _ => Covariate::Load,
         },
     }

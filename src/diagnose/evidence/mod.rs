@@ -199,7 +199,7 @@ impl Evidence {
         let depends_on = self.probability(|other| other.part == of.part && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
             let unknown = |other: &Hypothesis| other.part == of.part && other.effect().is_none();
-            explanation.hypotheses.iter().any(|other| other.law == of.law && other.part == of.part)
+            explanation.hypotheses.iter().any(|other| other.law.is_of(&of.law) && other.part == of.part)
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
         let law = self
@@ -222,7 +222,7 @@ pub(super) fn ln_posterior(
     added: &[Effect],
     functions: &[(Hypothesis, usize)],
 ) -> Option<f64> {
-    let rows = data.thinned(data.rules.weighed_poses);
+    let rows = data.weighed();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
@@ -277,7 +277,7 @@ pub(super) fn stability(
     if best.effects().is_empty() {
         return Vec::new();
     }
-    let rows = data.thinned(data.rules.weighed_poses);
+    let rows = data.weighed();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let worth = || evidence.explanations.iter().filter(|known| known.probability > WORTH_A_DRAW);
     let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
@@ -332,7 +332,7 @@ fn blocks(
         Block::new(design, &neighbourhood, candidate.ln_prior, coefficients)
     };
     let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
-    let rows = data.thinned(data.rules.weighed_poses);
+    let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();
     let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
@@ -349,7 +349,7 @@ fn blocks(
 ///
 /// `None` where the residual is not a finite number, as that of a pose without equilibrium.
 pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
-    let rows = data.thinned(data.rules.weighed_poses);
+    let rows = data.weighed();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let (blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), &[])?;
     let is_added = |effect: &Effect| hypotheses.added.contains(effect);

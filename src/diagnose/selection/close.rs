@@ -125,26 +125,18 @@ pub fn close_by(
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
     let mut rounds = Rounds::new(&data, options, first.effects());
-    let all_weighed = data.rows().len() <= rules.weighed_poses;
-    let (fitted, harmonic_sigma, evidence) = if all_weighed {
-        let (fitted, evidence) = weighed(&mut rounds, first)?;
-        let evidence = evidence.filter(|_| fitted.found.termination.converged());
-        (rounds.settled(fitted)?, None, evidence)
-    } else {
-        let mut fitted = rounds.run(first)?;
-        for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
-            let Some(next) = exchanged(&mut rounds, &fitted)? else { break };
-            fitted = rounds.run(next)?;
-        }
-        let (fitted, sigma) = harmonics::filled(&rounds, fitted)?;
-        (fitted, sigma, None)
-    };
+    let declared = first.clone();
+    let (fitted, harmonic_sigma, evidence) = chosen(&mut rounds, first)?;
+    // Beside a fit that is not to be trusted nothing is found: its residual may be that of a mistake in the data.
+    let trusted = fitted.found.is_trusted();
+    let (fitted, harmonic_sigma, evidence) =
+        if trusted { (fitted, harmonic_sigma, evidence) } else { (declared, None, None) };
     let findings = check_fit(&fitted, &data);
     let added = rounds.added(&fitted);
     // Of very many effects none is taken out again: what is left beside all of them is weighed.
     let crowded = added.iter().flat_map(Effect::parts).count() > rules.crowd;
     let taken_out: &[Effect] = if crowded { &[] } else { &added };
-    let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out));
+    let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out).filter(|_| trusted));
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
@@ -173,6 +165,38 @@ pub fn close_by(
         gain,
         set_aside,
     })
+}
+
+/// The fit with what evidence or rounds found, the prior that many harmonics share, and the evidence about it where it led.
+///
+/// Evidence leads on up to `led_poses` poses. It holds few hypotheses together: where many poses show structure beside them, as the waves
+/// of many orders that a gear has, rounds are tried, and taken where they leave noise.
+fn chosen(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>, Option<Evidence>), IdentifyError> {
+    let (data, rules) = (rounds.data, rounds.data.rules);
+    let noise = |fitted: &Fitted| !check_fit(fitted, data).is_structured();
+    let mut led = None;
+    if data.is_led() {
+        let (fitted, evidence) = weighed(rounds, first.clone())?;
+        let evidence = evidence.filter(|_| fitted.found.termination.converged());
+        let fitted = rounds.settled(fitted)?;
+        if data.rows().len() <= rules.weighed_poses || noise(&fitted) {
+            return Ok((fitted, None, evidence));
+        }
+        led = Some((fitted, evidence, std::mem::replace(rounds, Rounds::new(data, rounds.options, first.effects()))));
+    }
+    let mut fitted = rounds.run(first)?;
+    for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
+        let Some(next) = exchanged(rounds, &fitted)? else { break };
+        fitted = rounds.run(next)?;
+    }
+    let (fitted, sigma) = harmonics::filled(rounds, fitted)?;
+    match led {
+        Some((led, evidence, story)) if !noise(&fitted) => {
+            *rounds = story;
+            Ok((led, None, evidence))
+        }
+        _ => Ok((fitted, sigma, None)),
+    }
 }
 
 /// The fit with the effects of the explanation that is sure, weighed again about every fit until that is what the model holds; and the

@@ -4,20 +4,21 @@ use super::coverage::{Columns, DataCoverage};
 use super::custom::custom;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::{
-    backlash, base_compliance, covariate, deflected_equilibrium, gear_ratio, gravity_direction, hoist_direction,
-    hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance, joint_nonlinear_stiffness,
-    joint_thermal_drift, link_bending, link_thermal_bending, link_thermal_expansion, payload_mass, station_shift,
-    tracker_drift, tracker_scale, unmodelled_mass,
+    backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
+    hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance,
+    joint_nonlinear_stiffness, joint_thermal_drift, link_bending, link_thermal_bending, link_thermal_expansion,
+    payload_backlash, payload_mass, station_shift, tracker_drift, tracker_scale, tracker_settling, unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 22] = [
+pub const FAMILIES: [&Family; 25] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &gear_ratio::FAMILY,
     &backlash::FAMILY,
+    &payload_backlash::FAMILY,
     &joint_nonlinear_stiffness::FAMILY,
     &joint_lateral_compliance::FAMILY,
     &joint_thermal_drift::FAMILY,
@@ -33,8 +34,10 @@ pub const FAMILIES: [&Family; 22] = [
     &gravity_direction::FAMILY,
     &deflected_equilibrium::FAMILY,
     &tracker_scale::FAMILY,
+    &frame_strain::FAMILY,
     &tracker_drift::FAMILY,
     &station_shift::FAMILY,
+    &tracker_settling::FAMILY,
     &covariate::FAMILY,
 ];
 

@@ -15,6 +15,8 @@ pub struct DataCoverage {
     pub both_sides: Vec<bool>,
     /// Whether a payload is carried in some poses.
     pub payload: bool,
+    /// Whether the payload changes.
+    pub payload_varies: bool,
     /// For each joint, the range of its commands \[rad\] or \[m\].
     pub ranges: Vec<(f64, f64)>,
     /// Times between which a station may have moved \[s\], ascending.

@@ -29,6 +29,10 @@ pub enum Driver {
     Elapsed,
     /// 1 from a time on \[s\], 0 before.
     Since(f64),
+    /// 1 − exp(−t/τ), t since the first pose, of a time constant τ \[s\].
+    Settling(f64),
+    /// Half the payload, with the sign of the direction from which a joint came \[kg\]; 0 where that is not known.
+    LoadedSide(usize),
     /// One of the problem's own covariates, counted from 0, in its unit.
     Covariate(usize),
     /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
@@ -103,6 +107,11 @@ impl Driver {
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
+            Self::Settling(time_constant) => -(-setup.elapsed / time_constant).exp_m1(),
+            Self::LoadedSide(joint) => {
+                let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
+                0.5 * setup.payload.unwrap_or(0.0) * side
+            }
             Self::Covariate(which) => Quantity::Covariate(which).value(setup),
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
         }
@@ -151,6 +160,8 @@ impl Driver {
             | Self::Warming { .. }
             | Self::Elapsed
             | Self::Since(_)
+            | Self::Settling(_)
+            | Self::LoadedSide(_)
             | Self::Covariate(_) => false,
         }
     }

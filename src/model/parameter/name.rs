@@ -58,6 +58,11 @@ pub enum Slot {
     },
     /// A relative error of every measured coordinate.
     Scale,
+    /// An entry of the strain E of the measuring frame, in which p is measured as p + E p, E triangular: xx, yy, zz, xy, xz, yz.
+    Strain {
+        /// 0..6.
+        entry: usize,
+    },
 }
 
 /// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects add.
@@ -274,7 +279,7 @@ impl Slot {
             Self::Turn { .. } => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
             Self::Fixture { kind, axis, .. } => kind.unit(axis),
-            Self::Scale => Unit::Ratio,
+            Self::Scale | Self::Strain { .. } => Unit::Ratio,
         }
     }
 
@@ -293,7 +298,8 @@ impl Slot {
             | Self::Fixture { .. }
             | Self::Shift { .. }
             | Self::Turn { .. }
-            | Self::Scale => false,
+            | Self::Scale
+            | Self::Strain { .. } => false,
         }
     }
 

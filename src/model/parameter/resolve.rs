@@ -86,13 +86,17 @@ pub fn resolve(
         }
         if !matched {
             let mut known: Vec<String> = Vec::new();
-            for Candidate { plain, .. } in candidates {
-                if !known.contains(&plain) {
-                    known.push(plain);
+            for Candidate { plain, .. } in &candidates {
+                if !known.contains(plain) {
+                    known.push(plain.clone());
                 }
             }
-            let kind = undeclared(problem, &rule.pattern, &known)
-                .unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
+            let undeclared = undeclared(problem, &rule.pattern, &known);
+            // Effects that are held are not looked for.
+            if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
+                continue;
+            }
+            let kind = undeclared.unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
             return Err(rule.location.clone().error(kind));
         }
         check_kinds(rule, &candidates)?;

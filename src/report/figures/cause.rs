@@ -17,7 +17,7 @@ use super::sheet::Sheet;
 use super::tags::Tags;
 use crate::diagnose::{Covariate, PartialResidual, Unexplained};
 use crate::measurement::Split;
-use crate::model::parameter::{EffectParameter, JointField, Slot};
+use crate::model::parameter::{Driver, EffectParameter, JointField, Slot};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
 use crate::report::quantity::fixed;
@@ -221,6 +221,12 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
             let sides = rows.poses.iter().map(|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
             (joint, across, sides.collect(), lever(joint), Box::new(move |side| 0.5 * first * side))
         }
+        Effect::PayloadBacklash { joint } => {
+            let across = Quantity::new(format!("half the payload × side from which joint {joint} came [kg]"), 1.0);
+            let driver = Driver::LoadedSide(joint - 1);
+            let sides = rows.poses.iter().map(|pose| driver.value(pose)).collect();
+            (joint, across, sides, lever(joint), Box::new(move |side| first * side))
+        }
         // Δθ = c M, c₃ M³: the moment follows from the law itself.
         Effect::JointCompliance { joint } => {
             let levers = lever(joint);
@@ -308,6 +314,10 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
         Effect::TrackerDrift => {
             let speed = if last > 0.0 { most.norm() / last } else { 0.0 };
             of_time(Box::new(move |t| speed * t))
+        }
+        Effect::TrackerSettling { time_constant } => {
+            let (time_constant, size) = (*time_constant, norm);
+            of_time(Box::new(move |t| size * (1.0 - (-t / time_constant).exp())))
         }
         Effect::StationShift { at_time } => {
             let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);

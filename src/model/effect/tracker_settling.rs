@@ -1,0 +1,57 @@
+//! `tracker-settling`: what measures settles, positions move by d (1 − exp(−(t − t_first)/τ)).
+
+use super::family::{Candidate, Family, Term, USUAL};
+use crate::model::parameter::{Driver, Slot};
+use crate::problem::Effect;
+
+/// Time constants that are looked for, as parts of the time measured: shorter ones act on few poses, longer ones are drifts.
+const SHORTEST: f64 = 0.03;
+const LONGEST: f64 = 0.6;
+/// Each over the one before.
+const STEP: f64 = 1.25;
+
+/// The family.
+pub(super) const FAMILY: Family = Family {
+    name: "tracker-settling",
+    terms: |effect, _| match effect {
+        Effect::TrackerSettling { time_constant } => ["x", "y", "z"]
+            .into_iter()
+            .enumerate()
+            .map(|(axis, name)| Term::driven(name, Slot::Shift { axis }, Driver::Settling(*time_constant), 5e-3))
+            .collect(),
+        _ => Vec::new(),
+    },
+    candidates: |_, data| {
+        let (Some(first), Some(last)) = (data.times.first(), data.times.last()) else { return Vec::new() };
+        let time = last - first;
+        let constants =
+            std::iter::successors(Some(SHORTEST), |part| Some(part * STEP)).take_while(|part| *part <= LONGEST);
+        constants
+            .filter_map(|part| rounded(part * time))
+            .map(|time_constant| Candidate::of(Effect::TrackerSettling { time_constant }))
+            .collect()
+    },
+    describe: |effect| match effect {
+        Effect::TrackerSettling { time_constant } => {
+            format!("the measuring station settles with a time constant of {time_constant} s")
+        }
+        _ => String::new(),
+    },
+    describe_by_row: |effect| match effect {
+        Effect::TrackerSettling { time_constant } => {
+            Some(format!("the measuring station settles with a constant of {time_constant} rows"))
+        }
+        _ => None,
+    },
+    is_searched: true,
+    ..USUAL
+};
+
+/// To three digits; `None` where nothing is left.
+fn rounded(time: f64) -> Option<f64> {
+    let step = 10_f64.powf(time.log10().floor() - 2.0);
+    let rounded = (time / step).round() * step;
+    // As written with three digits, not as the product has it.
+    let written = if step < 1.0 { format!("{rounded:.6}").parse().ok()? } else { rounded.round() };
+    (written > 0.0).then_some(written)
+}
