@@ -90,11 +90,11 @@ impl<'a> Data<'a> {
 
     /// What the identification poses have and vary.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
+        fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        }
         let measurements = self.measurements;
-        let column = |joint: usize| {
-            let values = self.rows().iter().map(move |&row| measurements.configuration(row)[joint]);
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
-        };
+        let column = |joint: usize| range(self.rows().iter().map(move |&row| measurements.configuration(row)[joint]));
         let varies = |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
         let payload = measurements.payload.as_deref().map(|all| self.pick(all));
         let temperature = measurements.temperature.as_deref().map(|all| self.pick(all));
@@ -107,8 +107,7 @@ impl<'a> Data<'a> {
             temperature: problem.data.reference_temperature.is_some() && temperature.is_some_and(varies),
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
-            payload: payload.as_ref().map_or(problem.tool.payload_mass > 0.0, |all| all.iter().any(|mass| *mass > 0.0)),
-            payload_varies: payload.is_some_and(varies),
+            payload: payload.map_or([problem.tool.payload_mass; 2].into(), |all| range(all.into_iter())),
             ranges: (0..n).map(column).collect(),
             covariates: self.own_covariates().map(varies).collect(),
             times: self.shift_times(),

@@ -96,8 +96,8 @@ impl Instrument {
 
 /// ∂E by one of its entries, in the order of [`Slot::Strain`].
 pub(super) fn strained(entry: usize) -> Matrix3<f64> {
-    let mut matrix = Matrix3::zeros();
     const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+    let mut matrix = Matrix3::zeros();
     if let Some(place) = PLACES.get(entry) {
         matrix[*place] = 1.0;
     }

@@ -43,7 +43,7 @@ impl CustomEffect for Creep {
     }
 
     fn untestable(&self, _: &Problem, data: &DataCoverage) -> Option<&'static str> {
-        (!data.payload).then_some("no payload is carried")
+        (!data.carries()).then_some("no payload is carried")
     }
 }
 

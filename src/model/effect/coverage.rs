@@ -13,10 +13,8 @@ pub struct DataCoverage {
     pub approach: bool,
     /// For each joint, whether it was approached from both sides.
     pub both_sides: Vec<bool>,
-    /// Whether a payload is carried in some poses.
-    pub payload: bool,
-    /// Whether the payload changes.
-    pub payload_varies: bool,
+    /// Smallest and largest payload \[kg\].
+    pub payload: (f64, f64),
     /// For each joint, the range of its commands \[rad\] or \[m\].
     pub ranges: Vec<(f64, f64)>,
     /// Times between which a station may have moved \[s\], ascending.
@@ -31,6 +29,16 @@ impl DataCoverage {
     /// Whether a joint, counted from 0, moves at all.
     pub fn moves(&self, joint: usize) -> bool {
         self.ranges.get(joint).is_some_and(|(low, high)| high > low)
+    }
+
+    /// Whether a payload is carried in some poses.
+    pub fn carries(&self) -> bool {
+        self.payload.1 > 0.0
+    }
+
+    /// Whether the payload changes.
+    pub fn changes_payload(&self) -> bool {
+        self.payload.1 > self.payload.0
     }
 
     /// Whether loads act at all.

@@ -20,7 +20,7 @@ pub(super) const FAMILY: Family = Family {
             let both = data.both_sides.get(joint - 1).copied().unwrap_or(false);
             Candidate::needing(
                 effect,
-                both && data.payload_varies,
+                both && data.changes_payload(),
                 "no payload that changes, or no approach from both sides",
             )
         };

@@ -12,7 +12,7 @@ pub(super) const FAMILY: Family = Family {
         _ => Vec::new(),
     },
     candidates: |_, data| {
-        vec![Candidate::needing(Effect::PayloadMass, data.payload && data.weighs(), "no payload is carried")]
+        vec![Candidate::needing(Effect::PayloadMass, data.carries() && data.weighs(), "no payload is carried")]
     },
     describe: |effect| match effect {
         Effect::PayloadMass => "payloads are heavier than declared".to_owned(),
