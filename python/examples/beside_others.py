@@ -146,15 +146,26 @@ def by_figaroh() -> Array:
 
 
 # %%
-def measure(tool: Callable[[], Array]) -> None:
-    """Prints lines, time and error of a tool."""
+def timed(tool: Callable[[], Array]) -> tuple[float, Array]:
+    """The time that a tool takes [s], and what it predicts [m]."""
     begin = time.perf_counter()
     with contextlib.redirect_stdout(io.StringIO()):
         predicted = tool()
-    took = time.perf_counter() - begin
-    error = 1e3 * np.linalg.norm(predicted - positions(TRUE, TRUE_TOOL, JUDGED), axis=1)
-    lines = len(inspect.getsource(tool).splitlines()) - 1
-    print(f"{tool.__name__[3:]:10} {lines:3} lines {took:9.3f} s   mean error {error.mean():.4f} mm, largest {error.max():.4f} mm")
+    return time.perf_counter() - begin, predicted
+
+
+def measure(tools: list[Callable[[], Array]], rounds: int = 5) -> None:
+    """Prints lines, time and error of each tool: the median of rounds in which they take turns, as other work slows all of them."""
+    runs = [[timed(tool) for tool in tools] for _ in range(rounds)]
+    for k, tool in enumerate(tools):
+        took = float(np.median([run[k][0] for run in runs]))
+        ratio = float(np.median([run[k][0] / run[0][0] for run in runs]))
+        error = 1e3 * np.linalg.norm(runs[0][k][1] - positions(TRUE, TRUE_TOOL, JUDGED), axis=1)
+        lines = len(inspect.getsource(tool).splitlines()) - 1
+        print(
+            f"{tool.__name__[3:]:10} {lines:3} lines {took:9.3f} s {ratio:7.1f} times flexcal's   "
+            f"mean error {error.mean():.4f} mm, largest {error.max():.4f} mm"
+        )
 
 
 if __name__ == "__main__":
@@ -162,5 +173,4 @@ if __name__ == "__main__":
     warnings.simplefilter("ignore")
     before = 1e3 * np.linalg.norm(positions(NOMINAL, TOOL, JUDGED) - positions(TRUE, TRUE_TOOL, JUDGED), axis=1)
     print(f"nominal: mean error {before.mean():.4f} mm")
-    for tool in (by_flexcal, by_scipy, by_pybotics, by_figaroh):
-        measure(tool)
+    measure([by_flexcal, by_scipy, by_pybotics, by_figaroh])

@@ -85,7 +85,12 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             };
             Ok(Judged::Table { poses: Box::new(poses), within: source.known_ranges(problem)?, held_out: None })
         }
-        (None, Some(poses)) => Ok(Judged::Drawn(source.all_ranges(problem)?, poses)),
+        (None, Some(poses)) => {
+            if !common.quiet {
+                diagnostic::print_warnings(problem.far_target().as_slice());
+            }
+            Ok(Judged::Drawn(source.all_ranges(problem)?, poses))
+        }
         (None, None) => {
             let files: &[PathBuf] = if common.data().is_empty() { &problem.data.files } else { common.data() };
             if files.is_empty() {

@@ -58,9 +58,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Err(NoTargets.into());
     }
     let mut problem = Problem::read(common.problem())?;
-    if let Some(own) = problem.joints.iter().find(|joint| joint.mimic.is_some()) {
-        return Err(own.location.clone().error(InputErrorKind::FollowerInTheWay).into());
-    }
     // Targets are not split: every row is one.
     problem.data.held_out = None;
     let results =

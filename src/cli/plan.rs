@@ -119,10 +119,9 @@ impl From<CriterionArgument> for Criterion {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;
-    if declared.data.fits_orientation && !common.quiet {
-        diagnostic::warn("poses are chosen by what their positions tell; check counts orientations as well");
+    if declared.data.fits_orientation && !arguments.separate.is_empty() && !common.quiet {
+        diagnostic::warn("effects are told apart by positions: orientations do not count");
     }
-    let declared = declared.positions_alone();
     let pair = pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let results = common.results("plan", &problem, &source.files(), &["plan.csv", "plan.json"])?;

@@ -24,6 +24,8 @@ const SWEEPS: usize = 50;
 pub struct Exchange {
     /// Jᵀ of the candidates, scaled.
     candidates: DMatrix<f64>,
+    /// Measured coordinates of each of them.
+    coordinates: usize,
     /// By what each unknown is multiplied.
     scale: DVector<f64>,
     /// Information that is there without any candidate, scaled.
@@ -95,18 +97,18 @@ impl Exchange {
         ground += &held;
         all += &held;
         let yardstick = criterion.yardstick(parameters, &all, &scaled_prior)?;
-        Some(Self { candidates: rows, scale, ground, yardstick })
+        Some(Self { candidates: rows, coordinates: candidates.coordinates, scale, ground, yardstick })
     }
 
     /// Other candidates, measured by the same criterion in the same units.
     #[must_use]
     pub fn with_candidates(&self, candidates: &Sensitivity) -> Self {
-        Self { candidates: in_scale(candidates, &self.scale), ..self.clone() }
+        Self { candidates: in_scale(candidates, &self.scale), coordinates: candidates.coordinates, ..self.clone() }
     }
 
     /// Number of candidates.
     pub fn candidates(&self) -> usize {
-        self.candidates.ncols() / 3
+        self.candidates.ncols() / self.coordinates
     }
 
     /// ln of the criterion for a set of candidates.
@@ -128,7 +130,9 @@ impl Exchange {
                 let Some(scan) = Scan::new(&self.yardstick, &self.information(others)) else { continue };
                 // Rounding must not pass for a gain.
                 let least = value - 1e-10 * value.abs().max(1.0);
-                if let Some((better, gained)) = scan.best(&self.candidates, |k| !chosen.contains(&k), least) {
+                if let Some((better, gained)) =
+                    scan.best((&self.candidates, self.coordinates), |k| !chosen.contains(&k), least)
+                {
                     (chosen[place], value) = (better, gained);
                 }
             }
@@ -146,7 +150,7 @@ impl Exchange {
     fn information(&self, poses: impl Iterator<Item = usize>) -> DMatrix<f64> {
         let mut information = self.ground.clone();
         for pose in poses {
-            let rows = self.candidates.columns(3 * pose, 3);
+            let rows = self.candidates.columns(self.coordinates * pose, self.coordinates);
             information.gemm(1.0, &rows, &rows.transpose(), 1.0);
         }
         information

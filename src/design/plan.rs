@@ -170,7 +170,7 @@ pub fn plan(
     let planned = forecast(&told);
     let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let suffices = planned.open <= attainable && 3 * apart >= without_prior;
+    let suffices = planned.open <= attainable && all.coordinates * apart >= without_prior;
     Ok(Plan { poses: chosen, candidates: tried, starts, value, planned, random, suffices })
 }
 

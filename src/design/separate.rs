@@ -21,7 +21,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Two effects that `problem` does not declare.
+    /// Two effects that `problem` does not declare; positions alone tell them apart.
     ///
     /// # Errors
     /// They are the same, one of them is declared, or follows the time and not the poses.
@@ -38,9 +38,10 @@ impl Pair {
                 return Err(DesignError::FollowsTime { effect: effect.describe() });
             }
         }
-        let mut declared = problem.clone();
+        let plain = problem.positions_alone();
+        let mut declared = plain.clone();
         declared.effects.extend(pair.clone());
-        Ok(Self { effects: pair.map(|declared| declared.effect), plain: problem.clone(), declared })
+        Ok(Self { effects: pair.map(|declared| declared.effect), plain, declared })
     }
 
     /// The errors of the effects' parameters, each beside the other effect and everything else that is free: an effect whose

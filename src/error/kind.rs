@@ -153,10 +153,6 @@ pub enum InputErrorKind {
     NoCovariateName { name: String },
     #[error("no covariate is called \"{name}\"; [data.covariates] {}", list("has", known, "has none"))]
     UnknownCovariate { name: String, known: Vec<String> },
-    #[error(
-        "the joint follows another one, and commands that reach targets are sought for arms of which every joint takes its own"
-    )]
-    FollowerInTheWay,
     #[error("every row names a fixed point in the column nest; none is of the arm")]
     NestsAlone,
     #[error("the row names no position to go to: contacts, distances and tilts are no targets")]
@@ -363,7 +359,7 @@ pub enum NoRows {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum WarningKind {
-    #[error("not a column that is known{}; ignored", question(meant.as_deref()))]
+    #[error("not a column that is known{}; ignored{}", question(meant.as_deref()), covariate(meant.as_deref()))]
     ColumnIgnored { meant: Option<String> },
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
@@ -385,10 +381,21 @@ pub enum WarningKind {
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
     )]
     BeyondLimits { rows: usize, worst: String, limits: String },
+    #[error("{value} is {turns} turns; if these are degrees, the columns end in _deg")]
+    ManyTurns { value: String, turns: String },
+    #[error(
+        "{distance} m away from the last frame, and all links together are {links} m long; if these are millimetres, write target_mm"
+    )]
+    FarTarget { distance: String, links: String },
 }
 
 fn more(rows: usize) -> String {
     if rows > 1 { format!(", and {} further rows repeat others", rows - 1) } else { String::new() }
+}
+
+/// Where a column goes that is not a known one written wrongly.
+fn covariate(meant: Option<&str>) -> &'static str {
+    if meant.is_none() { " (what may bear on the arm is named in [data.covariates])" } else { "" }
 }
 
 fn plural(count: usize) -> &'static str {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::Outlier;
+use super::misread::Misreading;
 
 /// The registered nominal arm misses the measurements by this part of their spread: a reason to ask.
 const FAR_OFF: f64 = 0.1;
@@ -33,6 +34,8 @@ pub enum Caution {
         rms: f64,
         /// Root mean squared distance of the measured points from their centre \[m\].
         spread: f64,
+        /// What would explain it, each by itself, the best first.
+        misreadings: Vec<Misreading>,
     },
 }
 
@@ -58,18 +61,26 @@ impl fmt::Display for Caution {
             Self::FarOff { rms, .. } if !rms.is_finite() => {
                 f.write_str("the nominal arm misses the measurements by more than numbers hold; check their units")
             }
-            Self::FarOff { rms, spread } => write!(
-                f,
-                "the nominal arm misses the measurements by {:.1} mm, {:.0} % of their spread, wherever its base stands; check \
-                 units, signs of joints, and whether the numbers are of this convention of frames",
-                rms * 1e3,
-                100.0 * rms / spread
-            ),
+            Self::FarOff { rms, spread, misreadings } => {
+                let (millimetres, part) = (rms * 1e3, 100.0 * rms / spread);
+                write!(
+                    f,
+                    "the nominal arm misses the measurements by {millimetres:.1} mm, {part:.0} % of their spread, wherever its base \
+                     stands; "
+                )?;
+                let words: Vec<String> = misreadings.iter().map(Misreading::to_string).collect();
+                if words.is_empty() {
+                    return f.write_str(
+                        "check units, signs of joints, and whether the numbers are of this convention of frames",
+                    );
+                }
+                write!(f, "this would explain it: {}", words.join(", or "))
+            }
         }
     }
 }
 
-/// A nominal arm that is far off.
-pub(super) fn far_off(rms: f64, spread: f64) -> Option<Caution> {
-    (spread > 0.0 && rms > FAR_OFF * spread).then_some(Caution::FarOff { rms, spread })
+/// A nominal arm that is far off, and what would explain it.
+pub(super) fn far_off(rms: f64, spread: f64, explain: impl FnOnce() -> Vec<Misreading>) -> Option<Caution> {
+    (spread > 0.0 && rms > FAR_OFF * spread).then(|| Caution::FarOff { rms, spread, misreadings: explain() })
 }

@@ -7,7 +7,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{CommandResiduals, Model, Pose};
 use crate::problem::{JointKind, PoseView, Problem};
 use crate::spatial::Frame;
 
@@ -123,21 +123,18 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
 /// taken at the command found so far, until it settles.
 ///
 /// # Errors
-/// The limits of a joint exclude each other, or a joint follows another one.
+/// The limits of a joint exclude each other.
 pub fn compensate(
     problem: &Problem,
     model: &Model,
     x: &DVector<f64>,
     targets: &Measurements,
 ) -> Result<Vec<Command>, StageError> {
-    if let Some(index) = problem.joints.iter().position(|joint| joint.mimic.is_some()) {
-        return Err(StageError::Follower { joint: index + 1 });
-    }
     let placement = Placement::of(targets);
     let arm = model.commanded(problem, x).true_to_position();
     let rows: Vec<usize> = (0..targets.len()).collect();
-    let unknowns: Vec<usize> = (0..arm.parameters.len()).collect();
     let moving = arm.moving_joints();
+    let led = arm.clone().with_followers(problem);
     let mut commands = Vec::with_capacity(rows.len());
     let weights = (POSITION_WEIGHT, Some(ORIENTATION_WEIGHT));
     for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate() {
@@ -158,7 +155,7 @@ pub fn compensate(
             let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
             let away = DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
             let pose = Pose { setup: PoseView { configuration: &configuration, ..pose.setup }, ..pose };
-            let residuals = PoseResiduals::new(&arm, vec![pose], unknowns.clone(), DVector::zeros(n));
+            let residuals = CommandResiduals::new(problem, &led, n, vec![pose]);
             let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
             let fit = Fit::new(&residuals).with_rows(near)?;
             let step = solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default()).x;

@@ -258,7 +258,7 @@ pub fn identify_model(
         sigma: (noise_is_declared.then_some(declared_all), taken),
     };
     let quality_flag = judgement.flag(enough.flag, not_converged, enough.poses);
-    let cautions = judgement.cautions(&whole.unknowns, &statistics.covariance);
+    let cautions = judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
     Ok(Identification {
         quality_flag,
         too_few_poses: enough.too_few,

@@ -4,9 +4,11 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::cautions::{Caution, far_off};
 use super::fitting::{FitEnd, Fitting};
+use super::misread::misreadings;
 use super::quality::{BEYOND_NOISE, QualityFlag, beyond_arm, beyond_prior, misses, other_size, spread};
 use super::{Errors, Outlier, held_out};
 use crate::least_squares::Loss;
+use crate::problem::Problem;
 
 /// Poses below which the size of the cloud of points says nothing.
 const LEAST_POSES: usize = 4;
@@ -59,13 +61,14 @@ impl Judgement<'_> {
     }
 
     /// What to ask about the input; `covariance` is that of the fit's `unknowns`.
-    pub fn cautions(&self, unknowns: &[usize], covariance: &DMatrix<f64>) -> Vec<Caution> {
+    pub fn cautions(&self, problem: &Problem, unknowns: &[usize], covariance: &DMatrix<f64>) -> Vec<Caution> {
         let of = self.fitting.split.held_out.len();
         let rows = held_out::outliers(self.fitting, &self.end.x, unknowns, covariance);
         let outliers = (!rows.is_empty()).then_some(Caution::HeldOutOutliers { rows, of });
         let copies = self.copies();
         let copies = (0 < copies && copies < of).then_some(Caution::HeldOutCopies { copies, of });
-        let far_off = far_off(self.errors.0.identification.rms.norm, self.measured());
+        let rms = self.errors.0.identification.rms.norm;
+        let far_off = far_off(rms, self.measured(), || misreadings(self.fitting, problem, rms));
         far_off.into_iter().chain(copies).chain(outliers).collect()
     }
 

@@ -35,12 +35,6 @@ pub enum StageError {
     /// Bounds and constraints contradict each other.
     #[error("no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]")]
     Infeasible,
-    /// A command that moves several joints.
-    #[error("joint {joint} follows another, and commands for such arms are not found yet")]
-    Follower {
-        /// Number of the joint.
-        joint: usize,
-    },
     /// Priors do not fit the unknowns.
     #[error(transparent)]
     Rows(#[from] RowsError),

@@ -1,11 +1,13 @@
-//! Commands beyond the ranges of their joints.
+//! Commands beyond the ranges of their joints, and beyond what joints do at all.
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::Problem;
+use crate::problem::{JointKind, Problem};
 
 /// How far beyond its limit a command may be for rounding alone \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-6;
+/// Turns from zero that hardly any arm makes.
+const MANY_TURNS: f64 = 2.0;
 
 /// The column of a joint's commands.
 pub(super) struct Commands<'a> {
@@ -37,6 +39,25 @@ impl Commands<'_> {
 }
 
 impl Measurements {
+    /// A warning where columns in radians turn a joint further than joints turn, at the row that is furthest off.
+    pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
+        let is_angle = |column: &&Commands| {
+            column.unit() == "rad"
+                && problem.joints.get(column.joint).is_some_and(|own| own.commanded() == JointKind::Revolute)
+        };
+        let value = |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
+        let every = columns.iter().filter(is_angle).flat_map(|column| (0..self.len()).map(move |row| (column, row)));
+        let (column, row) =
+            every.max_by(|(a, i), (b, j)| value(*i, a.joint).abs().total_cmp(&value(*j, b.joint).abs()))?;
+        let turns = value(row, column.joint).abs() / std::f64::consts::TAU;
+        let kind = WarningKind::ManyTurns {
+            value: format!("{} = {}", column.name, column.shown(value(row, column.joint))),
+            turns: format!("{turns:.0}"),
+        };
+        let location = self.location(row).with_key(format!("joint {}", column.joint + 1));
+        (turns > MANY_TURNS).then_some(Warning { location, kind })
+    }
+
     /// A warning for each joint that was commanded beyond its declared range, at the row that is furthest beyond.
     pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
         let warning = |column: &Commands| {

@@ -136,9 +136,12 @@ impl<'a> Tables<'a> {
                     return Err(Location::file(&file).error(InputErrorKind::NestsAlone));
                 }
                 observed::complete(&mut measurements, problem)?;
+                let commands = commands(&columns);
+                warnings.extend(measurements.many_turns(problem, &commands));
                 if measured {
-                    warnings.extend(measurements.beyond_limits(problem, &commands(&columns)));
+                    warnings.extend(measurements.beyond_limits(problem, &commands));
                 }
+                warnings.extend(problem.far_target());
                 measurements.warnings.clone_from(&warnings);
                 Ok((measurements, warnings))
             }

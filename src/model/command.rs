@@ -35,9 +35,12 @@ impl Model {
         Self { instrument: self.instrument.true_to_position(), ..self }
     }
 
-    /// The same corrections of the joints that follow others, of a commanded model.
-    pub(super) fn followers(&self, problem: &Problem) -> Vec<Parameter> {
-        commands(problem, &self.nominal, |joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed })
+    /// A commanded model with corrections to the joints that follow others as further parameters.
+    #[must_use]
+    pub fn with_followers(mut self, problem: &Problem) -> Self {
+        let of = |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
+        self.parameters.extend(commands(problem, &self.nominal, of));
+        self
     }
 
     /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not know.

@@ -14,10 +14,10 @@ impl Model {
     /// A command moves its own joint, what is driven by it in other joints, and what the instrument adds by it:
     /// ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + ∂s/∂q. The side from which a joint comes stays.
     pub fn command_jacobian(&self, problem: &Problem, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<DMatrix<f64>> {
-        let mut arm = self.commanded(problem, x);
+        let arm = self.commanded(problem, x);
         let joints = arm.joints();
         let own = arm.moving_joints().len();
-        arm.parameters.extend(arm.followers(problem));
+        let arm = arm.with_followers(problem);
         let moving = arm.moving_joints();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let count = poses.len();

@@ -4,6 +4,7 @@
 mod ablation;
 mod command;
 mod command_jacobian;
+mod command_residuals;
 mod derivative;
 mod driven;
 pub mod effect;
@@ -24,6 +25,7 @@ mod turn;
 
 pub use crate::mechanics::Shape;
 pub use ablation::Ablation;
+pub use command_residuals::CommandResiduals;
 pub use pose::{Pose, SeenOrientation};
 pub use poses::PoseResiduals;
 

@@ -25,6 +25,8 @@ mod standard;
 
 use nalgebra::Vector3;
 
+use crate::error::{Location, Warning, WarningKind};
+
 pub use argument::{Argument, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
@@ -76,6 +78,20 @@ impl Problem {
     pub fn is_elastic(&self) -> bool {
         let bends = |beam: &Beam| [beam.ea, beam.ei_y, beam.ei_z, beam.gj].iter().any(Option::is_some);
         self.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
+    }
+
+    /// A warning where the target lies further from the last frame than the arm could reach twice.
+    pub fn far_target(&self) -> Option<Warning> {
+        let length = |joint: &Joint| {
+            let placed = joint.placement.as_ref().map_or(0.0, |own| own.xyz.norm());
+            let (min, max) = joint.limits;
+            let way = if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
+            joint.a.hypot(joint.d) + placed + way
+        };
+        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), self.tool.target.norm());
+        let location = Location { line: None, excerpt: None, ..self.data.location.clone().with_key("tool.target") };
+        let kind = WarningKind::FarTarget { distance: format!("{distance:.3}"), links: format!("{links:.3}") };
+        (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
     }
 }
 

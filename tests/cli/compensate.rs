@@ -176,6 +176,34 @@ fn redundancy_stays_near_the_seed() {
 }
 
 #[test]
+fn a_joint_that_follows_moves_with_its_leader() {
+    // A palletiser: the plate stays level, and one more joint slides as the shoulder turns.
+    let text = "name = 'level'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\ntheta_deg = 60\nmin_deg = -60\nmax_deg = 60\n\
+                [[joint]]\na_m = 0.6\ntheta_deg = -90\n[[joint]]\na_m = 0.5\nmimic = { joint = 2, ratio = -1 }\n\
+                [[joint]]\nkind = 'prismatic'\nmimic = { joint = 3, ratio = 0.1 }\n[tool]\ntarget_m = [0.1, 0.02, 0.05]\n\
+                [[effect]]\ngear-ratio = { joint = 2 }\n[parameters]\n'*gear-ratio*' = { free = true }\n";
+    let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
+    let rows =
+        measured("q1_deg,q2_deg,q3_deg,x_m,y_m,z_m\n10,20,-15,0,0,0\n-80,-30,25,0,0,0\n45,55,0,0,0,0\n", &problem);
+    let arm = model(&problem, &rows);
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let x = nalgebra::DVector::from_element(arm.parameters.len(), 2e-3);
+    let mut wanted = rows.clone();
+    for configuration in wanted.configurations.chunks_exact_mut(problem.joints.len()) {
+        configuration.iter_mut().take(3).for_each(|q| *q += 0.07);
+    }
+    let mut targets = rows.clone();
+    targets.positions = arm.predict(Placement::of(&wanted).poses(&wanted, &all, 1.0), &x);
+    for command in compensate(&problem, &arm, &x, &targets).unwrap() {
+        assert!(command.is_reached() && command.seed_miss > 0.01, "{command:?}");
+        let off = command.configuration.iter().zip(wanted.configuration(command.row)).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-8, "{command:?}");
+    }
+    let commands = compensate(&problem, &arm, &x, &targets).unwrap();
+    assert!(commands_csv(&problem, &targets, &commands).starts_with("q1_deg,q2_deg,q3_deg,x_mm"));
+}
+
+#[test]
 fn words_with_a_comma_stay_one_cell() {
     let problem = Problem::read(&case("problem.toml")).unwrap();
     let mut targets = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);

@@ -20,6 +20,16 @@ pub fn lunar() -> (Problem, Truth) {
     (problem, truth)
 }
 
+/// The same arm with orientations fitted beside positions.
+pub fn oriented() -> Problem {
+    let text = std::fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
+    let text = text.replace("\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_mm = 5.0, sigma_deg = 1.0 }");
+    let text = text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0.05\norientation_sigma_deg = 0.005");
+    let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+    assert!(problem.data.fits_orientation);
+    problem
+}
+
 /// The ranges of joints, payload and hoist from which the test rig draws.
 pub fn ranges(truth: &Truth) -> PoseRanges {
     PoseRanges { temperature: None, approach: false, ..truth.poses.clone() }

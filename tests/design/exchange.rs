@@ -3,10 +3,12 @@
 use flexcal::design::{
     Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity, Site, plan,
 };
+use flexcal::measurement::Measurements;
 use flexcal::model::parameter::Parameter;
+use flexcal::problem::Problem;
 use rayon::ThreadPoolBuilder;
 
-use super::bench::{lunar, ranges};
+use super::bench::{lunar, oriented, ranges};
 
 const POSES: usize = 14;
 
@@ -17,17 +19,22 @@ fn criteria() -> [Criterion; 6] {
 
 /// Forty candidates of the lunar sampler.
 fn candidates() -> (Vec<Parameter>, Sensitivity) {
-    let (problem, truth) = lunar();
-    let rows = ranges(&truth).draw(&problem, 40, Extremes::Often, 5, 0);
-    let site = Site::new(&problem, &[&rows]).unwrap();
+    candidates_of(&lunar().0)
+}
+
+fn candidates_of(problem: &Problem) -> (Vec<Parameter>, Sensitivity) {
+    let (_, truth) = lunar();
+    let rows = ranges(&truth).draw(problem, 40, Extremes::Often, 5, 0);
+    let site = Site::new(problem, &[&rows]).unwrap();
     let sensitivity = site.sensitivity(&rows, None);
     (site.model.parameters, sensitivity)
 }
 
 #[test]
 fn it_never_worsens_and_ends_where_no_exchange_of_one_pose_helps() {
-    let (parameters, candidates) = candidates();
-    for criterion in criteria() {
+    for (criterion, problem) in criteria().into_iter().flat_map(|own| [(own.clone(), lunar().0), (own, oriented())]) {
+        let (parameters, candidates) = candidates_of(&problem);
+        assert_eq!(candidates.coordinates, if problem.data.fits_orientation { 6 } else { 3 });
         let exchange = Exchange::new(&parameters, &candidates, None, POSES, &criterion).unwrap();
         let found = exchange.improve((0..POSES).collect(), |_, _| {});
         let name = criterion.as_str();
@@ -70,6 +77,25 @@ fn criteria_measure_the_covariance_that_a_fit_has() {
     let logs = covariances.map(|all| arm.iter().map(|&k| all[(k, k)].ln()).sum::<f64>() / arm.len() as f64);
     let product = difference(&Criterion::S);
     assert!((product - (logs[0] - logs[1])).abs() < 1e-3, "{product} {logs:?}");
+}
+
+#[test]
+fn a_plan_counts_orientations_where_they_are_fitted() {
+    let (problem, (_, truth)) = (oriented(), lunar());
+    let rows = Candidates::Rows(Box::new(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0)));
+    let options = PlanOptions { poses: 10, criterion: &Criterion::S, seed: 4, progress: None, workspace: None };
+    let told_by = |poses: &Measurements| {
+        let site = Site::new(&problem, &[poses]).unwrap();
+        Forecast::new(&site.model.parameters, &site.sensitivity(poses, None))
+    };
+    let judged = |problem: &Problem| {
+        let planned = plan(problem, &rows, None, &options).unwrap();
+        let errors = told_by(&planned.poses).expected;
+        let arm = errors.iter().filter(|own| !own.is_placement).filter_map(|own| own.std_error.map(f64::ln));
+        arm.sum::<f64>()
+    };
+    let (with, without) = (judged(&problem), judged(&problem.positions_alone()));
+    assert!(with < without, "{with} {without}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
-use flexcal::identify::{Caution, Identification, Options, QualityFlag, identify};
+use flexcal::identify::{Caution, Identification, Misreading, Options, QualityFlag, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
@@ -148,6 +148,49 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
     let found = fit(&standard, &clean);
     let asked = found.cautions.iter().any(|caution| matches!(caution, Caution::FarOff { .. }));
     assert!(asked || !found.is_trusted(), "{:?}", found.cautions);
+}
+
+#[test]
+fn what_may_have_been_misread_is_said() {
+    let problem = arm(&format!("{PRIORS}\n'base.*' = {{ free = true }}"));
+    let clean = measured(&problem, 5);
+    let with = |misread: &dyn Fn(&mut Problem, &mut Dataset)| {
+        let (mut problem, mut data) = (problem.clone(), clean.clone());
+        misread(&mut problem, &mut data);
+        let far = fit(&problem, &data).cautions.into_iter().find_map(|own| match own {
+            Caution::FarOff { misreadings, .. } => Some(misreadings),
+            _ => None,
+        });
+        far.expect("far off")
+    };
+    let scaled = |factor: f64| {
+        move |_: &mut Problem, data: &mut Dataset| {
+            data.measurements.configurations.iter_mut().for_each(|q| *q *= factor);
+        }
+    };
+    let sized = |factor: f64| {
+        move |_: &mut Problem, data: &mut Dataset| data.measurements.positions.iter_mut().for_each(|own| *own *= factor)
+    };
+    let degree = std::f64::consts::PI / 180.0;
+    assert_eq!(with(&scaled(degree)), [Misreading::Radians]);
+    assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees]);
+    assert_eq!(with(&sized(1e3)), [Misreading::Millimetres]);
+    assert_eq!(with(&sized(1e-3)), [Misreading::Metres]);
+    let mirrored = with(&|_, data| data.measurements.positions.iter_mut().for_each(|own| own.swap_rows(0, 2)));
+    assert_eq!(mirrored, [Misreading::Mirrored]);
+    let reversed =
+        with(&|_, data| data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q));
+    assert_eq!(reversed, [Misreading::Reversed { joint: 3 }]);
+    // A tool that is free goes where it belongs, far beyond its prior.
+    let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
+    let far = with(&|problem, _| {
+        *problem = held.clone();
+        problem.tool.target *= 1e3;
+    });
+    assert_eq!(far, [Misreading::TargetInMillimetres]);
+    // What none of them explains.
+    let shuffled = with(&|_, data| data.measurements.positions.rotate_left(1));
+    assert_eq!(shuffled, []);
 }
 
 #[test]

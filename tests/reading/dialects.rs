@@ -75,6 +75,25 @@ fn what_sets_columns_apart_is_found_or_said() {
 }
 
 #[test]
+fn sizes_that_no_arm_has_are_said() {
+    let arm = |target: &str| Problem::parse(&format!("{ARM}[tool]\n{target}\n"), Path::new("problem.toml")).unwrap();
+    let said = |arm: &Problem, table: &str| {
+        let (_, warnings) = read(arm, &[("rows.csv", table)]).unwrap();
+        warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    };
+    let table = |unit: &str| format!("q1_{unit},q2_{unit},x_m,y_m,z_m\n0.5,-1,0,0,0\n90,1.5,0,0,0\n");
+    let words = said(&arm(""), &table("rad"));
+    assert!(words.contains("rows.csv:3: joint 1: q1_rad = 90 is 14 turns; if these are degrees"), "{words}");
+    assert_eq!(said(&arm(""), &table("deg")), "");
+    let words = said(&arm("target_m = [220, 0, -90]"), &table("deg"));
+    assert!(words.contains("problem.toml: tool.target: 237.697 m away") && words.contains("0.500 m long"), "{words}");
+    assert_eq!(said(&arm("target_mm = [220, 0, -90]"), &table("deg")), "");
+    // A column of one's own that nobody named.
+    let words = said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,humidity\n1,2,3,4,5,40\n");
+    assert!(words.contains("column humidity") && words.contains("[data.covariates]"), "{words}");
+}
+
+#[test]
 fn the_name_of_a_file_may_be_a_session() {
     let table = "q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n";
     let rows = read(&problem("'#file' = 'session'\n"), &[("May.csv", table), ("June.csv", table)]).unwrap().0;

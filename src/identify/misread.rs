@@ -1,0 +1,129 @@
+//! How a table, or a number of the problem, may have been misread where the nominal arm is far from its measurements.
+
+use std::f64::consts::PI;
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use super::Placement;
+use super::fitting::Fitting;
+use crate::measurement::{Measurements, Split};
+use crate::model::Model;
+use crate::problem::{JointKind, Problem};
+
+/// Read otherwise the nominal arm misses the measurements by no more than this part of what it misses them by as they are.
+const EXPLAINED: f64 = 0.2;
+/// A reading that does nearly as well as the best one is named beside it.
+const AS_GOOD: f64 = 1.5;
+/// Beyond so many sizes of the arm no misreading leads: millimetres are a thousand times metres.
+const MOST_SIZES: f64 = 1e4;
+/// Rows that are looked at.
+const MOST_ROWS: usize = 200;
+
+/// What may have been taken for something else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Misreading {
+    /// Joint angles in degrees, declared as radians.
+    Degrees,
+    /// Joint angles in radians, declared as degrees.
+    Radians,
+    /// Positions in metres, declared as millimetres.
+    Metres,
+    /// Positions in millimetres, declared as metres.
+    Millimetres,
+    /// Positions in a left-handed frame: two coordinates exchanged, or one of the other sign.
+    Mirrored,
+    /// A joint that counts the other way.
+    Reversed {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// The target of `[tool]` in millimetres, declared as metres.
+    TargetInMillimetres,
+}
+
+impl fmt::Display for Misreading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
+            Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
+            Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
+            Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
+            Self::Mirrored => f.write_str("two of x, y and z that are exchanged, or one of the other sign"),
+            Self::Reversed { joint } => write!(f, "joint {joint} that counts the other way"),
+            Self::TargetInMillimetres => f.write_str("a target of [tool] that is in millimetres, declared in metres"),
+        }
+    }
+}
+
+impl Misreading {
+    /// All that an arm may have.
+    fn all(problem: &Problem) -> impl Iterator<Item = Self> + '_ {
+        let plain = [Self::Degrees, Self::Radians, Self::Metres, Self::Millimetres, Self::Mirrored];
+        let moving = (1..).zip(&problem.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        let reversed = moving.map(|(joint, _)| Self::Reversed { joint });
+        let far = problem.tool.target.norm() > 1.0;
+        plain.into_iter().chain(far.then_some(Self::TargetInMillimetres)).chain(reversed)
+    }
+
+    /// The rows as they should have been read.
+    fn mend(self, rows: &mut Measurements, problem: &Problem) {
+        let mut scale = |factor: f64, chosen: &dyn Fn(usize) -> bool| {
+            for (at, q) in rows.configurations.iter_mut().enumerate() {
+                if chosen(at % problem.joints.len()) {
+                    *q *= factor;
+                }
+            }
+        };
+        let turns = |joint: usize| problem.joints[joint].commanded() == JointKind::Revolute;
+        match self {
+            Self::Degrees => scale(PI / 180.0, &turns),
+            Self::Radians => scale(180.0 / PI, &turns),
+            Self::Reversed { joint } => scale(-1.0, &|own| own + 1 == joint),
+            Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
+            Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
+            Self::Mirrored => rows.positions.iter_mut().for_each(|own| *own = Vector3::new(own.y, own.x, own.z)),
+            Self::TargetInMillimetres => {}
+        }
+    }
+
+    /// Root mean squared error of the registered nominal arm with some rows read this way \[m\].
+    fn rms(self, fitting: &Fitting, problem: &Problem, rows: &Measurements, split: &Split) -> Option<f64> {
+        let mut mended = rows.clone();
+        self.mend(&mut mended, problem);
+        let other;
+        let model = if self == Self::TargetInMillimetres {
+            let mut problem = problem.clone();
+            problem.tool.target *= 1e-3;
+            other = Model::new(&problem, &fitting.placement.bases, &fitting.placement.targets).ok()?;
+            &other
+        } else {
+            fitting.model
+        };
+        let placement = &Placement::of(rows);
+        let held_out_only = placement.held_out_only(model, rows, split);
+        let fitting =
+            Fitting { model, measurements: &mended, split, placement, held_out_only, turn_sigma: None, ..*fitting };
+        let registered = fitting.registered().ok()?;
+        Some(fitting.errors(&registered).identification.rms.norm)
+    }
+}
+
+/// Misreadings any one of which would explain why the registered nominal arm misses the measurements by `rms` \[m\], the best first.
+pub(super) fn misreadings(fitting: &Fitting, problem: &Problem, rms: f64) -> Vec<Misreading> {
+    if rms.is_nan() || rms > MOST_SIZES * fitting.model.size() {
+        return Vec::new();
+    }
+    let identification = &fitting.split.identification;
+    let chosen: Vec<usize> =
+        identification.iter().copied().step_by(identification.len().div_ceil(MOST_ROWS).max(1)).collect();
+    let rows = fitting.measurements.select(&chosen);
+    let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+    let one = |own: Misreading| Some((own, own.rms(fitting, problem, &rows, &split)?));
+    let mut explained: Vec<(Misreading, f64)> =
+        Misreading::all(problem).filter_map(one).filter(|(_, left)| *left < EXPLAINED * rms).collect();
+    explained.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = explained.first().map_or(0.0, |own| own.1);
+    explained.into_iter().filter(|(_, left)| *left <= AS_GOOD * best).map(|(own, _)| own).collect()
+}
