@@ -161,13 +161,17 @@ impl Squares {
     }
 }
 
-/// Whether an effect that was named is the true one: family and place, orders among others, times within a few poses.
+/// Whether an effect that was named is the true one: family and place, orders among others, times within a few poses, time constants within a
+/// factor of two.
 pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     match (named, truth) {
         (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
             joint == own && wanted.iter().all(|order| orders.contains(order))
         }
         (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => (at_time - own).abs() < 900.0,
+        (Effect::TrackerSettling { time_constant }, Effect::TrackerSettling { time_constant: own }) => {
+            (time_constant / own).ln().abs() < std::f64::consts::LN_2
+        }
         _ => named == truth,
     }
 }

@@ -127,6 +127,12 @@ pub fn close_by(
     let mut rounds = Rounds::new(&data, options, first.effects());
     let declared = first.clone();
     let (fitted, harmonic_sigma, evidence) = chosen(&mut rounds, first)?;
+    // What was missing at first may have driven a parameter to where no step leads back from: such a fit begins anew.
+    let anew =
+        if fitted.found.is_trusted() { None } else { Some(Fitted::new(fitted.problem.clone(), &data, options)?) };
+    let anew = anew.filter(|anew| anew.found.is_trusted());
+    let evidence = evidence.filter(|_| anew.is_none());
+    let fitted = anew.unwrap_or(fitted);
     // Beside a fit that is not to be trusted nothing is found: its residual may be that of a mistake in the data.
     let trusted = fitted.found.is_trusted();
     let (fitted, harmonic_sigma, evidence) =
