@@ -12,3 +12,5 @@ mod bench;
 mod derivatives;
 #[path = "observations/recovery.rs"]
 mod recovery;
+#[path = "observations/results.rs"]
+mod results;

@@ -39,13 +39,19 @@ def closed_loop(result: ClosedLoop) -> str:
     )
 
 
+def _gain(entry: dict[str, Any]) -> str:
+    """What an effect takes off the error: a length, or of tilts an angle."""
+    length = entry.get("expected_gain_mm")
+    return f"{entry['expected_gain_deg']:.5f}°" if length is None else f"{length:.4f} mm"
+
+
 def trace(result: Trace) -> str:
     """Of a trace."""
     document = result.to_dict()
     facts = _facts(document["reduced_chi2"], f"{document['tried']} candidates tried")
     mean = _mm(document["held_out"])
     ranked = [
-        f"{escape(entry['description'])}: p {_probability(entry['p_value'])}, takes {entry['expected_gain_mm']:.4f} mm off the rms error"
+        f"{escape(entry['description'])}: p {_probability(entry['p_value'])}, takes {_gain(entry)} off the rms error"
         for entry in document["ranking"][:5]
     ]
     return _card(

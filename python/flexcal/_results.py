@@ -238,11 +238,11 @@ class Trace(_Result):
     @cached_property
     def ranking(self) -> pd.DataFrame:
         """Candidates, best first: ``effect``, ``description``, ``p_value`` (corrected for the candidates tried) and
-        ``expected_gain_mm`` (off the rms error of the poses fitted)."""
+        ``expected_gain_mm`` (off the rms error of the poses fitted; none where these are tilts)."""
         import pandas as pd
 
         names = ["effect", "description", "p_value", "expected_gain_mm"]
-        return pd.DataFrame([[entry[name] for name in names] for entry in self._document["ranking"]], columns=names)
+        return pd.DataFrame([[entry.get(name) for name in names] for entry in self._document["ranking"]], columns=names)
 
     def _repr_html_(self) -> str:
         return _html.trace(self)

@@ -155,7 +155,7 @@ fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hyp
         ranges: hypotheses.ranges(hypothesis),
         beyond: reached.iter().filter(|reached| !**reached).count(),
         cross_validated,
-        held_out: ErrorSummary::of(&errors),
+        held_out: ErrorSummary::of_rows(data.measurements, there.iter().copied(), &errors),
         curve: curve(&hypotheses, hypothesis, (&function, &left)),
     })
 }

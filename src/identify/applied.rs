@@ -44,9 +44,11 @@ pub struct Prediction {
 /// Errors of all rows, and of those of each session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorsBySession {
-    /// Of all rows.
+    /// Of all rows of the first kind that there is.
     pub all: ErrorSummary,
-    /// Of each session by its name, in the order of the rows; none where there are no sessions.
+    /// Of each kind, where there are several.
+    pub kinds: Vec<ErrorSummary>,
+    /// Of each session by its name, in the order of the rows, of the first kind that it has; none where there are no sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 
@@ -74,14 +76,20 @@ pub enum PredictError {
 impl ErrorsBySession {
     /// Of the errors measured − predicted of every row \[m\].
     pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
-        let kind = rows.leading();
+        let kinds = rows.kinds();
+        let of = |own: &[usize], errors: &[Vector3<f64>]| {
+            let first = own.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
+            of_kind(rows, own.iter().copied(), errors, first)
+        };
         let session = |(label, name): (usize, &String)| {
             let own = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
             let (own, errors): (Vec<usize>, Vec<Vector3<f64>>) = own.map(|row| (row, errors[row])).unzip();
-            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), of_kind(rows, own, &errors, kind)))
+            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), of(&own, &errors)))
         };
         let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
-        Self { all: of_kind(rows, 0..rows.len(), errors, kind), sessions }
+        let all: Vec<usize> = (0..rows.len()).collect();
+        let each = kinds.iter().filter(|_| kinds.len() > 1).map(|&kind| of_kind(rows, 0..rows.len(), errors, kind));
+        Self { all: of(&all, errors), kinds: each.collect(), sessions }
     }
 }
 
@@ -123,9 +131,19 @@ pub fn predict(
     if let Some(estimate) = estimate {
         estimate.count_time_in(&mut poses);
     }
+    // A point or surface that no row speaks of is nowhere needed.
+    let is_needed = |k: usize| {
+        let fixture = matches!(model.parameters[k].slot, Slot::Fixture { .. });
+        !fixture || poses.iter().any(|pose| uses(&model, pose, k))
+    };
+    missing.retain(|&k| is_needed(k));
     if !missing.is_empty() && rows.position_measured {
         if let Some(k) = too_few(&model, &poses, &missing) {
-            return Err(lacking(estimate, &model.parameters[k].name));
+            let name = &model.parameters[k].name;
+            return Err(match model.parameters[k].slot {
+                Slot::Fixture { .. } => PredictError::Open { name: name.clone() },
+                _ => lacking(estimate, name),
+            });
         }
         x = place(&model, &poses, &missing, x)?;
     } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
@@ -177,8 +195,11 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     let open: Vec<usize> = missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
     open.iter().copied().find(|&k| {
         let own: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
-        own.iter().map(|pose| pose.coordinates()).sum::<usize>()
-            < open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count()
+        let measured = own.iter().map(|pose| pose.coordinates()).sum::<usize>();
+        let unknown = open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count();
+        // Contacts that do no more than place a point would meet it exactly.
+        let placed_exactly = matches!(model.parameters[k].slot, Slot::Fixture { .. }) && measured == unknown;
+        measured < unknown || placed_exactly
     })
 }
 

@@ -70,9 +70,19 @@ pub(super) fn of_kind(
 }
 
 impl ErrorSummary {
+    /// Whether the errors are angles \[rad\], as those of tilts are.
+    pub fn is_angle(&self) -> bool {
+        self.kind == "tilt"
+    }
+
     /// Of the errors measured − predicted of positions \[m\].
     pub fn of(errors: &[Vector3<f64>]) -> Self {
         Self::of_kind(Observation::Position, errors)
+    }
+
+    /// Of some rows' residuals, measured − predicted: of those of the first kind that the table has.
+    pub fn of_rows(table: &Measurements, rows: impl IntoIterator<Item = usize>, errors: &[Vector3<f64>]) -> Self {
+        of_kind(table, rows, errors, table.leading())
     }
 
     /// Of the residuals of rows of one kind \[m\].

@@ -10,6 +10,7 @@ use super::outliers::Lengths;
 use super::prices::Prices;
 use super::stage::{Stage, StageError};
 use crate::least_squares::{Identifiability, Loss, Uncertainty};
+use crate::model::Pose;
 
 /// A part this large in unidentifiable combinations leaves an unknown without an error of its own.
 const PARTLY_BLIND: f64 = 1e-3;
@@ -63,7 +64,8 @@ impl Statistics {
         let aside = (0..lengths.values.len()).filter(|&place| !counts(place));
         let left_out = aside.map(|place| stage.poses[place].coordinates() as f64).sum::<f64>();
         if robust {
-            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, stage.coordinates(), freedom));
+            let each: Vec<usize> = stage.poses.iter().map(Pose::coordinates).collect();
+            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, &each, freedom));
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();

@@ -106,17 +106,46 @@ impl Loss {
 
     /// Variance of an estimate over that of its weighted Jacobian, from the whitened lengths of its residuals.
     ///
-    /// (JᵀWJ)⁻¹ · A w̄ / B², with A = Σ‖ρ′ r‖²/ν, w̄ the mean of ρ′ and B that of the curvature ∂²(½ρ)/∂r² over all
-    /// directions; ν are the degrees of freedom and `rows` the coordinates of an item  [Huber & Ronchetti 2009, sec. 7.6].
-    pub fn variance_factor(self, lengths: &[f64], rows: usize, freedom: f64) -> f64 {
-        if self == Self::Squares || lengths.is_empty() || freedom <= 0.0 {
+    /// (JᵀWJ)⁻¹ · A w̄ / B², with A = Σ‖ρ′ r‖²/ν, w̄ the mean of ρ′ and B that of the curvature ∂²(½ρ)/∂r² over all directions of
+    /// all items; ν are the degrees of freedom, and `coordinates` says how many numbers each item has: its directions
+    ///                                                                              [Huber & Ronchetti 2009, sec. 7.6].
+    pub fn variance_factor(self, lengths: &[f64], coordinates: &[usize], freedom: f64) -> f64 {
+        let directions = coordinates.iter().sum::<usize>() as f64;
+        if self == Self::Squares || directions <= 0.0 || freedom <= 0.0 {
             return 1.0;
         }
-        let (items, rows) = (lengths.len() as f64, rows as f64);
-        let mean = |of: &dyn Fn(f64) -> f64| lengths.iter().map(|&s| of(s)).sum::<f64>() / items;
-        let influence = mean(&|s| (self.weight(s) * s).powi(2)) * items / freedom;
-        let weight = mean(&|s| self.weight(s));
-        let curvature = ((rows - 1.0) * weight + mean(&|s| self.curvature(s))) / rows;
+        let sum = |of: &dyn Fn(f64, f64) -> f64| {
+            lengths.iter().zip(coordinates).map(|(&s, &own)| of(s, own as f64)).sum::<f64>()
+        };
+        let influence = sum(&|s, _| (self.weight(s) * s).powi(2)) / freedom;
+        let weight = sum(&|s, own| own * self.weight(s)) / directions;
+        // Along the residual the curvature is that of the loss, across it the weight.
+        let curvature = sum(&|s, own| (own - 1.0) * self.weight(s) + self.curvature(s)) / directions;
         influence * weight / (curvature * curvature)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against closed forms of A / B² over normal residuals of one and of two numbers, at thresholds where most of them are beyond.
+    #[test]
+    fn variance_of_rows_of_one_and_two_numbers() {
+        use statrs::distribution::{ContinuousCDF as _, Normal};
+        let normal = Normal::standard();
+        let parts = || (0..20_000).map(|k| (f64::from(k) + 0.5) / 20_000.0);
+        for (coordinates, threshold, expected) in [(1, 0.5, 1.2626), (2, 1.0, 1.1216)] {
+            let length = |part: f64| match coordinates {
+                1 => normal.inverse_cdf(0.5 + 0.5 * part),
+                _ => (-2.0 * (1.0 - part).ln()).sqrt(),
+            };
+            let lengths: Vec<f64> = parts().map(length).collect();
+            let loss = Loss::Huber { threshold };
+            let freedom = (coordinates * lengths.len()) as f64;
+            let factor = loss.variance_factor(&lengths, &vec![coordinates; lengths.len()], freedom);
+            let weight = lengths.iter().map(|&s| loss.weight(s)).sum::<f64>() / lengths.len() as f64;
+            assert!((factor / weight - expected).abs() < 2e-3, "{coordinates}: {}", factor / weight);
+        }
     }
 }

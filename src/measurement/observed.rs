@@ -10,7 +10,7 @@ use super::role::Role;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::fixture::unknown;
-use crate::problem::{KnownDistance, Observation, Problem};
+use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
 /// Something that a row measures, and its numbers \[m\]; those of a position are in its own columns.
 pub(super) struct Observed {
@@ -144,10 +144,12 @@ pub(super) fn complete(measurements: &mut Measurements, problem: &Problem) -> Re
         return Ok(());
     }
     let of_table = measurements.len();
-    let touched = |fixture: usize, all: &[Observation]| all.contains(&Observation::Point(fixture));
+    let touched = |&fixture: &usize, all: &[Observation]| {
+        let is_known = |own: &Fixture| own.known.iter().all(Option::is_some);
+        all.contains(&Observation::Point(fixture)) || problem.fixtures.get(fixture).is_some_and(is_known)
+    };
     for distance in &problem.distances {
-        let [first, second] = distance.between;
-        if touched(first, &measurements.observations) || touched(second, &measurements.observations) {
+        if distance.between.iter().all(|point| touched(point, &measurements.observations)) {
             measurements.add_known(distance, &problem.data.location.file);
         }
     }

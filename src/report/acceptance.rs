@@ -169,6 +169,7 @@ pub fn acceptance_page(
     record: &AcceptanceRecord,
 ) -> String {
     let head = Headline {
+        unit: "mm",
         states: vec![
             (BEFORE, short_mm(judged.before.mean.value)),
             ("as identified", short_mm(judged.after.mean.value)),

@@ -1,14 +1,14 @@
 //! What is told of rows that measure against points, anchors and surfaces.
 
 use super::document::{Block, Table};
-use super::errors::measure;
-use super::quantity::mm;
-use crate::identify::{ErrorSummary, Identification};
+use super::errors::{measure, shown};
+use super::quantity::{mm, number};
+use crate::identify::{ErrorSummary, Identification, PointSpread};
 
 /// Errors of every kind of rows where there are several, and the spread of the target at points.
 pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
     let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
-        let values = [before.rms.norm, after.rms.norm].map(|value| mm(value, 4));
+        let values = [before.rms.norm, after.rms.norm].map(|value| shown(after, value));
         [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()
     };
     let mut blocks = Vec::new();
@@ -33,7 +33,24 @@ pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
         let header = ["spread at points, mm", "", "rows", "before", "after"];
         let mut table = Table::new(&header, rows, &[0, 1]);
         table.notes.push("mean distance of the predicted target from its mean over the rows at one point".to_owned());
+        table.notes.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
         blocks.push(Block::Table(table));
     }
     blocks
+}
+
+/// What is to be said of points that spread far more than the others, a sentence each.
+pub(super) fn unsteady<'a>(all: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
+    let sentence = |(own, times): (&PointSpread, f64)| {
+        let [x, y, z] = [own.along.x, own.along.y, own.along.z].map(|value| number(value, 2));
+        format!(
+            "{} spreads by {} mm, {} times the median of all points, {} % of it along ({x}, {y}, {z}): what it is fixed to may have moved \
+             or given way",
+            own.point,
+            mm(own.mean, 3),
+            number(times, 1),
+            number(100.0 * own.share, 0),
+        )
+    };
+    PointSpread::unsteady(all).into_iter().map(sentence).collect()
 }

@@ -1,7 +1,9 @@
 //! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
 
+use super::around::unsteady;
 use super::closed_loop::{called, errors, quality_flag, set_aside, verdict};
 use super::document::{Block, Point};
+use super::errors::{both_parts, shown, unit};
 use super::findings;
 use super::identify::{errors_by_axis, headline, noise};
 use super::parameters::correlated;
@@ -54,6 +56,7 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
         let (n, error) = (counted(found.outliers.len(), "pose"), mm(own.error.norm(), 3));
         format!("{n} too far off to be noise, the farthest {}: {error} mm", own.location)
     }));
+    points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
     let unidentifiable = found.identifiability.unidentifiable.len();
     if unidentifiable > 0 {
         points.push(format!(
@@ -78,15 +81,13 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
 /// A loop on one screen of so many columns, ending in a line break: what it came to, what was found, and what remains.
 pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
     let text = |blocks: &[Block]| text_within(blocks, columns);
-    let poses = &closure.before.fit.fitted;
-    let (n, held_out) = (poses.identification.n, poses.held_out.n);
     let mut table = errors(closure);
     // Of the held-out poses, whose column of χ² is empty.
     table.rows.truncate(table.rows.len() / 2);
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     let mut blocks = vec![
-        Block::lines(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(n, "pose"))),
+        Block::lines(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
@@ -132,8 +133,10 @@ fn gain(closure: &ClosedLoop) -> String {
     if closure.effects.is_empty() || !gain.value.is_finite() {
         return chi2;
     }
-    let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| mm(value, 4));
-    format!("Gain on the held-out poses {value} mm in the mean (95 % interval {low} to {high} mm). {chi2}")
+    let of = &closure.after.fitted.held_out;
+    let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| shown(of, value));
+    let (rows, unit) = (if of.kind == "position" { "poses" } else { "rows" }, unit(of));
+    format!("Gain on the held-out {rows} {value} {unit} in the mean (95 % interval {low} to {high} {unit}). {chi2}")
 }
 
 /// What is left, in a sentence.

@@ -1,137 +1,27 @@
-//! What `loop` says and writes: what was found, before and after, and what remains.
+//! What `loop` says: what was found, before and after, and what remains.
 
 use std::fmt::Write as _;
 
 use super::document::{Block, Headline, Point, Table, code, some_of};
-use super::errors::{NOMINAL, mean_and_rms, row, unpredicted};
-use super::figures::{Figure, PlotData};
-use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, short_mm, size, spread, told, why_not_trusted};
-use super::json::{Both, Summary, object, to_text};
-use super::parameters::{lower_waves, parameters};
-use super::quantity::{counted, decimals, mm, number, or_dash, p_value};
-use super::render::{Report, report, text};
-use super::unexplained::{correction, place, size_alone, unexplained};
-use super::{effect, findings, trace};
-use crate::diagnose::{
-    ClosedLoop, Correction, Found, Interval, Round, SelectionRules, Trace, Unexplained, Verdict, Witness,
-    WitnessVerdict,
+use super::errors::{
+    NOMINAL, both_parts, held_out_rows, in_unit, mean_and_rms, measure, row, rows_of, shown, unit, unpredicted,
+    with_unit,
 };
-use crate::error::Location;
-use crate::identify::{ErrorSummary, Errors, Estimate, Identification};
-use crate::problem::{Effect, Problem};
+use super::figures::{Figure, PlotData};
+use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, size, spread, told, why_not_trusted};
+use super::parameters::{lower_waves, parameters};
+use super::quantity::{counted, decimals, number, or_dash, p_value};
+use super::render::{Report, report, text};
+use super::unexplained::{correction, size_alone, unexplained};
+use super::{effect, findings, trace};
+use crate::diagnose::{ClosedLoop, Found, Round, SelectionRules, Verdict, Witness, WitnessVerdict};
+use crate::identify::{ErrorSummary, Errors, Identification};
+use crate::problem::Problem;
 
 /// Alternatives that are named in words; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
 /// Candidates that a report shows.
 const SHOWN: usize = 8;
-
-object! {
-    Document<'a>(problem: &'a Problem, closure: &'a ClosedLoop) {
-        problem: &'a str = &problem.name,
-        verdict: &'static str = verdict_word(closure.verdict),
-        trusted: bool = closure.after.is_trusted(),
-        /// Whether structure in the residual could be tested for.
-        tested: bool = closure.findings.is_testable(),
-        registered: Both = Both::of(&closure.before.fit.registered),
-        before: FitEntry = FitEntry::of(&closure.before.fit),
-        after: FitEntry = FitEntry::of(&closure.after),
-        /// Mean reduction of the error on held-out poses.
-        held_out_gain_mm: IntervalEntry = IntervalEntry::of(&closure.gain),
-        effects: Vec<FoundEntry<'a>> = closure.effects.iter().map(|found| FoundEntry::of(found, closure)).collect(),
-        unexplained: Option<UnexplainedEntry> = closure.unexplained.first().map(|left| UnexplainedEntry::of(left, &closure.before)),
-        /// Rows too far off to be noise, which took no part in the choice of effects.
-        set_aside: Vec<RowEntry> = closure.set_aside.iter().map(RowEntry::of).collect(),
-        /// Further structure without a known law.
-        further: Vec<UnexplainedEntry> = closure.unexplained.iter().skip(1).map(|left| UnexplainedEntry::of(left, &closure.before)).collect(),
-        /// 1 σ of the prior that waves of joints were given \[rad\].
-        harmonic_prior_rad: Option<f64> = closure.harmonic_sigma,
-        steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
-        checks_before: Vec<findings::Entry> = findings::entries(&closure.before.findings),
-        checks_after: Vec<findings::Entry> = findings::entries(&closure.findings),
-    }
-}
-object! {
-    FitEntry(fit: &Identification) {
-        #[serde(flatten)]
-        errors: Both = Both::of(&fit.fitted),
-        reduced_chi2: Option<f64> = fit.reduced_chi2,
-    }
-}
-object! {
-    RowEntry(row: &Location) {
-        file: String = row.file.display().to_string(),
-        line: Option<usize> = row.line,
-    }
-}
-object! {
-    IntervalEntry(gain: &Interval) {
-        mean: f64 = gain.value * 1e3,
-        /// 95 of 100 such intervals hold the true one.
-        interval_95: [f64; 2] = [gain.low * 1e3, gain.high * 1e3],
-    }
-}
-object! {
-    FoundEntry<'a>(found: &'a Found, closure: &ClosedLoop) {
-        #[serde(flatten)]
-        effect: &'a Effect = &found.effect,
-        description: String = closure.before.describe(&found.effect),
-        claims: Option<trace::ClaimsEntry> = found.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, &closure.before)),
-        /// Part of fits to configurations drawn anew that name it.
-        stability: Option<f64> = found.stability,
-        /// What data that took no part say.
-        witness: Option<WitnessEntry<'a>> = found.witness.as_ref().map(WitnessEntry::of),
-        p_value: f64 = found.p_value,
-        parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
-        alternatives: &'a [Effect] = &found.alternatives,
-        held_out_after: Summary = Summary::of(&found.held_out_after),
-    }
-}
-object! {
-    WitnessEntry<'a>(own: &'a Witness) {
-        data: &'a str = &own.data,
-        says: &'static str = says(own),
-    }
-}
-object! {
-    ParameterEntry<'a>(estimate: &'a Estimate) {
-        name: &'a str = &estimate.name,
-        unit: &'static str = estimate.unit.symbol(),
-        estimate: f64 = estimate.estimate,
-        std_error: Option<f64> = estimate.std_error,
-    }
-}
-object! {
-    UnexplainedEntry(own: &Unexplained, trace: &Trace) {
-        #[serde(rename = "where")]
-        place: String = place(own),
-        depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
-        claims: Option<trace::ClaimsEntry> = own.claims.as_ref().map(|claims| trace::ClaimsEntry::of(claims, trace)),
-        p_value: f64 = own.p_value,
-        held_out_with_empirical_correction: Option<Summary> = own.correction.as_ref().map(|own| Summary::of(&own.held_out)),
-        correction: Option<CorrectionEntry> = own.correction.as_ref().map(CorrectionEntry::of),
-    }
-}
-object! {
-    CorrectionEntry(own: &Correction) {
-        /// Of each covariate that it depends on, SI; beyond it the correction keeps its last value.
-        ranges: Vec<(String, [f64; 2])> = own.ranges.iter().map(|(of, range)| (of.to_string(), (*range).into())).collect(),
-        held_out_beyond: usize = own.beyond,
-        /// Root mean squared error of poses left out in turn, before and with the correction.
-        cross_validated_rms_mm: [f64; 2] = [own.cross_validated.0 * 1e3, own.cross_validated.1 * 1e3],
-    }
-}
-object! {
-    StepEntry<'a>(step: &'a Round) {
-        effects: &'a [Effect] = &step.effects,
-        identification: Summary = Summary::of(&step.identification),
-        held_out: Summary = Summary::of(&step.held_out),
-    }
-}
-
-/// What the loop came to as JSON text, ending in a line break; SI units except where a key says otherwise.
-pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
-    to_text(&Document::of(problem, closure))
-}
 
 /// Rows that took no part in the choice of effects; nothing to say without any.
 pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
@@ -154,10 +44,8 @@ pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<B
 
 /// What the loop came to as text, ending in a line break.
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
-    let poses = &closure.before.fit.fitted;
-    let (n, held_out) = (poses.identification.n, poses.held_out.n);
     let mut blocks = vec![
-        Block::Text(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(n, "pose"))),
+        Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
@@ -191,8 +79,8 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let counts = format!(
         "{} from {}; {} held out, which took no part in any choice.",
         counted(fit.unknowns.len(), "parameter"),
-        counted(fit.fitted.identification.n, "pose"),
-        counted(fit.fitted.held_out.n, "pose")
+        rows_of(fit, |errors| errors.identification),
+        rows_of(fit, |errors| errors.held_out)
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
@@ -256,7 +144,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         None => (last, ""),
     };
     let gain = closure.gain;
-    let digits = decimals((gain.high - gain.low) * 1e3, 4).max(2);
+    let digits = decimals(in_unit(&last, gain.high - gain.low), 4).max(2);
     let mut facts = vec![
         ("Verdict", verdict_word(closure.verdict).replace('-', " ")),
         ("Effects found", closure.effects.len().to_string()),
@@ -266,22 +154,23 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         size("Residual after", after),
         ("Held out, after", spread(&last)),
     ];
-    facts.extend(correction.map(|_| ("Without the correction", format!("{} mm", short_mm(last.mean.norm)))));
+    facts.extend(correction.map(|_| ("Without the correction", format!("{} {}", mean(&last), unit(&last)))));
     facts.extend((!closure.effects.is_empty() && gain.value.is_finite()).then(|| {
-        let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| mm(value, digits));
-        ("Gain of the effects", format!("{value} mm, 95 % interval {low} to {high} mm"))
+        let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| number(in_unit(&last, value), digits));
+        let unit = unit(&last);
+        ("Gain of the effects", format!("{value} {unit}, 95 % interval {low} to {high} {unit}"))
     }));
     facts.extend((!problem.effects.is_empty()).then(|| ("Effects declared", problem.effects.len().to_string())));
-    let of = format!("{}{with}", counted(last.n, "held-out pose"));
+    let of = format!("{}{with}", held_out_rows(after));
     let mut states = vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
     if !closure.effects.is_empty() || correction.is_some() {
         states.push(("with what was found", mean(&best)));
     }
-    Headline { states, of, facts }
+    Headline { states, unit: unit(&last), of, facts }
 }
 
 /// What it came to, in a word.
-fn verdict_word(verdict: Verdict) -> &'static str {
+pub(super) fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::NothingFound => "nothing-found",
         Verdict::Explained => "explained",
@@ -369,7 +258,8 @@ pub(super) fn errors(closure: &ClosedLoop) -> Table {
     if closure.effects.is_empty() {
         rows.retain(|row| row[1] != "with what was found");
     }
-    Table { minor: vec![3, 4], ..Table::new(&["error, mm", "", "mean", "rms", "max", "χ²/ν"], rows, &[0, 1]) }
+    let header = [measure(&after.fitted.held_out), "", "mean", "rms", "max", "χ²/ν"];
+    Table { minor: vec![3, 4], ..Table::new(&header, rows, &[0, 1]) }
 }
 
 /// How the figures are to be read, with the gain and how sure it is.
@@ -383,17 +273,17 @@ fn gain(closure: &ClosedLoop) -> String {
     let unknown = unpredicted(&arms);
     let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
     let notes = [Some(chi2.to_owned()), another, unknown].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    let gain = closure.gain;
+    let (gain, of) = (closure.gain, &after.fitted.held_out);
     if closure.effects.is_empty() || !gain.value.is_finite() {
         return notes;
     }
     format!(
-        "What was found takes {} mm off the mean error of the {} held-out poses (95 % interval {} to {} mm). They took no \
-         part in any choice. {notes}",
-        mm(gain.value, 4),
-        closure.after.fitted.held_out.n,
-        mm(gain.low, 4),
-        mm(gain.high, 4),
+        "What was found takes {} off the mean error of the {} (95 % interval {} to {}). They took no part in any choice. \
+         {notes}",
+        with_unit(of, gain.value),
+        held_out_rows(after),
+        shown(of, gain.low),
+        with_unit(of, gain.high),
     )
 }
 
@@ -452,7 +342,7 @@ pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
 }
 
 /// What a witness says, in a word.
-fn says(own: &Witness) -> &'static str {
+pub(super) fn says(own: &Witness) -> &'static str {
     match own.says {
         WitnessVerdict::Corroborated => "corroborated",
         WitnessVerdict::Contradicted => "contradicted",
@@ -468,9 +358,11 @@ fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
         let effects: Vec<String> = step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
         let effects = if effects.is_empty() { "none".to_owned() } else { effects.join("; ") };
         let errors = [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm];
-        [vec![(k + 1).to_string(), effects], errors.map(|error| mm(error, 4)).to_vec()].concat()
+        [vec![(k + 1).to_string(), effects], errors.map(|error| shown(&step.held_out, error)).to_vec()].concat()
     };
-    let header = ["round", "effects in the model", "identification rms, mm", "held out mean", "held out rms"];
+    let is_angle = closure.after.fitted.held_out.is_angle();
+    let rms = if is_angle { "identification rms, °" } else { "identification rms, mm" };
+    let header = ["round", "effects in the model", rms, "held out mean", "held out rms"];
     let rows = closure.rounds.iter().enumerate().map(row).collect();
     vec![
         Block::heading("Rounds"),
@@ -490,10 +382,12 @@ fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
             or_dash(found.claims.as_ref(), |claims| share(claims.law.1)),
             or_dash(found.stability, share),
             or_dash(witness, |words| words),
-            mm(found.held_out_after.mean.norm, 4),
+            shown(&found.held_out_after, found.held_out_after.mean.norm),
         ]
     };
-    let header = ["effect", "p by chance", "law", "resampled", "data that took no part", "held out mean, mm"];
+    let is_angle = closure.after.fitted.held_out.is_angle();
+    let mean = if is_angle { "held out mean, °" } else { "held out mean, mm" };
+    let header = ["effect", "p by chance", "law", "resampled", "data that took no part", mean];
     let note = "law: its probability against every other at the same place; resampled: the share of weighings without a fifth of the poses \
                 that name it; held out mean: once it was in the model";
     let table = Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use serde::{Serialize, Serializer};
 
 use super::document::{Block, Headline, Table, code};
+use super::errors::unit;
 use super::figures::{Figure, PlotData};
 use super::identify::{
     BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder, short_mm, size,
@@ -139,6 +140,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
     let held_out = joint.fitted.held_out;
     let head = Headline {
         states: vec![(BEFORE, mean(&joint.registered.held_out)), ("identified", mean(&held_out))],
+        unit: unit(&held_out),
         of: format!("{} held-out poses, everything fitted at once", held_out.n),
         facts: vec![
             poses(joint),

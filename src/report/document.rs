@@ -83,8 +83,10 @@ pub(super) struct Bar {
 /// What it came to, at one glance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Headline {
-    /// States of the arm from the first to the last, each with its error \[mm\].
+    /// States of the arm from the first to the last, each with its error.
     pub states: Vec<(&'static str, String)>,
+    /// Unit of the errors.
+    pub unit: &'static str,
     /// Of what.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,

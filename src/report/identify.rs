@@ -6,7 +6,9 @@ use serde_json::value::{RawValue, to_raw_value};
 
 use super::around::around;
 use super::document::{Block, Headline, Table, first_of};
-use super::errors::{NOMINAL, measure, row, unpredicted};
+use super::errors::{
+    NOMINAL, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted, with_unit,
+};
 use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
@@ -167,7 +169,8 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     let held_out = found.fitted.held_out;
     let head = Headline {
         states: vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))],
-        of: counted(held_out.n, "held-out pose"),
+        unit: unit(&held_out),
+        of: held_out_rows(found),
         facts: vec![
             poses(found),
             fitted_parameters(found),
@@ -198,14 +201,13 @@ pub fn why_not_trusted(found: &Identification) -> String {
 
 /// What was fitted to what, and how it ended, in three lines.
 pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
-    let fitted = &found.fitted;
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     Block::lines(format!(
         "{}\n{} from {}, {} held out; strategy {}, solver {}{reason}\n{} after {}, {:.3} s",
         problem.title,
         counted(found.unknowns.len(), "parameter"),
         measured(found),
-        counted(fitted.held_out.n, "pose"),
+        rows_of(found, |errors| errors.held_out),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
@@ -221,7 +223,7 @@ pub(super) fn counts(found: &Identification) -> String {
         "{} from {}; {} held out. Strategy {}, solver {}: {}.{beware}",
         counted(found.unknowns.len(), "parameter"),
         measured(found),
-        counted(found.fitted.held_out.n, "pose"),
+        rows_of(found, |errors| errors.held_out),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
@@ -236,12 +238,8 @@ pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Blo
 
 /// What was fitted: several targets in one pose are points of it.
 fn measured(found: &Identification) -> String {
-    let points = found.fitted.identification.n;
-    if found.several_targets {
-        format!("{} in {}", counted(points, "point"), counted(found.poses, "different pose"))
-    } else {
-        counted(points, "pose")
-    }
+    let rows = rows_of(found, |errors| errors.identification);
+    if found.several_targets { format!("{rows} in {}", counted(found.poses, "different pose")) } else { rows }
 }
 
 fn steps(found: &Identification) -> String {
@@ -252,7 +250,7 @@ fn steps(found: &Identification) -> String {
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
         let values = [of.mean.x, of.mean.y, of.mean.z, of.mean.norm, of.rms.norm, of.max.norm];
-        [vec![poses.to_owned(), when.to_owned()], values.map(|value| mm(value, 4)).to_vec()].concat()
+        [vec![poses.to_owned(), when.to_owned()], values.map(|value| shown(of, value)).to_vec()].concat()
     };
     let (before, after) = (&found.registered, &found.fitted);
     let rows = vec![
@@ -352,10 +350,11 @@ pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
 
 /// How large the residual is against the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
+    let of = &found.fitted.identification;
     match (found.noise, found.reduced_chi2) {
         (Noise::Estimated(sigma), _) => format!(
-            "No σ is declared; the scatter about the fit gives {} mm per coordinate, model errors included.",
-            mm(sigma, 4)
+            "No σ is declared; the scatter about the fit gives {} per coordinate, model errors included.",
+            with_unit(of, sigma)
         ),
         (Noise::Unknown, _) => {
             "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors."
@@ -369,7 +368,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
         }
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
         (Noise::Declared, Some(chi2)) if contradicted(found) => {
-            let declared = problem.data.position_sigma.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, 4)));
+            let declared = problem.data.position_sigma.filter(|_| of.kind == "position");
+            let declared = declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, 4)));
             let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
             let chance = found.chance.map_or_else(String::new, |(low, high)| {
                 format!("; chance gives {} to {}", number(low, 2), number(high, 2))
@@ -381,9 +381,10 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             };
             format!(
                 "Reduced χ² is {}{chance}: the scatter is {size},\n\
-                 {cause}. Fit and standard errors take a σ of {} mm, which residual and priors speak for.",
+                 {cause}. Fit and standard errors take a σ of {} {}, which residual and priors speak for.",
                 short(chi2),
-                short_mm(found.sigma_taken)
+                brief(of, found.sigma_taken),
+                unit(of)
             )
         }
         (Noise::Declared, Some(chi2)) => {
@@ -442,7 +443,7 @@ fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> 
     } else {
         "they count in full; a section [robust] would limit them"
     };
-    let (n, poses) = (found.outliers.len(), found.fitted.identification.n);
+    let (n, poses) = (found.outliers.len(), rows_in(found, |errors| errors.identification));
     let point = |own: &Outlier| {
         format!("{}: {} mm, {} σ of the scatter", own.location, mm(own.error.norm(), 3), number(own.distance, 1))
     };
@@ -462,11 +463,13 @@ pub(super) const BEFORE: &str = "nominal arm";
 
 /// A mean error in a headline.
 pub(super) fn mean(of: &ErrorSummary) -> String {
-    short_mm(of.mean.norm)
+    brief(of, of.mean.norm)
 }
 
 pub(super) fn poses(found: &Identification) -> (&'static str, String) {
-    ("Poses", format!("{} fitted, {} held out", found.fitted.identification.n, found.fitted.held_out.n))
+    let (fitted, held_out) = (rows_in(found, |errors| errors.identification), rows_in(found, |errors| errors.held_out));
+    let what = if found.fitted.identification.kind == "position" { "Poses" } else { "Rows" };
+    (what, format!("{fitted} fitted, {held_out} held out"))
 }
 
 pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String) {
@@ -474,14 +477,19 @@ pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String
 }
 
 pub(super) fn spread(errors: &ErrorSummary) -> String {
-    format!("rms {} mm, largest {} mm", short_mm(errors.rms.norm), short_mm(errors.max.norm))
+    let [rms, max] =
+        [errors.rms.norm, errors.max.norm].map(|value| format!("{} {}", brief(errors, value), unit(errors)));
+    format!("rms {rms}, largest {max}")
 }
 
 /// How large the residual is, in brief.
 pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
     let size = match (found.noise, found.reduced_chi2) {
         (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", number(chi2, 2)),
-        (Noise::Estimated(sigma), _) => format!("{} mm per coordinate", short_mm(sigma)),
+        (Noise::Estimated(sigma), _) => {
+            let of = &found.fitted.identification;
+            format!("{} {} per coordinate", brief(of, sigma), unit(of))
+        }
         _ => "not to be judged".to_owned(),
     };
     (term, size)

@@ -66,9 +66,9 @@ object! {
         kind: Option<&'static str> = Some(summary.kind).filter(|kind| !matches!(*kind, "" | "position")),
         n: usize = summary.n,
         #[serde(flatten)]
-        lengths: Option<Lengths> = (summary.kind != "tilt").then(|| Lengths::of(summary)),
+        lengths: Option<Lengths> = (!summary.is_angle()).then(|| Lengths::of(summary)),
         #[serde(flatten)]
-        angles: Option<Angles> = (summary.kind == "tilt").then(|| Angles::of(summary)),
+        angles: Option<Angles> = summary.is_angle().then(|| Angles::of(summary)),
     }
 }
 object! {
@@ -76,6 +76,8 @@ object! {
     Spread(point: &PointSpread) {
         n: usize = point.n,
         mean_mm: f64 = point.mean * 1e3,
+        along: [f64; 3] = point.along.into(),
+        share: f64 = point.share,
     }
 }
 object! {
@@ -85,6 +87,9 @@ object! {
         held_out: bool = of.2,
         registered_mm: f64 = of.0.mean * 1e3,
         mean_mm: f64 = of.1.mean * 1e3,
+        /// Where the spread is largest, and the part of its squares there.
+        along: [f64; 3] = of.1.along.into(),
+        share: f64 = of.1.share,
     }
 }
 object! {

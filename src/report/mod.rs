@@ -24,6 +24,7 @@ mod identify;
 mod init;
 mod json;
 mod limits;
+mod loop_json;
 mod paper_tables;
 mod parameters;
 mod plan;
@@ -42,7 +43,7 @@ mod unexplained;
 pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
 pub use brief::{estimate_brief, loop_brief};
 pub use check::{check_json, check_text, why_not_sufficient};
-pub use closed_loop::{loop_json, loop_report, loop_text};
+pub use closed_loop::{loop_report, loop_text};
 pub use closed_problem::closed_problem;
 pub use columns::{Column, Columns, residual_columns, residuals_csv};
 pub use compare::{compare_json, compare_text, comparison_report};
@@ -55,6 +56,7 @@ pub use identify::{
     estimate_json, estimate_text, identification_report, joint_sources_text, lacks_something, why_not_trusted,
 };
 pub use init::{init_json, init_text};
+pub use loop_json::loop_json;
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
 pub use predict::{errors_json, prediction_text, predictions_csv};

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use super::around::unsteady;
 use super::columns::{self, Column};
 use super::document::{Block, Table};
+use super::errors::{measure, sizes};
 use super::json::{Spread, Summary, object, to_text};
-use super::quantity::{counted, mm};
+use super::quantity::counted;
 use super::render::text;
 use super::table;
 use crate::identify::{ErrorSummary, ErrorsBySession, PointSpread, Prediction};
@@ -16,6 +18,8 @@ use crate::problem::Problem;
 object! {
     Document<'a>(errors: &'a ErrorsBySession, spreads: &'a [PointSpread]) {
         all: Summary = Summary::of(&errors.all),
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        kinds: Vec<Summary> = errors.kinds.iter().map(Summary::of).collect(),
         sessions: BTreeMap<String, Summary> =
             errors.sessions.iter().map(|(name, own)| (name.clone(), Summary::of(own))).collect(),
         #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -62,13 +66,20 @@ pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) ->
         blocks.push(Block::lines(format!("Fitted to these rows, with the arm as it is: {names}")));
     }
     if let Some(errors) = &prediction.errors {
-        let row = |name: &str, of: &ErrorSummary| {
-            let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| mm(value, 4));
-            [vec![name.to_owned(), of.n.to_string()], values.to_vec()].concat()
+        let row =
+            |name: &str, of: &ErrorSummary| [vec![name.to_owned(), of.n.to_string()], sizes(of).to_vec()].concat();
+        let named = |(name, own): &(String, ErrorSummary)| {
+            let kind = if own.kind == errors.all.kind { String::new() } else { format!(": {}", measure(own)) };
+            row(&format!("session {name}{kind}"), own)
         };
         let mut rows = vec![row("all rows", &errors.all)];
-        rows.extend(errors.sessions.iter().map(|(name, own)| row(&format!("session {name}"), own)));
-        blocks.push(Block::Table(Table::new(&["error, mm", "poses", "mean", "rms", "max"], rows, &[0])));
+        rows.extend(errors.kinds.iter().skip(1).map(|own| row(measure(own), own)));
+        rows.extend(errors.sessions.iter().map(named));
+        blocks.push(Block::Table(Table::new(&[measure(&errors.all), "rows", "mean", "rms", "max"], rows, &[0])));
+    }
+    let unsteady = unsteady(&prediction.spreads);
+    if !unsteady.is_empty() {
+        blocks.push(Block::list(unsteady));
     }
     text(&blocks)
 }

@@ -94,6 +94,7 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
         or_dash(spread, |spread| mm(spread.mean, 3))
     };
     let head = Headline {
+        unit: "mm",
         states: vec![
             ("elasticity ignored", error(|own| own.rigid)),
             ("corrected formulas, stiffness known", error(|own| own.left(0, 0))),

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::document::{Block, Point, some_of};
-use super::errors::without_equilibrium;
+use super::errors::{held_out_rows, rows_of, with_unit, without_equilibrium};
 use super::json::{Both, object, to_text};
 use super::quantity::{counted, mm, number, p_value};
 use super::render::text;
@@ -54,16 +54,21 @@ object! {
         f: f64 = ranked.f.0,
         freedom: usize = ranked.f.1,
         /// Expected reduction of the root mean squared error on the identification poses.
-        expected_gain_mm: f64 = ranked.gain * 1e3,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        expected_gain_mm: Option<f64> = in_mm(trace, Some(ranked.gain)),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        expected_gain_deg: Option<f64> = in_degrees(trace, Some(ranked.gain)),
         /// The same on poses left out in turn.
-        cross_validated_gain_mm: Option<f64> = ranked.cross_validated.map(|gain| gain * 1e3),
+        cross_validated_gain_mm: Option<f64> = in_mm(trace, ranked.cross_validated),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        cross_validated_gain_deg: Option<f64> = in_degrees(trace, ranked.cross_validated),
         alike: Vec<AlikeEntry<'a>> = ranked.alike.iter().map(AlikeEntry::of).collect(),
         /// A pose that would tell it from the first of those.
-        told_apart: Option<ApartEntry<'a>> = ranked.telling_pose.as_ref().map(ApartEntry::of),
+        told_apart: Option<ApartEntry<'a>> = ranked.telling_pose.as_ref().map(|apart| ApartEntry::of(apart, trace)),
     }
 }
 object! {
-    ApartEntry<'a>(apart: &'a TellingPose) {
+    ApartEntry<'a>(apart: &'a TellingPose, trace: &Trace) {
         from: &'a Effect = &apart.other,
         /// Configuration \[rad\] or \[m\].
         q: &'a [f64] = &apart.configuration,
@@ -72,7 +77,10 @@ object! {
         hoist: Option<f64> = apart.hoist,
         #[serde(rename = "temperature_C")]
         temperature: Option<f64> = apart.temperature,
-        difference_mm: f64 = apart.difference * 1e3,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        difference_mm: Option<f64> = in_mm(trace, Some(apart.difference)),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        difference_deg: Option<f64> = in_degrees(trace, Some(apart.difference)),
     }
 }
 object! {
@@ -244,15 +252,15 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
 }
 
 fn headline(problem: &Problem, fit: &Identification) -> String {
-    let (fitted, held_out) = (&fit.fitted.identification, &fit.fitted.held_out);
+    let held_out = &fit.fitted.held_out;
     let size =
         fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", number(chi2, 2)));
     let error = match held_out.unpredicted {
         0 => format!(
-            "on {} the error is {} mm in the mean, rms {} mm",
-            counted(held_out.n, "held-out pose"),
-            mm(held_out.mean.norm, 4),
-            mm(held_out.rms.norm, 4),
+            "on {} the error is {} in the mean, rms {}",
+            held_out_rows(fit),
+            with_unit(held_out, held_out.mean.norm),
+            with_unit(held_out, held_out.rms.norm),
         ),
         _ => without_equilibrium(held_out, "held-out"),
     };
@@ -260,7 +268,7 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
         "{}\n{} from {}{size}; {error}",
         problem.title,
         counted(fit.unknowns.len(), "parameter"),
-        counted(fitted.n, "pose")
+        rows_of(fit, |errors| errors.identification)
     )
 }
 
@@ -304,13 +312,14 @@ pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_a
 }
 
 fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
+    let of = &trace.fit.fitted.identification;
     let mut gain = format!(
-        "p {}; would take {} mm off the rms error of the identification poses",
+        "p {}; would take {} off the rms error of the identification poses",
         p_value(ranked.p_value),
-        mm(ranked.gain, 4)
+        with_unit(of, ranked.gain)
     );
     if let Some(cross_validated) = ranked.cross_validated {
-        let _ = write!(gain, ", {} mm on poses left out in turn", mm(cross_validated, 4));
+        let _ = write!(gain, ", {} on poses left out in turn", with_unit(of, cross_validated));
     }
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {
@@ -321,9 +330,23 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     }
     if let Some(apart) = &ranked.telling_pose {
         let other = trace.describe(&apart.other);
-        details.push(format!("“{other}” would differ by {} mm at {}", mm(apart.difference, 4), pose(problem, apart)));
+        details.push(format!(
+            "“{other}” would differ by {} at {}",
+            with_unit(of, apart.difference),
+            pose(problem, apart)
+        ));
     }
     Point { text: effect::both(&ranked.effect, trace), details, mark: None }
+}
+
+/// An error of the rows that the fit is told of in mm, unless they are tilts.
+fn in_mm(trace: &Trace, value: Option<f64>) -> Option<f64> {
+    value.filter(|_| !trace.fit.fitted.identification.is_angle()).map(|value| value * 1e3)
+}
+
+/// The same in °, if they are.
+fn in_degrees(trace: &Trace, value: Option<f64>) -> Option<f64> {
+    value.filter(|_| trace.fit.fitted.identification.is_angle()).map(f64::to_degrees)
 }
 
 /// A pose in words: joints, payload, hoist, temperature.

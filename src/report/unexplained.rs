@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::document::code;
-use super::quantity::{mm, number, p_value};
+use super::errors::{shown, with_unit};
+use super::quantity::{number, p_value};
 use crate::diagnose::{ClosedLoop, Correction, Covariate, HELD_FIXED, Law, Part, REFUSED, Unexplained};
 use crate::problem::{JointKind, Problem};
 
@@ -106,14 +107,14 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
     let does = if held_out.rms.norm < before.rms.norm { "improves" } else { "does not improve" };
     let mut sentences = vec![format!(
-        "A smooth correction there {does} the prediction of held-out poses: mean {} to {} mm, rms {} to {} mm; of identification poses \
-         left out in turn rms {} to {} mm. It names no cause and is not part of {}.",
-        mm(before.mean.norm, 4),
-        mm(held_out.mean.norm, 4),
-        mm(before.rms.norm, 4),
-        mm(held_out.rms.norm, 4),
-        mm(*without, 4),
-        mm(*with, 4),
+        "A smooth correction there {does} the prediction of held-out poses: mean {} to {}, rms {} to {}; of identification poses \
+         left out in turn rms {} to {}. It names no cause and is not part of {}.",
+        shown(held_out, before.mean.norm),
+        with_unit(held_out, held_out.mean.norm),
+        shown(held_out, before.rms.norm),
+        with_unit(held_out, held_out.rms.norm),
+        shown(held_out, *without),
+        with_unit(held_out, *with),
         code("problem.closed.toml"),
     )];
     let range = |(covariate, range): &(Covariate, (f64, f64))| {

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use flexcal::identify::{Options, identify};
+use flexcal::least_squares::UnidentifiableCombination;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 
-use crate::bench::{ARM, AROUND, Bench, problem, read, true_arm};
+use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
 
 fn table(more: &str, rows: &str) -> String {
     let problem = problem(more);
@@ -83,6 +84,27 @@ fn what_contacts_cannot_tell_is_named() {
         assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
     }
     assert!(found.identifiability.unidentifiable.len() >= 6);
+}
+
+/// Distances to anchors on a line, wherever these are known to be, leave a turn of the base about the line open.
+#[test]
+fn collinear_anchors_leave_a_turn_of_the_base_open() {
+    let at = |(name, [x, y, z]): &(&str, [f64; 3])| format!("[[anchor]]\nname = \"{name}\"\nat_m = [{x}, {y}, {z}]\n");
+    let around: String = LINE.iter().map(at).collect();
+    let held_out = "held_out = { fraction = 0.2, seed = 1 }";
+    let own = format!("\"base.*\" = {{ free = true }}\n{around}[data]\ndistance_sigma_mm = 0.05\n{held_out}\n");
+    let problem = problem(&own);
+    let (arm, _) = true_arm(&problem, 2);
+    let data = read(&problem, &Bench::new(arm, 7).table(&["distance on a line"], 150));
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let named = |own: &UnidentifiableCombination| {
+        own.weights.iter().map(|&(k, _)| found.unknowns[k].clone()).collect::<Vec<String>>()
+    };
+    let all: Vec<Vec<String>> = found.identifiability.unidentifiable.iter().map(named).collect();
+    let of_base = |own: &&Vec<String>| own.iter().all(|name| name.starts_with("base."));
+    let open: Vec<&Vec<String>> = all.iter().filter(of_base).collect();
+    assert!(open.len() == 1 && open[0].contains(&"base.ry".to_owned()), "{all:?}");
+    assert_eq!(found.estimate("base.ry").unwrap().std_error, None);
 }
 
 #[test]

@@ -81,6 +81,9 @@ pub const RADIUS: f64 = 0.2;
 /// 1 σ of everything that is measured [m].
 const SIGMA: f64 = 5e-5;
 
+/// Anchors on a line.
+pub const LINE: [(&str, [f64; 3]); 3] = [("A", [1.5, 0.5, 1.2]), ("B", [1.5, -0.5, 1.2]), ("C", [1.5, -1.5, 1.2])];
+
 /// A problem with this arm.
 pub fn problem(more: &str) -> Problem {
     Problem::parse(&format!("{ARM}{more}"), Path::new("problem.toml")).unwrap()
@@ -207,8 +210,8 @@ impl Bench {
                 let place = Vector3::from(place) + Vector3::from_fn(|_, _| self.noise());
                 (self.contact(&|at| (at - place).as_slice().to_vec()), format!(",,,{name},,,,,,,"))
             }
-            "distance" => {
-                let (name, place) = ANCHORS[k % 2];
+            "distance" | "distance on a line" => {
+                let (name, place) = if kind == "distance" { ANCHORS[k % 2] } else { LINE[k % 3] };
                 let q = self.anywhere();
                 let length = (self.at(&q) - Vector3::from(place)).norm() + self.noise();
                 (q, format!(",,,,{name},{},,,,,", mm(length)))

@@ -159,12 +159,12 @@ fn headline(own: &Headline) -> Markup {
             @for (k, (label, error)) in own.states.iter().enumerate() {
                 @if k > 0 { span.arrow { "→" } }
                 span.state {
-                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { "mm" } } }
+                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { (own.unit) } } }
                     span.label { (label) }
                 }
             }
         }
-        p.under { "mean position error on " (own.of) }
+        p.under { "mean error on " (own.of) }
         dl.facts { @for (term, value) in &own.facts { div { dt { (term) } dd { (value) } } } }
     }
 }

@@ -1,0 +1,195 @@
+//! Error summaries of every kind of rows in every file of results, against residuals.csv.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use crate::bench::{ARM, AROUND, Bench, LINE, problem, true_arm};
+
+/// Runs a command in a folder; what it prints.
+fn run(folder: &Path, command: &str, out: &str, more: &[&str]) -> String {
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let assert = flexcal.current_dir(folder).args([command, ".", "--out", out]).args(more).assert().success();
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+fn json(folder: &Path, name: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
+}
+
+/// Lengths of the residuals of residuals.csv by kind of rows, part of the data and session \[mm\] or \[°\].
+struct Residuals(Vec<(&'static str, String, String, f64)>);
+
+impl Residuals {
+    fn read(folder: &Path, name: &str) -> Self {
+        let mut rows = csv::Reader::from_path(folder.join(name)).unwrap();
+        let of_row = |row: BTreeMap<String, String>| {
+            let cell = |name: &str| row.get(name).map(String::as_str).unwrap_or_default().to_owned();
+            let numbers: Vec<f64> = row
+                .iter()
+                .filter(|(name, _)| name.starts_with("residual_"))
+                .filter_map(|own| own.1.parse().ok())
+                .collect();
+            let kind = match () {
+                () if !cell("residual_tilt_x_deg").is_empty() => "tilt",
+                () if !cell("residual_offset_mm").is_empty() => "surface",
+                () if !cell("anchor").is_empty() => "distance",
+                () if !cell("residual_distance_mm").is_empty() => "known distance",
+                () if !cell("point").is_empty() => "point",
+                () => "position",
+            };
+            let length = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+            (kind, cell("held_out"), cell("session"), length)
+        };
+        Self(rows.deserialize().map(|row| of_row(row.unwrap())).collect())
+    }
+
+    /// The summary `err` is of the rows of `kind` for which `part` holds, given whether they are held out and their session.
+    fn agree(&self, err: &Value, kind: &str, part: impl Fn(&str, &str) -> bool, what: &str) {
+        let own: Vec<f64> =
+            self.0.iter().filter(|row| row.0 == kind && part(&row.1, &row.2)).map(|row| row.3).collect();
+        let n = own.len();
+        assert_eq!(err["n"], n, "{what}: {err}");
+        assert_eq!(err["kind"].as_str().unwrap_or("position"), kind, "{what}");
+        let mean = own.iter().sum::<f64>() / n.max(1) as f64;
+        let rms = (own.iter().map(|x| x * x).sum::<f64>() / n.max(1) as f64).sqrt();
+        let max = own.iter().copied().fold(0.0, f64::max);
+        let (unit, other) = if kind == "tilt" { ("deg", "mm") } else { ("mm", "deg") };
+        for (statistic, value) in [("mean", mean), ("max", max), ("rms", rms)] {
+            let told = err[format!("{statistic}_{unit}")]["norm"].as_f64().unwrap();
+            assert!((told - value).abs() < 5e-6, "{what}: {kind} {statistic} {told} {value}");
+            assert!(err.get(format!("{statistic}_{other}")).is_none(), "{what}: {err}");
+        }
+    }
+
+    /// Both parts of the data in `both` are of `kind`.
+    fn both_agree(&self, both: &Value, kind: &str, what: &str) {
+        self.agree(&both["identification"], kind, |held_out, _| held_out == "false", what);
+        self.agree(&both["held_out"], kind, |held_out, _| held_out == "true", what);
+    }
+}
+
+#[test]
+fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
+    let mixed = ["position", "point", "distance", "surface", "tilt"];
+    for (measured, kinds) in [
+        (&["position"][..], &mixed[..1]),
+        (&["point"], &mixed[1..2]),
+        (&["distance"], &mixed[2..3]),
+        (&["plane", "sphere"], &mixed[3..4]),
+        (&["tilt"], &mixed[4..]),
+        (&["position", "point", "distance", "plane", "sphere", "tilt"], &mixed[..]),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n")).unwrap();
+        let (arm, _) = true_arm(&problem(AROUND), 3);
+        // A session B holds every second row, or the tilts alone.
+        let session = |(k, line): (usize, &str)| match k {
+            0 => format!("{line},session\n"),
+            _ if kinds.len() == 1 => format!("{line},{}\n", ["A", "B"][k % 2]),
+            _ => format!("{line},{}\n", if line.contains("flange") { "B" } else { "A" }),
+        };
+        let table = Bench::new(arm, 5).table(measured, 120 / measured.len());
+        fs::write(folder.join("rows.csv"), table.lines().enumerate().map(session).collect::<String>()).unwrap();
+
+        let text = [
+            run(folder, "identify", "fit", &[]),
+            run(folder, "trace", "traced", &[]),
+            run(folder, "loop", "closed", &["-v"]),
+        ];
+        let left = Residuals::read(folder, "fit/residuals.csv");
+        let estimate = json(folder, "fit/estimate.json");
+        left.both_agree(&estimate, kinds[0], "estimate.json");
+        assert_eq!(estimate["registered"]["held_out"]["kind"], estimate["held_out"]["kind"]);
+
+        let all = json(folder, "closed/loop.json");
+        let after = Residuals::read(folder, "closed/residuals.csv");
+        after.both_agree(&all["after"], kinds[0], "loop.json");
+        for part in ["registered", "before"] {
+            for rows in ["identification", "held_out"] {
+                assert_eq!(all[part][rows]["kind"], estimate[rows]["kind"], "{part}");
+                assert_eq!(all[part][rows]["n"], estimate[rows]["n"], "{part}");
+            }
+        }
+        let is_angle = kinds == ["tilt"];
+        assert_eq!(all["held_out_gain_deg"].is_object(), is_angle);
+        assert_eq!(all["held_out_gain_mm"].is_object(), !is_angle);
+
+        run(folder, "predict", "there", &["--estimate", "fit/estimate.json"]);
+        let (errors, there) = (json(folder, "there/errors.json"), Residuals::read(folder, "there/residuals.csv"));
+        there.agree(&errors["all"], kinds[0], |_, _| true, "errors.json");
+        for (name, kind) in [("A", kinds[0]), ("B", kinds[kinds.len() - 1])] {
+            there.agree(&errors["sessions"][name], kind, |_, session| session == name, &format!("session {name}"));
+        }
+
+        // Several kinds: each in every file; the first in what is printed, with its number and unit.
+        let own = |file: &Value| file["kinds"].as_array().map_or(0, Vec::len);
+        let expected = if kinds.len() > 1 { kinds.len() + 1 } else { 0 };
+        let known = usize::from(kinds == ["point"]);
+        assert_eq!([own(&estimate), own(&all["after"])], [expected + 2 * known; 2], "{measured:?}");
+        assert_eq!(own(&errors), if kinds.len() > 1 { kinds.len() } else { 0 });
+        for (k, kind) in kinds.iter().enumerate().filter(|_| kinds.len() > 1) {
+            left.both_agree(&estimate["kinds"][k], kind, "estimate.json");
+            after.both_agree(&all["after"]["kinds"][k], kind, "loop.json");
+            there.agree(&errors["kinds"][k], kind, |_, _| true, "errors.json");
+        }
+        let n = [&estimate["identification"]["n"], &estimate["held_out"]["n"]];
+        for text in text {
+            let noun = match kinds {
+                ["point"] => "contacts with points",
+                ["distance"] => "distances",
+                ["surface"] => "contacts with surfaces",
+                ["tilt"] => "rows of tilts",
+                ["position"] => "poses",
+                _ => "positions",
+            };
+            assert!(text.contains(&format!("{} {noun}", n[0])), "{text}");
+            assert!(!is_angle || !text.contains(" mm"), "{text}");
+        }
+    }
+}
+
+/// What is measured against something that is not there, or by too little, ends with exit status 2 and where it stands.
+#[test]
+fn bad_references_end_with_status_2_and_write_nothing() {
+    let q = "0.1,0.2,0.3,0.4,0.5,0.6";
+    let header =
+        "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm,surface,frame,tilt_x_deg,tilt_y_deg";
+    let contacts: Vec<String> = (0..40).map(|k| format!("0.{k},{},left,,,,,,", &q[4..])).collect();
+    let contacts = contacts.join("\n");
+    let at = |(name, _): &(&str, [f64; 3])| format!("[[anchor]]\nname = \"{name}\"\n");
+    let around = format!("{}{AROUND}files = [\"rows.csv\"]\n", LINE[2..].iter().map(at).collect::<String>());
+    for (cells, words) in [
+        (",D,800,,,,", "rows.csv:42: column anchor: no anchor is called \"D\""),
+        (",,,wall,,,", "rows.csv:42: column surface: no surface is called \"wall\""),
+        (",,,,wrist,1,1", "rows.csv:42: column frame: no frame is called \"wrist\""),
+        ("top,,,,,,", "rows.csv:42: column point: the point \"top\" is measured by 1 row alone"),
+        (",C,800,,,,", "rows.csv:42: column anchor: the anchor \"C\" is measured by 1 row alone"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}")).unwrap();
+        fs::write(folder.path().join("rows.csv"), format!("{header}\n{contacts}\n{q},{cells}\n")).unwrap();
+        for command in ["identify", "loop", "trace", "predict"] {
+            // To predict, too few rows leave open where a point is.
+            let words = match cells {
+                "top,,,,,," if command == "predict" => {
+                    "point[top].x is not in the estimate, and its rows do not determine it"
+                }
+                ",C,800,,,," if command == "predict" => {
+                    "anchor[C].x is not in the estimate, and its rows do not determine it"
+                }
+                _ => words,
+            };
+            let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+            let assert = flexcal.current_dir(folder.path()).args([command, ".", "--out", "out"]).assert().code(2);
+            let error = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
+            let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(error.contains(words), "{command} {cells}: {error}");
+            assert!(!folder.path().join("out").exists(), "{command}");
+        }
+    }
+}
