@@ -47,7 +47,7 @@ struct Set {
     stated: usize,
     ghosts: usize,
     exact: bool,
-    close: bool,
+    close: [bool; 2],
 }
 
 fn judge(seed: u64) -> Set {
@@ -82,7 +82,7 @@ fn judge(seed: u64) -> Set {
         ghosts: stands.filter(|found| !true_law(&found.effect)).count(),
         exact: judged.places.iter().zip(&judged.chance).all(|(place, chance)| *place == Place::Found || *chance > 1e-4)
             && found.iter().all(|found| true_law(&found.effect)),
-        close: judged.after < 1.25 * judged.best,
+        close: [judged.best, judged.alike].map(|truth| judged.after < 1.25 * truth),
     }
 }
 
@@ -108,11 +108,12 @@ fn what_is_stated_is_as_true_as_it_is_probable() {
     let part = |of: &dyn Fn(&Set) -> bool| all.iter().filter(|set| of(set)).count();
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
     println!(
-        "{} of {} sets exact, {} with a ghost, {} within 1.25 of the truth declared",
+        "{} of {} sets exact, {} with a ghost, {} within 1.25 of the truth declared and stiffnesses apart, {} with them as declared",
         part(&|set| set.exact),
         all.len(),
         part(&|set| set.ghosts > 0),
-        part(&|set| set.close)
+        part(&|set| set.close[0]),
+        part(&|set| set.close[1])
     );
     let sure: Vec<Statement> = all.iter().flat_map(|set| set.laws.clone()).filter(|(p, _)| *p >= STATED).collect();
     let right = sure.iter().filter(|(_, right)| *right).count();

@@ -38,6 +38,8 @@ pub struct Judged {
     pub before: f64,
     pub after: f64,
     pub best: f64,
+    /// The last of the problem as it is declared, its `EI_y` and `EI_z` as one.
+    pub alike: f64,
 }
 
 impl Judged {
@@ -70,6 +72,7 @@ impl Judged {
             before: ratio(&closure.before.fit),
             after: ratio(&closure.after),
             best: full.held_out / NOISE,
+            alike: ratio(&identify(&with(problem, &all), &set.data, &Options::default()).unwrap()),
             closure,
         }
     }
@@ -136,9 +139,7 @@ impl Squares {
         for beam in problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
             beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
         }
-        let location = problem.data.location.clone();
-        let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
-        problem.effects = effects.iter().map(declare).collect();
+        let problem = with(problem, effects);
         let found = identify(&problem, &set.data, &Options::default()).unwrap();
         let errors = found.fitted.identification;
         let model = model_of(&problem, &set.data.measurements);
@@ -159,6 +160,14 @@ impl Squares {
         let f = (self.sum - full.sum).max(0.0) / more / (full.sum / full.freedom);
         FisherSnedecor::new(more, full.freedom).unwrap().sf(f)
     }
+}
+
+/// A problem with some effects declared.
+fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
+    let location = problem.data.location.clone();
+    let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
+    problem.effects = effects.iter().map(declare).collect();
+    problem
 }
 
 /// Whether an effect that was named is the true one: family and place, orders among others, times within a few poses, time constants within a
