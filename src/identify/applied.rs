@@ -13,8 +13,8 @@ use super::stage::{Stage, StageError};
 use super::surroundings::locate;
 use super::{ErrorSummary, Placement, SolverChoice};
 use crate::error::InputError;
-use crate::least_squares::Loss;
 use crate::least_squares::solver::Settings;
+use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
 use crate::model::{Model, Pose};
@@ -211,6 +211,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
     let registrable: Vec<Pose> = own.iter().filter(new_base).copied().collect();
     register(model, &registrable, &mut x);
     locate(model, &own, |k| missing.contains(&k), &mut x);
+    let memory = Memory::default();
     let stage = Stage {
         model,
         declared: own.iter().map(|pose| pose.sigma).collect(),
@@ -221,6 +222,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         max_steps: Settings::default().max_iterations,
         loss: Loss::Squares,
         counts_fixed: true,
+        memory: &memory,
         progress: None,
     };
     let placed = stage.run(&x)?.x;

@@ -11,8 +11,8 @@ use super::spread::{PointSpread, spreads};
 use super::stage::{Gauge, Stage, StageEnd, StageError};
 use super::surroundings::locate;
 use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Strategy};
-use crate::least_squares::Loss;
 use crate::least_squares::solver::{AtBound, Settings, Termination};
+use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
@@ -48,6 +48,8 @@ pub(super) struct Fitting<'a> {
     pub noise_model: NoiseModel,
     /// What it makes of the σ of orientations.
     pub turn_noise_model: NoiseModel,
+    /// Linearisations that its fits share.
+    pub memory: &'a Memory,
 }
 
 /// Where a fit ended.
@@ -123,6 +125,7 @@ impl<'a> Fitting<'a> {
             max_steps: Settings::default().max_iterations,
             loss: Loss::Squares,
             counts_fixed: false,
+            memory: self.memory,
             progress: self.progress,
         }
     }

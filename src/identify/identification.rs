@@ -19,7 +19,7 @@ use super::statistics::Statistics;
 use super::{Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
-use crate::least_squares::{Identifiability, Loss};
+use crate::least_squares::{Identifiability, Loss, Memory};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::effect::Columns;
@@ -199,7 +199,7 @@ pub fn identify_model(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
-    let clock = Instant::now();
+    let (clock, memory) = (Instant::now(), Memory::default());
     check_data(problem, data)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
@@ -222,6 +222,7 @@ pub fn identify_model(
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         noise_model: NoiseModel::DECLARED,
         turn_noise_model: NoiseModel::DECLARED,
+        memory: &memory,
     };
     let unknowns = fitted_parameters(&fitting)?;
     let start = fitting.registered()?;

@@ -88,9 +88,10 @@ fn contradicted(
     let several_kinds = poses.iter().any(|pose| pose.observation.kind() != poses[0].observation.kind());
     let count: usize = poses.iter().map(Pose::coordinates).sum();
     let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
+    let all = poses.len() == stage.poses.len();
     let residuals = stage.residuals_of(poses, &end.x);
     let x = residuals.reduced(&end.x);
-    let data = Fit::new(&residuals).linearise(&x);
+    let data = if all { stage.linearised(&end.x, Loss::Squares) } else { Fit::new(&residuals).linearise(&x) };
     let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
     let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
     let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);

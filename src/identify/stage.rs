@@ -1,5 +1,6 @@
 //! One least-squares fit of some parameters to some poses.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -13,7 +14,8 @@ use crate::least_squares::solver::{
     Solution,
 };
 use crate::least_squares::{
-    Fit, Identifiability, LinearRows, Loss, Objective as _, RowsError, Steadied, UnidentifiableCombination, Weak,
+    Fit, Identifiability, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied, Triangle,
+    UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
@@ -58,6 +60,8 @@ pub(super) struct Stage<'a> {
     pub loss: Loss,
     /// Whether constraints count that also speak of free parameters which do not vary here.
     pub counts_fixed: bool,
+    /// Linearisations that fits of the same data share.
+    pub memory: &'a Memory,
     pub progress: Option<&'a ProgressSink>,
 }
 
@@ -106,10 +110,44 @@ impl<'a> Stage<'a> {
         PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone())
     }
 
+    /// The whitened data linearised at `at`, each pose weighted by `loss`, priors left out.
+    pub fn linearised(&self, at: &DVector<f64>, loss: Loss) -> Linearisation {
+        let residuals = self.residuals(at);
+        self.remembered(&residuals, at, loss).linearise(&residuals.reduced(at))
+    }
+
+    /// A fit of the poses of this stage that shares its linearisations with others of the same.
+    fn remembered<'b>(
+        &'b self,
+        residuals: &'b PoseResiduals<'a>,
+        at: &DVector<f64>,
+        loss: Loss,
+    ) -> Fit<'b, PoseResiduals<'a>> {
+        Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at))
+    }
+
+    /// What tells this stage's data and unknowns, and the parameters that stay as in `at`, from those of others.
+    fn digest(&self, at: &DVector<f64>) -> u64 {
+        let mut digest = DefaultHasher::new();
+        let mut others = at.clone();
+        self.unknowns.iter().for_each(|&k| others[k] = 0.0);
+        self.unknowns.hash(&mut digest);
+        let mut put = |value: f64| digest.write_u64(value.to_bits());
+        others.iter().copied().for_each(&mut put);
+        for pose in &self.poses {
+            pose.setup.configuration.iter().chain(&pose.measured).copied().for_each(&mut put);
+            put(pose.setup.time);
+            put(pose.sigma);
+            put(pose.orientation.map_or(0.0, |own| own.sigma));
+            put(pose.base as f64);
+            put(pose.target as f64);
+        }
+        digest.finish()
+    }
+
     /// Triangular factor R of the whitened data at `at`, priors left out.
     pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
-        let residuals = self.residuals(at);
-        Fit::new(&residuals).linearise(&residuals.reduced(at)).triangle
+        self.linearised(at, Loss::Squares).triangle
     }
 
     /// How far each unknown may plausibly go, where no prior says so.
@@ -119,8 +157,7 @@ impl<'a> Stage<'a> {
 
     /// The same, each pose weighted as the loss does.
     pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
-        let residuals = self.residuals(at);
-        Fit::new(&residuals).with_loss(self.loss).linearise(&residuals.reduced(at)).triangle
+        self.linearised(at, self.loss).triangle
     }
 
     /// The same with the rows of the priors below.
@@ -166,20 +203,25 @@ impl<'a> Stage<'a> {
             i => active[i - seen].row[j].signum() * f64::from(active[i - seen].row[j] != 0.0) * data.column(j).norm(),
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
-        let seen = stacked.qr().unpack_r().select_columns(&free);
-        let found = Identifiability::of(&seen);
+        let seen = Triangle::of(&stacked.select_columns(&free));
+        let (unseen, outside) = if Identifiability::sees_all(&seen) {
+            (DMatrix::zeros(0, free.len()), vec![1.0; free.len()])
+        } else {
+            let found = Identifiability::of(&seen);
+            (found.gauge, found.visible)
+        };
         let all = self.sizes();
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
-        let weak = Weak::of(&below(&seen, &found.gauge), &sizes);
-        let unidentifiable = found.gauge.nrows();
+        let weak = Weak::of(&below(&seen, &unseen), &sizes);
+        let unidentifiable = unseen.nrows();
         let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
         let mut gauge = Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
         for (j, &k) in free.iter().enumerate() {
-            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&found.gauge.column(j));
-            gauge.visible[k] = found.visible[j];
+            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&unseen.column(j));
+            gauge.visible[k] = outside[j];
             if let Some(weak) = &weak {
                 gauge.rows.view_mut((unidentifiable, k), (count - unidentifiable, 1)).copy_from(&weak.rows.column(j));
-                gauge.visible[k] = found.visible[j].min(weak.visible[j]);
+                gauge.visible[k] = outside[j].min(weak.visible[j]);
             }
         }
         let named = |own: UnidentifiableCombination| UnidentifiableCombination {
@@ -234,7 +276,7 @@ impl<'a> Stage<'a> {
     /// Minimises from the unknowns `begin`, with the combinations in `gauge` held as in `hold`.
     fn solve(
         &self,
-        residuals: &PoseResiduals,
+        residuals: &PoseResiduals<'a>,
         begin: DVector<f64>,
         hold: &DVector<f64>,
         gauge: &Gauge,
@@ -242,8 +284,8 @@ impl<'a> Stage<'a> {
     ) -> Result<Solution, StageError> {
         let priors = self.priors();
         let none = DVector::zeros(priors.nrows());
-        let fit = Fit::new(residuals)
-            .with_loss(self.loss)
+        let fit = self
+            .remembered(residuals, &residuals.full(&begin), self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?;
         let sizes = self.sizes();
@@ -301,5 +343,5 @@ fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stack = triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
     stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
-    if rows.nrows() == 0 { stack } else { stack.qr().unpack_r() }
+    if rows.nrows() == 0 { stack } else { Triangle::of(&stack) }
 }

@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
 /// A scaled singular value below this part of the largest counts as zero.
@@ -60,6 +61,17 @@ impl Identifiability {
         let unidentifiable = named(null.clone(), &scaled);
         let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
         Self { singular_values, rank, unidentifiable, gauge, visible }
+    }
+
+    /// Whether the problem with triangular factor `triangle` sees every combination for certain: quicker to say than what it does
+    /// not see.
+    pub(crate) fn sees_all(triangle: &DMatrix<f64>) -> bool {
+        let mut unit = triangle.clone();
+        for mut column in unit.column_iter_mut() {
+            let norm = column.norm();
+            column.unscale_mut(norm);
+        }
+        regular_inverse(&unit, 2.0 * BLIND_BELOW).is_some()
     }
 
     /// Ratio of the largest singular value to the smallest that is not zero.

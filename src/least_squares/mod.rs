@@ -6,8 +6,10 @@
 mod curvature;
 mod derivative;
 mod identifiability;
+mod inverse;
 mod kernel;
 mod loss;
+mod memory;
 mod objective;
 mod singular;
 pub mod solver;
@@ -24,6 +26,7 @@ use nalgebra::{DMatrix, DVector};
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub use loss::Loss;
+pub use memory::Memory;
 pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;

@@ -6,13 +6,18 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::kernel::{dot, sum_of_squares};
-use super::{Block, LeastSquares, Linearisation, Loss, Objective, Triangle};
+use super::memory::Key;
+use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
 
 /// Part of a step over which the second derivative along it is taken.
 const BEND_STEP: f64 = 0.1;
+
+/// Rows, over the number of unknowns, that are absorbed chunk after chunk before factors are merged: merging two costs as much as
+/// absorbing half as many rows as there are unknowns.
+const ROWS_PER_UNKNOWN: usize = 4;
 
 /// Chunks whose factors exist at the same time.
 const GROUP_CHUNKS: usize = 64;
@@ -50,25 +55,34 @@ pub enum RowsError {
 
 /// A data problem with optional linear rows, ready for a solver.
 ///
-/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk is reduced to its own [`Triangle`] and the chunks are merged
-/// in order, so that the result is the same to the bit for any number of threads. One chunk alone never leaves its thread.
+/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns are many, is reduced to its own
+/// [`Triangle`], and these are merged in order, so that the result is the same to the bit for any number of threads. One chunk
+/// alone never leaves its thread.
 #[derive(Debug, Clone)]
 pub struct Fit<'a, P> {
     problem: &'a P,
     rows: Vec<LinearRows>,
     loss: Loss,
+    memory: Option<(&'a Memory, u64)>,
 }
 
 impl<'a, P: LeastSquares> Fit<'a, P> {
     /// The data problem alone.
     pub fn new(problem: &'a P) -> Self {
-        Self { problem, rows: Vec::new(), loss: Loss::Squares }
+        Self { problem, rows: Vec::new(), loss: Loss::Squares, memory: None }
     }
 
     /// Counts the residual of every item by `loss`; linear rows keep their squares.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.loss = loss;
+        self
+    }
+
+    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem from others that share it.
+    #[must_use]
+    pub fn remembering(mut self, memory: &'a Memory, data: u64) -> Self {
+        self.memory = Some((memory, data));
         self
     }
 
@@ -115,17 +129,40 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.loss.sum(out, self.problem.rows_per_item())
     }
 
-    fn chunk_triangle(&self, x: &DVector<f64>, index: usize, block: &mut Block) -> Triangle {
-        let items = self.chunk(index);
-        block.reshape(items.len() * self.problem.rows_per_item());
-        self.problem.linearise(x, items, block);
-        let robust = self.loss.weigh(block, self.problem.rows_per_item());
+    /// Chunks that are absorbed one after the other.
+    fn run_length(&self) -> usize {
+        let rows = CHUNK_ITEMS * self.problem.rows_per_item().max(1);
+        (ROWS_PER_UNKNOWN * self.problem.parameters()).div_ceil(rows).max(1)
+    }
+
+    /// The factor of a run of chunks.
+    fn run_triangle(&self, x: &DVector<f64>, run: usize, block: &mut Block) -> Triangle {
         let mut triangle = Triangle::new(self.problem.parameters());
-        triangle.absorb(block);
-        match robust {
-            Some(sum) => triangle.with_sum_of_squares(sum),
-            None => triangle,
+        let first = run * self.run_length();
+        for index in first..(first + self.run_length()).min(self.chunks()) {
+            let items = self.chunk(index);
+            block.reshape(items.len() * self.problem.rows_per_item());
+            self.problem.linearise(x, items, block);
+            let before = triangle.sum_of_squares();
+            let robust = self.loss.weigh(block, self.problem.rows_per_item());
+            triangle.absorb(block);
+            if let Some(sum) = robust {
+                triangle = triangle.with_sum_of_squares(before + sum);
+            }
         }
+        triangle
+    }
+
+    /// The factor of all data at x.
+    fn reduce(&self, x: &DVector<f64>) -> Triangle {
+        let mut total: Option<Triangle> = None;
+        let map = |run, block: &mut Block| self.run_triangle(x, run, block);
+        let take = |triangle: Triangle| match &mut total {
+            Some(total) => total.merge(&triangle),
+            None => total = Some(triangle),
+        };
+        in_order(self.chunks().div_ceil(self.run_length()), || self.empty_block(), map, take);
+        total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
     }
 
     /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
@@ -145,26 +182,25 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         moved.iter_mut().zip(&weights).for_each(|(bend, weight)| *bend *= weight);
         DVector::from_fn(n, |j, _| dot(block.column(j), &moved))
     }
+}
 
-    /// Maps every chunk, in parallel when there are several, and hands the results on in order.
-    fn in_order<B, T: Send>(
-        &self,
-        buffer: impl Fn() -> B + Sync + Send,
-        map: impl Fn(usize, &mut B) -> T + Sync + Send,
-        mut take: impl FnMut(T),
-    ) {
-        let chunks = self.chunks();
-        if chunks <= 1 {
-            (0..chunks).for_each(|index| take(map(index, &mut buffer())));
-            return;
-        }
-        for group in (0..chunks).step_by(GROUP_CHUNKS) {
-            let results: Vec<T> = (group..(group + GROUP_CHUNKS).min(chunks))
-                .into_par_iter()
-                .map_init(&buffer, |buffer, index| map(index, buffer))
-                .collect();
-            results.into_iter().for_each(&mut take);
-        }
+/// Maps every one of `count` chunks, in parallel when there are several, and hands the results on in order.
+fn in_order<B, T: Send>(
+    count: usize,
+    buffer: impl Fn() -> B + Sync + Send,
+    map: impl Fn(usize, &mut B) -> T + Sync + Send,
+    mut take: impl FnMut(T),
+) {
+    if count <= 1 {
+        (0..count).for_each(|index| take(map(index, &mut buffer())));
+        return;
+    }
+    for group in (0..count).step_by(GROUP_CHUNKS) {
+        let results: Vec<T> = (group..(group + GROUP_CHUNKS).min(count))
+            .into_par_iter()
+            .map_init(&buffer, |buffer, index| map(index, buffer))
+            .collect();
+        results.into_iter().for_each(&mut take);
     }
 }
 
@@ -176,7 +212,8 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     fn cost(&self, x: &DVector<f64>) -> f64 {
         let rows = self.problem.items().min(CHUNK_ITEMS) * self.problem.rows_per_item();
         let mut squares = 0.0;
-        self.in_order(|| vec![0.0; rows], |index, buffer| self.chunk_squares(x, index, buffer), |s| squares += s);
+        let map = |index, buffer: &mut Vec<f64>| self.chunk_squares(x, index, buffer);
+        in_order(self.chunks(), || vec![0.0; rows], map, |s| squares += s);
         for rows in &self.rows {
             squares += sum_of_squares((&rows.matrix * x + &rows.constant).as_slice());
         }
@@ -184,17 +221,10 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        let mut total: Option<Triangle> = None;
-        let map = |index, block: &mut Block| self.chunk_triangle(x, index, block);
-        self.in_order(
-            || self.empty_block(),
-            map,
-            |triangle| match &mut total {
-                Some(total) => total.merge(&triangle),
-                None => total = Some(triangle),
-            },
-        );
-        let mut total = total.unwrap_or_else(|| Triangle::new(self.problem.parameters()));
+        let mut total = match self.memory {
+            Some((memory, data)) => memory.recall(&Key { data, loss: self.loss, x: x.clone() }, || self.reduce(x)),
+            None => self.reduce(x),
+        };
         for rows in &self.rows {
             total.absorb(&mut linear_block(rows, x));
         }
@@ -218,7 +248,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         let mut total = DVector::zeros(x.len());
         let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);
-        self.in_order(|| self.empty_block(), map, |bend| total += bend);
+        in_order(self.chunks(), || self.empty_block(), map, |bend| total += bend);
         total.iter().all(|value| value.is_finite()).then_some(total)
     }
 }
@@ -299,5 +329,26 @@ mod tests {
         assert_eq!(linearisation.triangle.shape(), (2, 2));
         assert!((linearisation.cost / fit.cost(&x) - 1.0).abs() < 1e-12);
         assert_eq!(line.largest.load(Ordering::Relaxed), CHUNK_ITEMS);
+    }
+
+    #[test]
+    fn what_is_remembered_is_not_asked_for_again() {
+        let line = Line { points: 500, largest: AtomicUsize::new(0) };
+        let memory = Memory::default();
+        let (x, other) = (DVector::from_vec(vec![0.5, 1e-3]), DVector::from_vec(vec![0.5, 2e-3]));
+        let robust = Loss::Huber { threshold: 1.0 };
+        let asked = |x: &DVector<f64>, loss: Loss, data: u64| {
+            let fit = Fit::new(&line).with_loss(loss);
+            let plain = fit.linearise(x);
+            assert!((fit.cost(x) / plain.cost - 1.0).abs() < 1e-12);
+            line.largest.store(0, Ordering::Relaxed);
+            let found = fit.remembering(&memory, data).linearise(x);
+            assert_eq!((plain.triangle, plain.projected), (found.triangle, found.projected));
+            line.largest.load(Ordering::Relaxed) > 0
+        };
+        // The last two are kept; asked of anything else, the data are reduced.
+        assert!(asked(&x, Loss::Squares, 1));
+        assert!(!asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1));
+        assert!(asked(&x, Loss::Squares, 2) && asked(&other, Loss::Squares, 1) && asked(&x, Loss::Squares, 1));
     }
 }

@@ -33,6 +33,16 @@ impl Triangle {
         Self { parameters, rows: vec![0.0; parameters * (parameters + 1)], squares: 0.0 }
     }
 
+    /// The triangular factor of a matrix.
+    pub(crate) fn of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let (m, n) = matrix.shape();
+        let mut block = Block::zeros(m, n);
+        block.values[..m * n].copy_from_slice(matrix.as_slice());
+        let mut triangle = Self::new(n);
+        triangle.absorb(&mut block);
+        triangle.into_linearisation().triangle
+    }
+
     /// Number of unknowns n.
     pub fn parameters(&self) -> usize {
         self.parameters

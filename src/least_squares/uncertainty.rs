@@ -2,12 +2,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Triangle;
+use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
 /// Weight that turns gauge rows into constraints: their variance falls below rounding.
 const HARD: f64 = 1e5;
 /// Scaled singular values below this part of the largest carry no information.
 const NO_INFORMATION: f64 = 1e-13;
+/// Where no singular value is below this part of the largest, an inverse is exact enough.
+const WELL_CONDITIONED: f64 = 1e-6;
 
 /// Covariance of the unknowns of a fit, and what it rests on.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +67,7 @@ impl Uncertainty {
     }
 }
 
-/// (`AᵀA`)⁺ through the singular values of A with its columns scaled to unit norm.
+/// (`AᵀA`)⁺ through the triangular factor of A with its columns scaled to unit norm, or through its singular values.
 fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {
@@ -73,11 +77,15 @@ fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     for (mut column, scale) in a.column_iter_mut().zip(scale.iter()) {
         column.unscale_mut(*scale);
     }
-    let SingularValues { values, right: mut v } = SingularValues::of(&a);
-    let largest = values[0];
-    for (mut column, &value) in v.column_iter_mut().zip(&values) {
-        column.scale_mut(if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
-    }
+    let triangle = Triangle::of(&a);
+    let mut v = regular_inverse(&triangle, WELL_CONDITIONED).unwrap_or_else(|| {
+        let SingularValues { values, right: mut v } = SingularValues::of(&a);
+        let largest = values[0];
+        for (mut column, &value) in v.column_iter_mut().zip(&values) {
+            column.scale_mut(if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
+        }
+        v
+    });
     for (mut row, scale) in v.row_iter_mut().zip(scale.iter()) {
         row.unscale_mut(*scale);
     }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::identifiability::UnidentifiableCombination;
+use super::inverse::inverse_rows;
 use super::singular::SingularValues;
 use super::{Block, Linearisation, Objective, Triangle};
 
@@ -35,6 +36,11 @@ impl Weak {
         let n = triangle.ncols();
         let sized: Vec<(usize, f64)> = sizes.iter().enumerate().filter_map(|(j, size)| Some((j, (*size)?))).collect();
         if sized.is_empty() {
+            return None;
+        }
+        // ‖R₃⁻¹‖ of the scaled unknowns, from the rows of R⁻¹.
+        let inverse = inverse_rows(triangle, sized.iter().map(|&(j, size)| (j, size.recip())));
+        if inverse.is_some_and(|squares| squares.sqrt() * WEAK_BELOW < 1.0) {
             return None;
         }
         let others: Vec<usize> = (0..n).filter(|&j| sizes[j].is_none()).collect();

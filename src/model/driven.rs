@@ -1,6 +1,6 @@
 //! What adds to the joints' commands, pose by pose.
 
-use crate::model::parameter::{Driver, JointField, Parameter, Slot};
+use crate::model::parameter::{Driver, JointField, Parameter, Slot, Waves};
 use crate::problem::{Mimic, PoseView, Problem};
 
 /// A known addition to a joint's coordinate: value × driver.
@@ -63,8 +63,9 @@ impl Commands {
         }
         self.configuration.clear();
         self.configuration.extend_from_slice(setup.configuration);
+        let mut waves = Waves::default();
         for driven in &self.all {
-            self.configuration[driven.joint] += driven.value * driven.driver.value(setup);
+            self.configuration[driven.joint] += driven.value * waves.value(driven.driver, setup);
         }
         PoseView { configuration: &self.configuration, ..*setup }
     }

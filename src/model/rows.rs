@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::inputs::Input;
 use crate::least_squares::Block;
+use crate::model::parameter::Waves;
 use crate::problem::PoseView;
 
 /// Three rows of a block.
@@ -43,8 +44,9 @@ impl Rows<'_> {
         if let Some(column) = input.column {
             self.put(column, derivative);
         }
+        let mut waves = Waves::default();
         for &(column, driver) in &input.driven {
-            self.put(column, &(derivative * driver.value(commanded)));
+            self.put(column, &(derivative * waves.value(driver, commanded)));
         }
     }
 }

@@ -67,6 +67,11 @@ impl Factor {
         self.spectrum().solution(lambda, n)
     }
 
+    /// By how much the minimiser of ‖B q + c‖² + λ‖q‖² moves where its gradient is larger by g; nothing where B lacks rank.
+    pub fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
+        self.pivoted.as_ref()?.response(gradient, lambda)
+    }
+
     /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
         if let Some(found) = self.pivoted.as_ref().and_then(|pivoted| pivoted.limited(radius)) {
@@ -121,6 +126,19 @@ mod tests {
             assert!((step.norm() / (fraction * full) - 1.0).abs() <= RADIUS_SLACK + 1e-12);
             let normal = matrix.tr_mul(&(&matrix * &step + &constant)) + lambda * &step;
             assert!(normal.norm() <= 1e-10 * factor.gradient().norm());
+        }
+    }
+
+    #[test]
+    fn responses_are_differences_of_solutions() {
+        let (matrix, constant) = example(6);
+        let more = DVector::from_fn(6, |i, _| 0.3 - i as f64);
+        for (matrix, lambda) in [(matrix.clone(), 0.0), (matrix.clone(), 0.7), (matrix.transpose(), 0.2)] {
+            let mut first = Factor::new(matrix.clone(), constant.clone(), 1e-13);
+            let mut second = Factor::new(matrix.clone(), &constant + &more, 1e-13);
+            let expected = second.damped(lambda) - first.damped(lambda);
+            let found = first.response(&matrix.tr_mul(&more), lambda).unwrap();
+            assert!((found - &expected).norm() < 1e-9 * expected.norm());
         }
     }
 

@@ -5,12 +5,17 @@ use nalgebra::{DMatrix, DVector};
 use super::{Factor, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
 
+/// Unknowns from which on steps are bent in curved valleys: a bend takes derivatives that are not reduced, and reducing them is then nearly
+/// all of the work of a step.
+const MANY: usize = 100;
+
 /// Levenberg–Marquardt in its trust-region form, for unknowns without bounds.
 ///
 /// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0            [Moré 1978]
 ///
 /// Needs an [`Objective`](crate::least_squares::Objective); solved from the n × n factor of J alone. Redundant unknowns are
-/// allowed: what the data cannot see does not move.
+/// allowed: what the data cannot see does not move. Of many unknowns steps that miss their forecast follow the bend of the way
+/// [Transtrum & Sethna 2012].
 pub fn levenberg_marquardt(settings: Settings) -> TrustRegion<Unconstrained> {
     TrustRegion::new(Unconstrained::default(), settings)
 }
@@ -19,6 +24,8 @@ pub fn levenberg_marquardt(settings: Settings) -> TrustRegion<Unconstrained> {
 #[derive(Debug, Clone, Default)]
 pub struct Unconstrained {
     model: Option<Model>,
+    /// The last step.
+    straight: DVector<f64>,
 }
 
 /// The linearised problem in scaled unknowns q = D p: B = R D⁻¹.
@@ -83,9 +90,23 @@ impl Subproblem for Unconstrained {
         gradient
     }
 
+    fn bends_freely(&self) -> bool {
+        self.model.as_ref().is_some_and(|model| model.scale.len() >= MANY)
+    }
+
+    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+        let Model { factor, scale } = self.model.as_ref()?;
+        let turned = factor.response(&(0.5 * bend.component_div(scale)), damping)?;
+        Some(x + &self.straight + turned.component_div(scale))
+    }
+
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         match &mut self.model {
-            Some(model) => model.unbounded_step(x, radius),
+            Some(model) => {
+                let step = model.unbounded_step(x, radius);
+                self.straight = &step.point - x;
+                step
+            }
             None => Step::none(x),
         }
     }

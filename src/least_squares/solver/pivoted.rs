@@ -4,11 +4,15 @@ use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
 
 use super::settings::RADIUS_SLACK;
 use crate::least_squares::Triangle;
+use crate::least_squares::inverse::regular_inverse;
 
 /// Newton steps allowed to the secular equation before the singular values are asked.
 const SECULAR_ITERATIONS: usize = 20;
+/// A triangle none of whose singular values is below this part of the largest needs no pivots.
+const WELL_CONDITIONED: f64 = 1e-8;
 
-/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B.
+/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B. Well-conditioned upper triangles B are their own
+/// factor.
 #[derive(Debug, Clone)]
 pub(super) struct Pivoted {
     /// R.
@@ -37,6 +41,11 @@ impl Pivoted {
                 column /= size;
                 *inverse = size.recip();
             }
+        }
+        if tolerance <= WELL_CONDITIONED && regular_inverse(&unit, WELL_CONDITIONED).is_some() {
+            let (projected, permutation) = (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
+            let solution = solve(&unit, &projected, &inverse_sizes)?;
+            return Some(Self { triangle: unit, projected, inverse_sizes, permutation, solution });
         }
         let qr = unit.col_piv_qr();
         let triangle = qr.r();
@@ -80,6 +89,21 @@ impl Pivoted {
             triangle = damped.triangle;
         }
         None
+    }
+
+    /// −(`BᵀB` + λ)⁻¹ g.
+    pub(super) fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
+        let mut q = gradient.clone();
+        self.permutation.permute_rows(&mut q);
+        q.component_mul_assign(&self.inverse_sizes);
+        let damped = (lambda > 0.0).then(|| {
+            Triangle::damped(&self.triangle, &self.projected, &(&self.inverse_sizes * lambda.sqrt())).triangle
+        });
+        let triangle = damped.as_ref().unwrap_or(&self.triangle);
+        let solved = triangle.tr_solve_upper_triangular_mut(&mut q) && triangle.solve_upper_triangular_mut(&mut q);
+        q.component_mul_assign(&self.inverse_sizes);
+        let found = self.in_order(-q);
+        (solved && found.iter().all(|value| value.is_finite())).then_some(found)
     }
 
     fn in_order(&self, mut q: DVector<f64>) -> DVector<f64> {

@@ -83,6 +83,11 @@ impl SecondOrder {
         worked
     }
 
+    /// Takes in what a step gained over its forecast, where S is not wanted.
+    pub fn watch(&mut self, ratio: f64) {
+        self.misses += usize::from(!FORECAST.contains(&ratio));
+    }
+
     /// Takes in a step of length ‖D p‖; whether S should be formed at the point where the solver is now.
     pub fn judge(&mut self, ratio: f64, taken: bool, (length, damping): (f64, f64), unknowns: usize) -> bool {
         let near = self.matrix.is_some() && damping == 0.0;

@@ -73,6 +73,11 @@ pub trait Subproblem {
         false
     }
 
+    /// Whether steps may be bent although no constraint changes them.
+    fn bends_freely(&self) -> bool {
+        false
+    }
+
     /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x that a step against the scaled
     /// gradient would leave.
     fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
@@ -381,6 +386,9 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         }
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
+            if self.subproblem.bends_freely() {
+                self.second_order.watch(trial.ratio);
+            }
             let renew = self.subproblem.is_confined()
                 && self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping), x.len());
             if renew {

@@ -172,6 +172,46 @@ impl Driver {
     }
 }
 
+/// The values of many drivers in one pose: a wave takes its sine and cosine from the one before it where their orders follow each other.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Waves {
+    /// Joint and order of the last wave, with its sine and cosine.
+    last: Option<(usize, u32, (f64, f64))>,
+    /// sin q and cos q of that joint, once needed.
+    first: Option<(f64, f64)>,
+}
+
+impl Waves {
+    /// The value of a driver in the pose that all others were of.
+    #[inline]
+    pub fn value(&mut self, driver: Driver, setup: &PoseView) -> f64 {
+        match driver {
+            Driver::Sine(joint, order) => self.wave(joint, order, setup).0,
+            Driver::Cosine(joint, order) => self.wave(joint, order, setup).1,
+            other => other.value(setup),
+        }
+    }
+
+    /// sin kq and cos kq.
+    fn wave(&mut self, joint: usize, order: u32, setup: &PoseView) -> (f64, f64) {
+        let q = setup.configuration[joint];
+        let wave = match self.last {
+            Some((own, last, wave)) if own == joint && last == order => return wave,
+            Some((own, last, (sin, cos))) if own == joint && last + 1 == order => {
+                let (by_sin, by_cos) = *self.first.get_or_insert_with(|| q.sin_cos());
+                (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
+            }
+            _ => {
+                let wave = (f64::from(order) * q).sin_cos();
+                self.first = (order == 1).then_some(wave);
+                wave
+            }
+        };
+        self.last = Some((joint, order, wave));
+        wave
+    }
+}
+
 /// The uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
 fn cubic(u: f64) -> f64 {
     let v = 2.0 - (u - 2.0).abs();
@@ -225,6 +265,23 @@ mod tests {
                 let slope = driver.slope(&PoseView::of(&[0.2, q]), 1);
                 assert!((slope - expected).abs() < 1e-8, "{driver:?} at {q}: {slope}, not {expected}");
             }
+        }
+    }
+
+    #[test]
+    fn waves_that_follow_each_other_are_those_by_themselves() {
+        let setup = PoseView::of(&[0.7, -2.3]);
+        let mut waves = Waves::default();
+        let orders = (1..=60).chain([3, 4, 4, 9]);
+        for (order, joint) in orders.flat_map(|order| [(order, 1), (order, 1), (order, order as usize % 2)]) {
+            for driver in [Driver::Sine(joint, order), Driver::Cosine(joint, order), Driver::Command(joint)] {
+                let (found, expected) = (waves.value(driver, &setup), driver.value(&setup));
+                assert!((found - expected).abs() < 1e-13, "{driver:?}: {found}, not {expected}");
+            }
+        }
+        let mut waves = Waves::default();
+        for driver in (1..=60).flat_map(|order| [Driver::Sine(0, order), Driver::Cosine(0, order)]) {
+            assert!((waves.value(driver, &setup) - driver.value(&setup)).abs() < 1e-13);
         }
     }
 

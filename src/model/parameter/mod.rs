@@ -9,6 +9,7 @@ mod name;
 mod resolve;
 
 pub use constraint::{LinearConstraint, constrain};
+pub(crate) use driver::Waves;
 pub use driver::{Driver, Quantity};
 pub use name::{ArmField, BeamField, JointField, Slot};
 pub use resolve::{EffectParameter, resolve};
