@@ -176,7 +176,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
-    assert_eq!(written, 14);
+    assert_eq!(written, 16);
 }
 
 #[test]
