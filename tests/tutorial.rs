@@ -234,7 +234,7 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
             let truth = root.join("problems/panda/TRUTH.toml");
             let measure = format!("flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig", truth.display());
             printed(&measure, folder.path());
-            fs::copy(folder.path().join("rig/measurements.csv"), folder.path().join("measurements.csv")).unwrap();
+            fs::copy(folder.path().join("rig/measurements.csv"), folder.path().join("panda/measurements.csv")).unwrap();
         }
     }
     let [init, check, found, _, exported] = said.as_slice() else { panic!("{commands:?}") };
