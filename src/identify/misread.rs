@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::Placement;
 use super::fitting::Fitting;
+use crate::least_squares::Memory;
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::{JointKind, Problem};
@@ -103,8 +104,18 @@ impl Misreading {
         };
         let placement = &Placement::of(rows);
         let held_out_only = placement.held_out_only(model, rows, split);
-        let fitting =
-            Fitting { model, measurements: &mended, split, placement, held_out_only, turn_sigma: None, ..*fitting };
+        // Linearisations of another model are not those of this one.
+        let memory = &Memory::default();
+        let fitting = Fitting {
+            model,
+            measurements: &mended,
+            split,
+            placement,
+            held_out_only,
+            turn_sigma: None,
+            memory,
+            ..*fitting
+        };
         let registered = fitting.registered().ok()?;
         Some(fitting.errors(&registered).identification.rms.norm)
     }
