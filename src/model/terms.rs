@@ -82,7 +82,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
     let driven = match parameter.driver {
         Driver::Command(joint)
         | Driver::Travel(joint)
-        | Driver::LoadedSide(joint)
+        | Driver::LoadedSide { joint, .. }
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
         | Driver::Spline { of: Quantity::Command(joint), .. }

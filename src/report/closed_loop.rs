@@ -22,13 +22,14 @@ use crate::problem::Problem;
 const SHOWN_ALTERNATIVES: usize = 4;
 /// Candidates that a report shows.
 const SHOWN: usize = 8;
+/// Rows that are named of those that took no part.
+const SHOWN_ROWS: usize = 3;
 
 /// Rows that took no part in the choice of effects; nothing to say without any.
 pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
-    const SHOWN: usize = 3;
     let rows = &closure.set_aside;
-    let named: Vec<String> = rows.iter().take(SHOWN).map(ToString::to_string).collect();
-    let more = if rows.len() > SHOWN { format!(" and {} more", rows.len() - SHOWN) } else { String::new() };
+    let (named, more) = some_of(rows.iter().map(ToString::to_string), SHOWN_ROWS);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let treatment = if problem.robust.is_some() {
         "The robust loss keeps the fit from such rows"
     } else {

@@ -36,7 +36,7 @@ impl Rig {
                 }
                 (Effect::PayloadBacklash { joint }, [width]) if *joint == number => {
                     let sides = conditions.approach.as_ref().and_then(|sides| sides.get(number - 1));
-                    let payload = conditions.payload.unwrap_or(0.0);
+                    let payload = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
                     sides.map_or(0.0, |side| payload * width * side / 2.0)
                 }
                 (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),

@@ -136,7 +136,7 @@ impl Hypothesis {
 /// The same of a parameter that two covariates drive, too.
 fn covariates(slot: Slot, driver: Driver, problem: &Problem, known: (bool, bool)) -> Vec<Covariate> {
     match driver {
-        Driver::LoadedSide(joint) => vec![Covariate::Approach(joint), Covariate::Payload],
+        Driver::LoadedSide { joint, .. } => vec![Covariate::Approach(joint), Covariate::Payload],
         _ => vec![covariate(slot, driver, problem, known)],
     }
 }

@@ -10,7 +10,12 @@ pub(super) const FAMILY: Family = Family {
     name: "payload-backlash",
     terms: |effect, problem| match effect {
         Effect::PayloadBacklash { joint } => {
-            vec![Term::driven("width", Slot::coordinate(problem, *joint), Driver::LoadedSide(joint - 1), 0.01)]
+            vec![Term::driven(
+                "width",
+                Slot::coordinate(problem, *joint),
+                Driver::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass },
+                0.01,
+            )]
         }
         _ => Vec::new(),
     },

@@ -32,7 +32,12 @@ pub enum Driver {
     /// 1 − exp(−t/τ), t since the first pose, of a time constant τ \[s\].
     Settling(f64),
     /// Half the payload, with the sign of the direction from which a joint came \[kg\]; 0 where that is not known.
-    LoadedSide(usize),
+    LoadedSide {
+        /// The joint.
+        joint: usize,
+        /// Payload that the problem declares \[kg\]: that of poses of which none is known.
+        declared: f64,
+    },
     /// One of the problem's own covariates, counted from 0, in its unit.
     Covariate(usize),
     /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
@@ -108,9 +113,9 @@ impl Driver {
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
             Self::Settling(time_constant) => -(-setup.elapsed / time_constant).exp_m1(),
-            Self::LoadedSide(joint) => {
+            Self::LoadedSide { joint, declared } => {
                 let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                0.5 * setup.payload.unwrap_or(0.0) * side
+                0.5 * setup.payload.unwrap_or(declared) * side
             }
             Self::Covariate(which) => Quantity::Covariate(which).value(setup),
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
@@ -161,7 +166,7 @@ impl Driver {
             | Self::Elapsed
             | Self::Since(_)
             | Self::Settling(_)
-            | Self::LoadedSide(_)
+            | Self::LoadedSide { .. }
             | Self::Covariate(_) => false,
         }
     }
@@ -242,6 +247,15 @@ fn cubic_slope(u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pose_of_unknown_payload_carries_the_declared_one() {
+        let driver = Driver::LoadedSide { joint: 1, declared: 3.0 };
+        let sides = [1.0, -1.0];
+        let pose = PoseView { approach: Some(&sides), ..PoseView::of(&[0.0, 0.0]) };
+        assert!((driver.value(&pose) + 1.5).abs() < 1e-15);
+        assert!((driver.value(&PoseView { payload: Some(2.0), ..pose }) + 1.0).abs() < 1e-15);
+    }
 
     #[test]
     fn slopes_are_those_of_the_values() {

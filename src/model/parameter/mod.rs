@@ -68,8 +68,8 @@ pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
     match (driver, slot.unit()) {
         (Driver::Warming { .. }, Unit::Angle) => Unit::AnglePerDegree,
         (Driver::Warming { .. }, _) => Unit::LengthPerDegree,
-        (Driver::LoadedSide(_), Unit::Angle) => Unit::AnglePerMass,
-        (Driver::LoadedSide(_), _) => Unit::LengthPerMass,
+        (Driver::LoadedSide { .. }, Unit::Angle) => Unit::AnglePerMass,
+        (Driver::LoadedSide { .. }, _) => Unit::LengthPerMass,
         (Driver::Elapsed, _) => Unit::Speed,
         (Driver::Covariate(_), Unit::Angle) => Unit::AnglePerUnit,
         (Driver::Covariate(_), _) => Unit::LengthPerUnit,

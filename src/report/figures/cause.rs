@@ -223,7 +223,7 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
         }
         Effect::PayloadBacklash { joint } => {
             let across = Quantity::new(format!("half the payload × side from which joint {joint} came [kg]"), 1.0);
-            let driver = Driver::LoadedSide(joint - 1);
+            let driver = Driver::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
             let sides = rows.poses.iter().map(|pose| driver.value(pose)).collect();
             (joint, across, sides, lever(joint), Box::new(move |side| first * side))
         }
