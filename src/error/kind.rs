@@ -100,6 +100,12 @@ pub enum InputErrorKind {
     BeamWithoutLength,
     #[error("a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")")]
     BeamInStandardForm,
+    #[error("a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")")]
+    NotInStandardForm,
+    #[error("joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on")]
+    StandsOnLater { joint: usize, parent: u64 },
+    #[error("the branch of joint {parent} has ended; list everything that stands on a joint right behind it")]
+    BranchEnded { parent: u64 },
     #[error("a fixed joint follows no other; leave mimic out, or give the joint another kind")]
     FixedFollows,
     #[error("joint {joint} takes no command of its own that another could follow")]
@@ -112,8 +118,10 @@ pub enum InputErrorKind {
     RepeatedBeamName { name: String },
 
     // What is measured against.
-    #[error("\"{name}\" cannot name a fixture, for parameters go by it; leave out . * [ ] and spaces")]
-    NotAFixtureName { name: String },
+    #[error("\"{name}\" cannot name {what}, for parameters go by it; leave out . * [ ] and spaces")]
+    NotAFixtureName { what: &'static str, name: String },
+    #[error("the rows name no target; each of them measures one of {}: add a column target", targets.join(", "))]
+    TargetsUnnamed { targets: Vec<String> },
     #[error("another {what} is called \"{name}\" (line {line}); choose another name")]
     RepeatedFixture { what: &'static str, name: String, line: usize },
     #[error("no {what} is called \"{name}\"{}; {}", meant(name, known), list("there are", known, "none is declared"))]

@@ -101,16 +101,16 @@ pub(super) fn of_row(
     }
 }
 
-/// The frame that a cell names: `base`, a joint by its name, or `joint3`; the last one without a word.
+/// The frame that a cell names: `base`, a joint by its name, or `joint3`; that of the tool without a word.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
-    let Some(place) = place else { return Ok(problem.joints.len()) };
+    let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     let word = table.name(place)?;
     let named = || problem.joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
     let numbered =
         || word.strip_prefix("joint")?.parse().ok().filter(|number| (1..=problem.joints.len()).contains(number));
     match word {
         "base" => Ok(0),
-        "tool" => Ok(problem.joints.len()),
+        "tool" => Ok(problem.tool.joint + 1),
         _ => named().or_else(numbered).ok_or_else(|| {
             let joints = problem.joints.iter().map(|joint| joint.name.clone());
             let known = std::iter::once("base".to_owned()).chain(joints).chain(["tool".to_owned()]).collect();

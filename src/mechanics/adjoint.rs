@@ -6,6 +6,9 @@
 //! the Λ-weighted axes of all sections inwards of it; a section adds what its own place and axes do to its moment. A segment's
 //! derivative is then the work of that wrench on the segment's twist. For the moments themselves this is Λ again, so that Λ
 //! is a fixed point of the sweep, reached by the same contraction as the equilibrium itself.
+//!
+//! Where branches meet, the wrenches of all of them add up. A branch without the target carries the virtual forces of its loads
+//! alone: that is how its masses, by bending the trunk, move the target of another.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,7 +17,7 @@ use super::tape::{Column, Each, Felt, Load, Section, Step, Tape};
 use crate::spatial::Frame;
 
 /// The wrench about the base origin that does the coordinates' change as virtual work.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Virtual {
     force: Each,
     moment: Each,
@@ -67,6 +70,7 @@ impl Tape {
     fn weigh_loads(&mut self) {
         let Self { steps, loads, influence, .. } = self;
         let mut weights = [Vector3::zeros(); 3];
+        let mut forks = Vec::new();
         let weigh = |load: &mut Load, weights: &Each| load.virtually = weights.each_ref().map(|w| load.force.cross(w));
         for step in steps {
             match step {
@@ -78,20 +82,33 @@ impl Tape {
                     let own = section.weights(influence);
                     (0..3).for_each(|i| weights[i] += own[i]);
                 }
+                Step::Fork { further } => forks.extend((0..*further).map(|_| weights)),
+                Step::Branch => weights = forks.pop().unwrap_or(weights),
             }
         }
     }
 
-    /// From the target to the base.
+    /// From the tips, the target among them, to the base.
     fn adjoint_sweep(&mut self, at: &Vector3<f64>, sought: Sought) {
-        let Self { steps, loads, columns, moves, influence, image, derivatives, stride, .. } = self;
+        let Self { steps, target, loads, columns, moves, influence, image, derivatives, stride, .. } = self;
         image.fill(0.0);
-        let unit = Frame::identity().axes;
-        let mut wrench = Virtual { force: unit, moment: unit.map(|axis| at.cross(&axis)) };
-        for step in steps.iter().rev() {
+        let (mut wrench, mut branches) = (Virtual::default(), Vec::new());
+        for (index, step) in steps.iter().enumerate().rev() {
+            if index + 1 == *target {
+                wrench.add(at, &Frame::identity().axes);
+            }
             match step {
                 Step::Load(load) => wrench.add(&loads[*load].at, &loads[*load].virtually),
                 Step::Section(section) => section.act(influence, &mut wrench),
+                Step::Branch => branches.push(std::mem::take(&mut wrench)),
+                Step::Fork { further } => {
+                    for branch in (0..*further).filter_map(|_| branches.pop()) {
+                        for i in 0..3 {
+                            wrench.force[i] += branch.force[i];
+                            wrench.moment[i] += branch.moment[i];
+                        }
+                    }
+                }
                 Step::Segment(segment) => {
                     let own = &loads[segment.loads.clone()];
                     let work = |lane: usize| {

@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 
 use super::imperfection::Rope;
 use super::joint::Joint;
-use crate::problem::{Equilibrium, PoseView, Problem};
+use crate::problem::{Equilibrium, PoseView, Problem, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// A serial arm with its parameters as scalars S; predicts in its own base frame.
+/// An arm, or several on one trunk, with its parameters as scalars S; predicts in its own base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm<S> {
     /// Gravity, arm base frame [m/s²].
@@ -17,9 +17,13 @@ pub struct Arm<S> {
     pub equilibrium: Equilibrium,
     /// Closed-form elements per beam.
     pub beam_elements: usize,
-    /// Joints from the base outwards.
+    /// Joints from the base outwards, branch by branch.
     pub joints: Vec<Joint<S>>,
-    /// Where a payload hangs, last frame \[m\].
+    /// How they stand on each other.
+    pub tree: Tree,
+    /// Index of the joint whose frame carries a payload; `None`: the last one.
+    pub payload_on: Option<usize>,
+    /// Where a payload hangs, in that frame \[m\].
     pub payload_at: Vector3<f64>,
     /// Payload where the pose gives none \[kg\].
     pub payload_mass: f64,
@@ -43,6 +47,8 @@ impl Arm<f64> {
             equilibrium: problem.statics.equilibrium,
             beam_elements: problem.statics.beam_elements,
             joints: problem.joints.iter().map(Joint::nominal).collect(),
+            tree: problem.tree(),
+            payload_on: Some(problem.tool.joint),
             payload_at: problem.tool.payload_at,
             payload_mass: problem.tool.payload_mass,
             payload_error: 0.0,
@@ -60,6 +66,8 @@ impl Arm<f64> {
             equilibrium: self.equilibrium,
             beam_elements: self.beam_elements,
             joints: self.joints.iter().map(Joint::lift).collect(),
+            tree: self.tree.clone(),
+            payload_on: self.payload_on,
             payload_at: self.payload_at,
             payload_mass: self.payload_mass,
             payload_error: S::from(self.payload_error),
@@ -83,11 +91,18 @@ impl<S: Scalar> Arm<S> {
         setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
     }
 
-    /// The last frame of the arm that does not deflect, arm base frame.
-    pub(crate) fn rigid_frame(&self, setup: &PoseView) -> Frame<S> {
+    /// Index of the last joint.
+    pub(crate) fn last(&self) -> usize {
+        self.joints.len().saturating_sub(1)
+    }
+
+    /// The frame of the joint `tip` of the arm that does not deflect, arm base frame.
+    pub(crate) fn rigid_frame(&self, setup: &PoseView, tip: usize) -> Frame<S> {
         let mut frame = Frame::identity();
-        for (joint, &q) in self.joints.iter().zip(setup.configuration) {
-            joint.advance(&mut frame, q);
+        for (index, (joint, &q)) in self.joints.iter().zip(setup.configuration).enumerate() {
+            if self.tree.leads_through(index, tip) {
+                joint.advance(&mut frame, q);
+            }
         }
         frame
     }
@@ -96,13 +111,18 @@ impl<S: Scalar> Arm<S> {
     /// frame.
     pub fn rigid_joints(&self, configuration: &[f64]) -> Vec<(Vector3<S>, Vector3<S>, Frame<S>)> {
         let mut frame = Frame::identity();
-        let along = |(joint, &q): (&Joint<S>, &f64)| {
+        let mut forks = vec![frame; self.tree.further_on_base()];
+        let along = |(index, (joint, &q)): (usize, (&Joint<S>, &f64))| {
+            if self.tree.begins_branch(index) {
+                frame = forks.pop().unwrap_or(frame);
+            }
             let mut root = frame;
             joint.root(&mut root);
             joint.advance(&mut frame, q);
+            forks.extend((0..self.tree.further_on(index)).map(|_| frame));
             (root.origin, root.axes[2], frame)
         };
-        self.joints.iter().zip(configuration).map(along).collect()
+        self.joints.iter().zip(configuration).enumerate().map(along).collect()
     }
 
     /// Payload of a pose \[kg\].

@@ -1,4 +1,4 @@
-//! The forward pass from the base to the tip: frames, loads, and the sections whose moments bend something.
+//! The forward pass from the base to the tips, branch by branch: frames, loads, and the sections whose moments bend something.
 
 use nalgebra::Vector3;
 
@@ -34,6 +34,8 @@ struct Walk<'a, S> {
     frame: Frame<S>,
     /// Index of the next unknown moment.
     next: usize,
+    /// The joint whose frame is sought.
+    tip: usize,
 }
 
 impl<S: Scalar> Walk<'_, S> {
@@ -75,6 +77,24 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
+    /// Takes note of a place from which `further` branches begin besides the next one.
+    fn fork(&self, further: usize, ws: &mut Workspace<S>) {
+        if further > 0 {
+            ws.forks.extend((0..further).map(|_| self.frame));
+            if self.records() {
+                ws.events.push(Event::Fork { further });
+            }
+        }
+    }
+
+    /// Goes back to the last such place that has a branch left.
+    fn branch(&mut self, ws: &mut Workspace<S>) {
+        self.frame = ws.forks.pop().unwrap_or(self.frame);
+        if self.records() {
+            ws.events.push(Event::Branch);
+        }
+    }
+
     fn records(&self) -> bool {
         !matches!(self.bend, Bend::FirstOrder(_))
     }
@@ -95,8 +115,16 @@ impl<S: Scalar> Arm<S> {
         }));
         ws.beyond.clear();
         ws.beyond.resize(self.joints.len(), zero);
-        let (mut mass, mut hoisted) = (self.payload(setup), zero);
-        for ((joint, beyond), rope) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).rev() {
+        ws.weights.clear();
+        let (mut mass, mut hoisted) = (S::from(0.0), zero);
+        for (index, ((joint, beyond), rope)) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev() {
+            for (more, pull) in (0..self.tree.further_on(index)).filter_map(|_| ws.weights.pop()) {
+                mass += more;
+                hoisted += pull;
+            }
+            if index == self.payload_joint() {
+                mass += self.payload(setup);
+            }
             mass += joint.bodies.iter().map(|body| body.mass).sum::<f64>();
             *beyond = self.gravity * mass + hoisted;
             if let Some(beam) = &joint.beam {
@@ -106,7 +134,16 @@ impl<S: Scalar> Arm<S> {
                 }
                 hoisted += rope;
             }
+            if self.tree.begins_branch(index) {
+                ws.weights.push((mass, hoisted));
+                (mass, hoisted) = (S::from(0.0), zero);
+            }
         }
+    }
+
+    /// Index of the joint whose frame carries a payload.
+    fn payload_joint(&self) -> usize {
+        self.payload_on.unwrap_or_else(|| self.last())
     }
 
     /// Force of a rope \[N\].
@@ -124,9 +161,12 @@ impl<S: Scalar> Arm<S> {
         self.rope.as_ref().map_or(0, |_| 2 * hoists().count())
     }
 
-    /// Walks to the last frame, arm base frame.
-    pub(super) fn walk(&self, setup: &PoseView, bend: Bend<S>, ws: &mut Workspace<S>) -> Frame<S> {
-        let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns() };
+    /// Walks through all branches; returns the frame of the joint `tip`, arm base frame.
+    pub(super) fn walk(&self, setup: &PoseView, bend: Bend<S>, tip: usize, ws: &mut Workspace<S>) -> Frame<S> {
+        let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
+        let mut found = walk.frame;
+        ws.forks.clear();
+        ws.passed = 0;
         ws.events.clear();
         ws.hooks.clear();
         ws.cuts.clear();
@@ -139,7 +179,11 @@ impl<S: Scalar> Arm<S> {
         }
         ws.frames.clear();
         ws.keep(&walk.frame);
+        walk.fork(self.tree.further_on_base(), ws);
         for (i, joint) in self.joints.iter().enumerate() {
+            if self.tree.begins_branch(i) {
+                walk.branch(ws);
+            }
             joint.begin(&mut walk.frame);
             if matches!(bend, Bend::Rigid) {
                 ws.rigid_roots.push(walk.frame);
@@ -150,7 +194,7 @@ impl<S: Scalar> Arm<S> {
             walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             if let Some(beam) = &joint.beam {
                 self.walk_beam(beam, i, &mut walk, ws);
-            } else {
+            } else if self.tree.leads_through(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
             if let Some(lateral) = &joint.lateral {
@@ -166,7 +210,9 @@ impl<S: Scalar> Arm<S> {
                 slip = joint.slip(approach);
             }
             joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
-            ws.trail.push(walk.frame.origin);
+            if self.tree.leads_through(i, tip) {
+                ws.trail.push(walk.frame.origin);
+            }
             ws.keep(&walk.frame);
             walk.cut(Segment::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
             if walk.records() {
@@ -175,13 +221,20 @@ impl<S: Scalar> Arm<S> {
                     ws.events.push(Event::Load { at: walk.frame.point(&body.at.map(S::from)), force });
                 }
             }
+            if i == self.payload_joint() {
+                let payload = self.payload(setup);
+                if walk.records() && payload.re() != 0.0 {
+                    let at = walk.frame.point(&self.payload_at.map(S::from));
+                    ws.events.push(Event::Load { at, force: self.gravity * payload });
+                }
+            }
+            if i == tip {
+                found = walk.frame;
+                ws.passed = ws.events.len();
+            }
+            walk.fork(self.tree.further_on(i), ws);
         }
-        let payload = self.payload(setup);
-        if walk.records() && payload.re() != 0.0 {
-            let at = walk.frame.point(&self.payload_at.map(S::from));
-            ws.events.push(Event::Load { at, force: self.gravity * payload });
-        }
-        walk.frame
+        found
     }
 
     /// Walks along the beam of joint `link`, element by element.
@@ -243,7 +296,9 @@ impl<S: Scalar> Arm<S> {
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
             }
-            trail.push(walk.frame.origin);
+            if self.tree.leads_through(link, walk.tip) {
+                trail.push(walk.frame.origin);
+            }
         }
     }
 

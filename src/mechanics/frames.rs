@@ -22,7 +22,7 @@ impl Arm<Dual64> {
     ) -> Vec<Frame<Dual64>> {
         ws.keeps_frames = true;
         self.gather_forces(setup, &[], ws);
-        self.walk(setup, Bend::Rigid, ws);
+        self.walk(setup, Bend::Rigid, rest.tip, ws);
         ws.sum_moments();
         let mut moments = ws.next_moments.clone();
         if !self.is_elastic() || moments.is_empty() {
@@ -31,7 +31,7 @@ impl Arm<Dual64> {
         let mut first_order = None;
         if self.equilibrium == Equilibrium::Undeflected {
             self.lean_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::FirstOrder(&moments), ws);
+            self.walk(setup, Bend::FirstOrder(&moments), rest.tip, ws);
             let frames = std::mem::take(&mut ws.frames);
             let Some(mixing) = self.mixing else { return frames };
             first_order = Some((frames, mixing));
@@ -41,7 +41,7 @@ impl Arm<Dual64> {
         }
         for _ in 0..MAX_PASSES {
             self.lean_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::Bent(&moments), ws);
+            self.walk(setup, Bend::Bent(&moments), rest.tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.eps.abs()));
             let both = moments.iter().zip(&ws.next_moments);

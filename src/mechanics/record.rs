@@ -13,9 +13,13 @@ impl Tape {
         self.clear();
         let mut cuts = ws.cuts.iter();
         let mut root = Frame::identity();
+        let mut forks = Vec::new();
         // Loads since the last other event: those of an element, if one ends next.
         let mut own = 0;
         for (index, event) in ws.events.iter().enumerate() {
+            if index == ws.passed {
+                self.target = self.steps.len();
+            }
             match event {
                 Event::Load { at, force } => {
                     self.load(at.map(|c| c.re), force.map(|c| c.re));
@@ -42,8 +46,19 @@ impl Tape {
                 Event::Tip { .. } => self.section(root.origin, &Frame::identity().axes, Felt::InSpace),
                 Event::Axis { .. } => self.section(root.origin, &root.axes[2..], Felt::OnTheArm),
                 Event::Tilt { .. } => self.section(root.origin, &root.axes[..2], Felt::OnTheArm),
+                Event::Fork { further } => {
+                    forks.extend((0..*further).map(|_| root));
+                    self.steps.push(Step::Fork { further: *further });
+                }
+                Event::Branch => {
+                    root = forks.pop().unwrap_or(root);
+                    self.steps.push(Step::Branch);
+                }
             }
             own = 0;
+        }
+        if ws.passed == ws.events.len() {
+            self.target = self.steps.len();
         }
         self.sum_loads();
     }

@@ -44,7 +44,8 @@ impl Sensitivity {
         }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame, and finds all derivatives.
+    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\] in the frame that the pose was brought to rest
+    /// for, and finds all derivatives.
     ///
     /// # Errors
     /// Λ does not settle: a little more load, and the arm would not come to rest.
@@ -65,7 +66,7 @@ impl Sensitivity {
                 // No segment's parameters change the forces.
                 arm.gather_forces(setup, &[], ws);
             }
-            arm.walk(setup, Bend::Apart(&moments, turning.as_ref()), ws);
+            arm.walk(setup, Bend::Apart(&moments, turning.as_ref()), pose.tip, ws);
             if lane == 0 {
                 tape.record(ws, parameters);
             }

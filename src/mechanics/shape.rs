@@ -10,7 +10,7 @@ use crate::problem::PoseView;
 /// Elements by which a beam is drawn at least.
 const ELEMENTS: usize = 4;
 
-/// An arm as a line from its base to its last frame: each joint before and after it turned, and points along its beams.
+/// An arm as a line from its base to the frame of its target: each joint before and after it turned, and points along its beams.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shape {
     /// Where nothing gives way \[m\].
@@ -20,21 +20,21 @@ pub struct Shape {
 }
 
 impl Arm<f64> {
-    /// The line of the arm in a pose, arm base frame.
+    /// The line of the arm to the frame of the joint `tip` in a pose, arm base frame.
     ///
     /// # Errors
     /// The arm is too soft for its loads.
-    pub fn shape(&self, setup: &PoseView) -> Result<Shape, StaticsError> {
+    pub fn shape(&self, setup: &PoseView, tip: usize) -> Result<Shape, StaticsError> {
         let drawn = Self { beam_elements: self.beam_elements.max(ELEMENTS), ..self.clone() };
         let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
         drawn.gather_forces(setup, &[], &mut ws);
-        drawn.walk(setup, Bend::Rigid, &mut ws);
+        drawn.walk(setup, Bend::Rigid, tip, &mut ws);
         let mut rigid = vec![Vector3::zeros()];
         rigid.append(&mut ws.trail);
         if !drawn.is_elastic() {
             return Ok(Shape { bent: rigid.clone(), rigid });
         }
-        drawn.equilibrate(setup, &mut ws, &mut rest)?;
+        drawn.equilibrate_at(setup, tip, &mut ws, &mut rest)?;
         let mut bent = vec![Vector3::zeros()];
         bent.append(&mut ws.trail);
         Ok(Shape { rigid, bent })

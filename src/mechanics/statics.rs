@@ -42,8 +42,9 @@ pub enum StaticsError {
 /// A pose in static equilibrium.
 #[derive(Debug, Clone, Default)]
 pub struct Equilibrated {
-    /// The last frame, arm base frame.
+    /// The frame that was asked for, of the joint `tip`, arm base frame.
     pub frame: Frame<f64>,
+    pub(super) tip: usize,
     /// Moments x* [N·m].
     pub(super) moments: Vec<f64>,
     /// Λ, shape = (3, moments), row after row [m/(N·m)]; empty until asked for.
@@ -54,7 +55,7 @@ pub struct Equilibrated {
 }
 
 impl Arm<f64> {
-    /// Brings one pose to rest.
+    /// Brings one pose to rest, to see where the last frame is.
     ///
     /// # Errors
     /// The arm is too soft for its loads.
@@ -64,19 +65,34 @@ impl Arm<f64> {
         ws: &mut Workspace<f64>,
         pose: &mut Equilibrated,
     ) -> Result<(), StaticsError> {
+        self.equilibrate_at(setup, self.last(), ws, pose)
+    }
+
+    /// The same, to see where the frame of the joint `tip` is, counted from 0.
+    ///
+    /// # Errors
+    /// The arm is too soft for its loads.
+    pub fn equilibrate_at(
+        &self,
+        setup: &PoseView,
+        tip: usize,
+        ws: &mut Workspace<f64>,
+        pose: &mut Equilibrated,
+    ) -> Result<(), StaticsError> {
         pose.adjoint.clear();
         pose.moments.clear();
+        pose.tip = tip;
         if !self.is_elastic() {
-            pose.frame = self.rigid_frame(setup);
+            pose.frame = self.rigid_frame(setup, tip);
             return Ok(());
         }
         self.gather_forces(setup, &[], ws);
-        self.walk(setup, Bend::Rigid, ws);
+        self.walk(setup, Bend::Rigid, tip, ws);
         ws.sum_moments();
         pose.moments.extend_from_slice(&ws.next_moments);
         let first_order = if self.is_first_order() {
             self.lean_ropes(setup, &pose.moments, ws);
-            pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), ws);
+            pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), tip, ws);
             let Some(mixing) = self.mixing else { return Ok(()) };
             Some((pose.frame, mixing))
         } else {
@@ -85,7 +101,7 @@ impl Arm<f64> {
         ws.anderson.restart();
         for _ in 0..MAX_PASSES {
             self.lean_ropes(setup, &pose.moments, ws);
-            pose.frame = self.walk(setup, Bend::Bent(&pose.moments), ws);
+            pose.frame = self.walk(setup, Bend::Bent(&pose.moments), tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let change = pose.moments.iter().zip(&ws.next_moments).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
@@ -124,7 +140,7 @@ impl Response {
         Self { arm: arm.lift(), ws: Workspace::default() }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], last frame.
+    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], in the frame that the pose was brought to rest for.
     ///
     /// # Errors
     /// Λ does not settle: a little more load, and the arm would not come to rest.
@@ -148,7 +164,7 @@ impl Response {
             moments.extend(pose.moments.iter().map(|&x| Dual64::from(x)));
             moments[j] = moments[j].derivative();
             self.arm.lean_ropes(setup, &moments, &mut self.ws);
-            let frame = self.arm.walk(setup, Bend::Bent(&moments), &mut self.ws);
+            let frame = self.arm.walk(setup, Bend::Bent(&moments), pose.tip, &mut self.ws);
             self.ws.sum_moments();
             let position = frame.point(&target);
             for i in 0..3 {
@@ -198,7 +214,7 @@ impl Equilibrated {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Position \[m\] of the target at `target` \[m\] (last frame), arm base frame, with its exact first derivatives.
+    /// Position \[m\] of the target at `target` \[m\] in the pose's frame, arm base frame, with its exact first derivatives.
     ///
     /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and for loads on the bent
     /// arm its Λ for the same target.
@@ -211,17 +227,17 @@ impl<S: Scalar> Arm<S> {
     ) -> Vector3<S> {
         let target = target.map(S::from);
         if pose.moments.is_empty() {
-            return self.rigid_frame(setup).point(&target);
+            return self.rigid_frame(setup, pose.tip).point(&target);
         }
         self.gather_forces(setup, &[], ws);
         let mut moments = std::mem::take(&mut ws.moments);
         let first_order = self.is_first_order().then(|| {
-            self.walk(setup, Bend::Rigid, ws);
+            self.walk(setup, Bend::Rigid, pose.tip, ws);
             ws.sum_moments();
             moments.clear();
             moments.extend_from_slice(&ws.next_moments);
             self.lean_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::FirstOrder(&moments), ws).point(&target)
+            self.walk(setup, Bend::FirstOrder(&moments), pose.tip, ws).point(&target)
         });
         let position = match (first_order, self.mixing) {
             (Some(first_order), None) => first_order,
@@ -246,7 +262,7 @@ impl<S: Scalar> Arm<S> {
         moments.clear();
         moments.extend(pose.moments.iter().map(|&x| S::from(x)));
         self.lean_ropes(setup, moments, ws);
-        let mut position = self.walk(setup, Bend::Bent(moments), ws).point(target);
+        let mut position = self.walk(setup, Bend::Bent(moments), pose.tip, ws).point(target);
         ws.sum_moments();
         let n = moments.len();
         for (j, (next, &x)) in ws.next_moments.iter().zip(&pose.moments).enumerate() {

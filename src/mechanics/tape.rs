@@ -35,6 +35,10 @@ pub(super) enum Step {
     Section(Section),
     /// A segment.
     Segment(TapedSegment),
+    /// As many branches as this, besides the one that comes next, begin here.
+    Fork { further: usize },
+    /// The last branch has ended, and the next one begins where the last fork has one left.
+    Branch,
 }
 
 /// A part with the places of its numbers: one column for each of its directions, and as many moves as it has loads.
@@ -92,10 +96,26 @@ pub(super) struct Load {
     pub virtually: Each,
 }
 
+/// Sums of loads: force, and moment about the base origin.
+#[derive(Default)]
+struct Sums {
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+}
+
+impl Sums {
+    fn add(&mut self, load: &Load) {
+        self.force += load.force;
+        self.moment += load.at.cross(&load.force);
+    }
+}
+
 /// A pose at rest taken down part by part, to differentiate its position.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tape {
     pub steps: Vec<Step>,
+    /// How many of them come before the target.
+    pub target: usize,
     pub loads: Vec<Load>,
     pub columns: Vec<Column>,
     pub moves: Vec<Vector3<f64>>,
@@ -164,24 +184,22 @@ impl Tape {
 
     /// Sums the loads beyond every section, once all is taken down.
     pub fn sum_loads(&mut self) {
-        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
-        let mut add = |load: &Load| {
-            force += load.force;
-            moment += load.at.cross(&load.force);
-            (force, moment)
-        };
-        let mut sums = (Vector3::zeros(), Vector3::zeros());
+        let mut sums = Sums::default();
+        let mut branches = Vec::new();
         for step in self.steps.iter_mut().rev() {
             match step {
-                Step::Load(load) => sums = add(&self.loads[*load]),
-                Step::Segment(segment) => {
-                    for load in &self.loads[segment.loads.clone()] {
-                        sums = add(load);
-                    }
-                }
+                Step::Load(load) => sums.add(&self.loads[*load]),
+                Step::Segment(segment) => self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load)),
                 Step::Section(section) => {
-                    section.force = sums.0;
-                    section.moment = sums.1 - section.at.cross(&sums.0);
+                    section.force = sums.force;
+                    section.moment = sums.moment - section.at.cross(&sums.force);
+                }
+                Step::Branch => branches.push(std::mem::take(&mut sums)),
+                Step::Fork { further } => {
+                    for branch in (0..*further).filter_map(|_| branches.pop()) {
+                        sums.force += branch.force;
+                        sums.moment += branch.moment;
+                    }
                 }
             }
         }

@@ -22,6 +22,10 @@ pub(super) enum Event<S> {
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
     /// The end of a segment of the arm that was walked alone.
     Cut,
+    /// As many branches as this, besides the one that comes next, begin here.
+    Fork { further: usize },
+    /// The last branch has ended, and the next one begins where the last fork has one left.
+    Branch,
 }
 
 /// Memory for walks, reused from pose to pose.
@@ -34,6 +38,13 @@ pub struct Workspace<S> {
     pub(super) hooks: Vec<[S; 2]>,
     /// Where the segments of the arm end, if it is walked segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
+    /// How many events the walk had passed at the frame of the joint that was asked for.
+    pub(super) passed: usize,
+    /// Frames at which branches are still to begin, the last first.
+    pub(super) forks: Vec<Frame<S>>,
+    /// Mass \[kg\] and hoists' force \[N\] of branches whose fork is still to come, and the same of forces and moments.
+    pub(super) weights: Vec<(S, Vector3<S>)>,
+    pub(super) wrenches: Vec<(Vector3<S>, Vector3<S>)>,
     /// Frame behind the mounting and behind each joint in the last walk, where they are kept.
     pub(super) frames: Vec<Frame<S>>,
     pub(super) keeps_frames: bool,
@@ -59,6 +70,10 @@ impl<S> Default for Workspace<S> {
             next_moments: Vec::new(),
             hooks: Vec::new(),
             cuts: Vec::new(),
+            passed: 0,
+            forks: Vec::new(),
+            weights: Vec::new(),
+            wrenches: Vec::new(),
             frames: Vec::new(),
             keeps_frames: false,
             ropes: Vec::new(),
@@ -77,7 +92,7 @@ impl Workspace<f64> {
     pub(super) fn turning(&self) -> f64 {
         let term = |event: &Event<f64>| match event {
             Event::Load { at, force } => at.norm() * force.norm(),
-            Event::Tip { .. } | Event::Axis { .. } | Event::Tilt { .. } | Event::Cut => 0.0,
+            _ => 0.0,
         };
         self.events.iter().map(term).sum()
     }
@@ -94,10 +109,11 @@ impl<S: Scalar> Workspace<S> {
 
     /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where something bends [N·m].
     pub(super) fn sum_moments(&mut self) {
-        let Self { events, next_moments, hooks, .. } = self;
+        let Self { events, next_moments, hooks, wrenches, .. } = self;
         let zero = Vector3::from_element(S::from(0.0));
         let (mut force_sum, mut moment_sum) = (zero, zero);
         next_moments.clear();
+        wrenches.clear();
         for event in events.iter().rev() {
             match event {
                 Event::Load { at, force } => {
@@ -114,6 +130,16 @@ impl<S: Scalar> Workspace<S> {
                     next_moments.extend([y.dot(&moment), x.dot(&moment)]);
                 }
                 Event::Cut => {}
+                Event::Branch => {
+                    wrenches.push((force_sum, moment_sum));
+                    (force_sum, moment_sum) = (zero, zero);
+                }
+                Event::Fork { further } => {
+                    for (force, moment) in (0..*further).filter_map(|_| wrenches.pop()) {
+                        force_sum += force;
+                        moment_sum += moment;
+                    }
+                }
             }
         }
         next_moments.extend(hooks.iter().rev().flat_map(|&[x, y]| [y, x]));

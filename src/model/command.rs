@@ -21,6 +21,7 @@ impl Model {
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
+            carriers: self.carriers.clone(),
             fixtures: self.fixtures(x.as_slice()),
             declared: self.declared.clone(),
             turned: self.target_rotations(x.as_slice()),

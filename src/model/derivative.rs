@@ -50,7 +50,8 @@ impl Linearised {
         let arm = model.arm(|k| x[k]);
         let mut bases: Vec<Base> = model.base_poses(x.as_slice()).iter().map(Base::new).collect();
         let places = model.target_positions(x.as_slice()).into_iter().zip(model.target_rotations(x.as_slice()));
-        let mut targets: Vec<Target> = places.map(|(position, rotation)| Target::new(position, &rotation)).collect();
+        let target = |(own, (position, rotation))| Target::new(model.carrier(own), position, &rotation);
+        let mut targets: Vec<Target> = places.enumerate().map(target).collect();
         let mut fixtures: Vec<_> = model.fixtures(x.as_slice()).into_iter().map(|own| (own, [None; 4])).collect();
         let (mut scale, mut strains, mut shifts, mut turns) = (None, Vec::new(), Vec::new(), Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
@@ -137,7 +138,7 @@ impl Linearised {
             probe.column_mut(column).fill(0.0);
         }
         let mut moves = Rows { block: probe, row: 0, scale: 1.0 };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, &target.position, &mut moves) else {
+        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut moves) else {
             put(last_column, Vector3::from_element(f64::NAN));
             return;
         };
@@ -181,7 +182,7 @@ impl Linearised {
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
         let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, &target.position, &mut rows) else {
+        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut rows) else {
             rows.put(last_column, &Vector3::from_element(f64::NAN));
             return;
         };
@@ -206,7 +207,7 @@ impl Linearised {
     }
 }
 
-/// The target's position \[m\], measuring frame, from the `last` frame there; writes what base and target do to it.
+/// The target's position \[m\], measuring frame, from the frame `last` that carries it there; writes what base and target do to it.
 #[inline]
 fn placed(last: &Frame<f64>, base: &Base, target: &Target, rows: &mut Rows) -> Vector3<f64> {
     let position = last.point(&target.position);

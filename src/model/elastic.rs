@@ -64,18 +64,18 @@ impl Elastic {
         Self { parts, response, whole, arm, rest, real: Workspace::default(), ws: Workspace::default() }
     }
 
-    /// Writes the derivatives of the `target` \[m\] of a pose; returns the last frame, measuring frame, `None` where the pose
-    /// has no equilibrium.
+    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that frame, measuring frame, `None` where the
+    /// pose has no equilibrium.
     pub fn write(
         &mut self,
         commanded: &PoseView,
         setup: &PoseView,
         base: &Frame<f64>,
-        target: &Vector3<f64>,
+        (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {
         let Self { parts, response, whole, arm, rest, real, ws } = self;
-        arm.equilibrate(setup, real, rest).ok()?;
+        arm.equilibrate_at(setup, tip, real, rest).ok()?;
         match parts {
             Some(Parts { sensitivity, inputs }) => {
                 sensitivity.differentiate(setup, target, rest).ok()?;

@@ -50,7 +50,9 @@ pub struct Model {
     instrument: Instrument,
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
-    /// Orientation of each target in the last frame, a rotation vector \[rad\].
+    /// Index of the joint whose frame carries each target.
+    carriers: Vec<usize>,
+    /// Orientation of each target in that frame, a rotation vector \[rad\].
     turned: Vec<Vector3<f64>>,
     /// Points, anchors and surfaces, as declared; 0 where nothing is known.
     fixtures: Vec<FixtureAt<f64>>,
@@ -66,10 +68,12 @@ impl Model {
     /// The declared arm with its effects, one base per name in `bases` and one target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, or a custom effect finds no room.
+    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, a custom effect finds no room, or the problem
+    /// declares targets and not all of these.
     pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
         terms::check_customs(problem, bases.len(), targets.len())?;
         let effects = &effect::parameters(problem);
+        let own = targets.iter().map(|word| problem.target(word)).collect::<Result<Vec<_>, _>>()?;
         let parameters = resolve(problem, bases, targets, effects)?;
         let mut nominal = Arm::nominal(problem);
         for effect in effects {
@@ -81,8 +85,9 @@ impl Model {
             driven: Driven::declared(problem),
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
-            targets: vec![problem.tool.target; targets.len()],
-            turned: vec![problem.tool.rotation; targets.len()],
+            targets: own.iter().map(|own| own.at).collect(),
+            carriers: own.iter().map(|own| own.joint).collect(),
+            turned: own.iter().map(|own| own.rotation).collect(),
             fixtures: problem.fixtures.iter().map(FixtureAt::declared).collect(),
             declared: problem.fixtures.iter().map(|own| own.known.clone()).collect(),
             parameters,
@@ -120,14 +125,20 @@ impl Model {
         self.nominal.joints.len()
     }
 
-    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over its joints and the farthest target; 1 m where all that is nought.
+    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over the joints that carry a target and to it, the most of
+    /// all targets; 1 m where all that is nought.
     pub fn size(&self) -> f64 {
         let length = |joint: &Joint<f64>| {
             joint.a.hypot(joint.d) + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
         };
-        let links: f64 = self.nominal.joints.iter().map(length).sum();
-        let target = self.targets.iter().map(Vector3::norm).fold(0.0, f64::max);
-        if links + target > 0.0 { links + target } else { 1.0 }
+        let Arm { joints, tree, .. } = &self.nominal;
+        let links = |tip: usize| -> f64 {
+            let carrying = joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, tip));
+            carrying.map(|(_, own)| length(own)).sum()
+        };
+        let reach = |(target, &tip): (&Vector3<f64>, &usize)| links(tip) + target.norm();
+        let reach = self.targets.iter().zip(&self.carriers).map(reach).fold(0.0, f64::max);
+        if reach > 0.0 { reach } else { 1.0 }
     }
 
     /// Whether bounds or constraints limit the parameters.
@@ -180,7 +191,12 @@ impl Model {
         self.base_poses(x).iter().map(|base| Frame::from_rotation_vector(base.translation, &base.rotation)).collect()
     }
 
-    /// Targets in the last frame \[m\].
+    /// Index of the joint whose frame carries a target.
+    pub(crate) fn carrier(&self, target: usize) -> usize {
+        self.carriers.get(target).copied().unwrap_or_else(|| self.nominal.last())
+    }
+
+    /// Targets in the frames that carry them \[m\].
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
@@ -207,7 +223,7 @@ impl Model {
         fixtures
     }
 
-    /// Orientations of the targets in the last frame, rotation vectors \[rad\].
+    /// Orientations of the targets in the frames that carry them, rotation vectors \[rad\].
     pub fn target_rotations(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut turned = self.turned.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {

@@ -24,8 +24,10 @@ pub(super) struct Base {
 
 /// A target, and the columns of its six coordinates.
 pub(super) struct Target {
+    /// Index of the joint whose frame carries it.
+    pub carrier: usize,
     pub position: Vector3<f64>,
-    /// Its axes in the last frame, and how they turn with its rotation vector.
+    /// Its axes in that frame, and how they turn with its rotation vector.
     pub axes: [Vector3<f64>; 3],
     turning: [Frame<f64>; 3],
     pub columns: [Option<usize>; 6],
@@ -79,12 +81,12 @@ impl Base {
 }
 
 impl Target {
-    /// At a place \[m\] and with a rotation vector \[rad\] in the last frame; no coordinate has a column yet.
-    pub fn new(position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
-        Self { position, axes: rotation_axes(rotation), turning: turning(rotation), columns: [None; 6] }
+    /// At a place \[m\] and with a rotation vector \[rad\] in the frame of the joint `carrier`; no coordinate has a column yet.
+    pub fn new(carrier: usize, position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
+        Self { carrier, position, axes: rotation_axes(rotation), turning: turning(rotation), columns: [None; 6] }
     }
 
-    /// What its own rotation does to its axes, last frame, by the columns of its coordinates.
+    /// What its own rotation does to its axes, in that frame, by the columns of its coordinates.
     pub fn turned(&self) -> impl Iterator<Item = (usize, &[Vector3<f64>; 3])> {
         let columns = self.columns[3..].iter().zip(&self.turning);
         columns.filter_map(|(column, turning)| Some(((*column)?, &turning.axes)))
@@ -92,8 +94,8 @@ impl Target {
 }
 
 impl Inner {
-    /// Writes the derivatives with respect to the arm's own parameters; returns the last frame of the pose, measuring
-    /// frame, `None` where it has no equilibrium.
+    /// Writes the derivatives of a point \[m\] in the frame of a joint with respect to the arm's own parameters; returns that frame,
+    /// measuring frame, `None` where the pose has no equilibrium.
     ///
     /// `setup` is the pose as the joints take it, `commanded` as it was commanded.
     #[inline]
@@ -102,12 +104,12 @@ impl Inner {
         commanded: &PoseView,
         setup: &PoseView,
         base: &Base,
-        target: &Vector3<f64>,
+        point: (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {
         match self {
-            Self::Rigid(rigid) => Some(rigid.write(commanded, setup, &base.frame, target, rows)),
-            Self::Elastic(elastic) => elastic.write(commanded, setup, &base.frame, target, rows),
+            Self::Rigid(rigid) => Some(rigid.write(commanded, setup, &base.frame, point, rows)),
+            Self::Elastic(elastic) => elastic.write(commanded, setup, &base.frame, point, rows),
         }
     }
 }

@@ -131,7 +131,7 @@ impl<'a> PoseResiduals<'a> {
                 use_it(pose, Seen { position: seen, turn: None });
                 continue;
             }
-            let seen = match arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest) {
+            let seen = match arm.equilibrate_at(&commands.apply(&pose.setup), self.model.carrier(pose.target), &mut ws, &mut rest) {
                 Ok(()) => {
                     let base = instrument.base(&bases[pose.base], &pose.setup);
                     let position = base.point(&rest.frame.point(&targets[pose.target]));
@@ -175,13 +175,13 @@ impl Model {
         PoseResiduals::new(self, poses, Vec::new(), x.clone()).orientation_errors(&DVector::zeros(0))
     }
 
-    /// Last frames of the arm in its base frame at the full parameter vector `x`; `None` without equilibrium.
+    /// Frames that carry the targets, in the arm's base frame, at the full parameter vector `x`; `None` without equilibrium.
     pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
         let arm = self.arm(|k| x[k]);
         let mut commands = self.commands(x);
         let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
         let frame = |pose: &Pose| {
-            arm.equilibrate(&commands.apply(&pose.setup), &mut ws, &mut rest).ok()?;
+            arm.equilibrate_at(&commands.apply(&pose.setup), self.carrier(pose.target), &mut ws, &mut rest).ok()?;
             Some(rest.frame)
         };
         poses.iter().map(frame).collect()
@@ -208,7 +208,7 @@ impl Model {
         let (bases, targets, instrument) = (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
         let mut commands = Commands::new(&self.driven, &[], &[]);
         let position = |pose: &Pose| {
-            let tip = arm.rigid_frame(&commands.apply(&pose.setup));
+            let tip = arm.rigid_frame(&commands.apply(&pose.setup), self.carrier(pose.target));
             let base = instrument.base(&bases[pose.base], &pose.setup);
             instrument.of(&base.point(&tip.point(&targets[pose.target])), &pose.setup)
         };
@@ -222,8 +222,9 @@ impl Model {
         let shape = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
             let mut commands = self.commands(x);
             let setup = commands.apply(&pose.setup);
-            let Shape { mut rigid, mut bent } = arm.shape(&setup).ok()?;
-            rigid.push(arm.rigid_frame(&setup).point(&targets[pose.target]));
+            let tip = self.carrier(pose.target);
+            let Shape { mut rigid, mut bent } = arm.shape(&setup, tip).ok()?;
+            rigid.push(arm.rigid_frame(&setup, tip).point(&targets[pose.target]));
             bent.push(frame?.point(&targets[pose.target]));
             rigid.iter_mut().chain(&mut bent).for_each(|point| *point = bases[pose.base].point(point));
             Some(Shape { rigid, bent })

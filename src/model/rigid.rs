@@ -1,7 +1,8 @@
 //! Derivatives of a rigid arm with respect to its own parameters.
 //!
 //! Every parameter belongs to one motion. Inwards, the target is carried through each motion in dual numbers, which tells
-//! what its parameter does in the frame before it; outwards, that frame chains on in plain numbers.
+//! what its parameter does in the frame before it; outwards, that frame chains on in plain numbers. Of a tree of joints that is the
+//! way from the base to the target; parameters elsewhere do nothing.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -10,12 +11,13 @@ use super::inputs::Input;
 use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Coordinates, Joint, Placement};
 use crate::model::parameter::{JointField, Slot};
-use crate::problem::PoseView;
+use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, turn_x, turn_y, turn_z};
 
 /// A rigid arm, motion by motion.
 pub(super) struct Rigid {
     links: Vec<Link>,
+    tree: Tree,
     inputs: Vec<Input>,
     /// Of the pose at hand, from the last link to the first.
     carried: Vec<Carried>,
@@ -50,24 +52,28 @@ impl Rigid {
                 }
             }
         }
-        Self { links, inputs, carried: Vec::new(), placed: Vec::new() }
+        Self { links, tree: arm.tree.clone(), inputs, carried: Vec::new(), placed: Vec::new() }
     }
 
-    /// Writes the derivatives of the `target` \[m\] of a pose; returns the last frame, measuring frame.
+    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that frame, measuring frame.
     #[inline]
     pub fn write(
         &mut self,
         commanded: &PoseView,
         setup: &PoseView,
         base: &Frame<f64>,
-        target: &Vector3<f64>,
+        (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Frame<f64> {
-        let Self { links, inputs, carried, placed } = self;
+        let Self { links, tree, inputs, carried, placed } = self;
         carried.clear();
         placed.clear();
         let mut point = *target;
-        for (link, &q) in links.iter().zip(setup.configuration).rev() {
+        let way = || {
+            let all = links.iter().zip(setup.configuration).enumerate();
+            all.filter(|(joint, _)| tree.leads_through(*joint, tip)).map(|(_, own)| own)
+        };
+        for (link, &q) in way().rev() {
             let coordinates = link.joint.coordinates(q);
             let derivatives;
             (derivatives, point) = link.carry(&coordinates, &point);
@@ -79,7 +85,7 @@ impl Rigid {
             }
         }
         let mut frame = *base;
-        for (link, Carried { derivatives, coordinates }) in links.iter().zip(carried.iter().rev()) {
+        for ((link, _), Carried { derivatives, coordinates }) in way().zip(carried.iter().rev()) {
             if let Some((placement, derivatives)) =
                 link.joint.placement.as_ref().and_then(|own| Some((own, placed.pop()?)))
             {

@@ -18,7 +18,7 @@ pub(super) struct About<'a> {
     pub setup: (&'a PoseView<'a>, &'a PoseView<'a>),
     pub base: &'a Base,
     pub target: &'a Target,
-    /// The last frame, measuring frame.
+    /// The frame that carries it, measuring frame.
     pub last: &'a Frame<f64>,
 }
 
@@ -42,7 +42,7 @@ pub(super) fn write(
     for (k, point) in std::iter::once(&target.position).chain(&ends).enumerate() {
         let mut rows = Rows { block: probe, row: 3 * k, scale: 1.0 };
         // The position has found its equilibrium.
-        if inner.write(commanded, setup, base, point, &mut rows).is_none() {
+        if inner.write(commanded, setup, base, (target.carrier, point), &mut rows).is_none() {
             return;
         }
         for (column, derivative) in base.turned(&last.point(point)) {

@@ -4,16 +4,21 @@ use nalgebra::Vector3;
 
 use super::item::Item;
 use super::section::Section;
-use super::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, standard};
+use super::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, standard, tree};
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
 
-/// Every `[[joint]]`, at least one.
-pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputError> {
+/// Every `[[joint]]`, at least one, and whether they are written in the standard form.
+pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), InputError> {
     let form = root.word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?.unwrap_or(Form::Modified);
-    let (mut joints, mut beams, mut mimics) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut joints, mut beams, mut mimics, mut parents) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for mut section in root.sections("joint")? {
         let mimic = section.section("mimic")?;
+        let parent = section.get("parent");
+        if let Some(item) = parent.as_ref().filter(|_| form == Form::Standard) {
+            return Err(item.error(InputErrorKind::NotInStandardForm));
+        }
+        parents.push(parent);
         joints.push(joint(section, joints.len() + 1, (form, mimic.is_some()), &mut beams)?);
         mimics.push(mimic);
     }
@@ -22,10 +27,12 @@ pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<Vec<Joint>, InputErro
     }
     let leads: Vec<bool> =
         joints.iter().zip(&mimics).map(|(own, mimic)| own.kind != JointKind::Fixed && mimic.is_none()).collect();
-    for (joint, section) in joints.iter_mut().zip(mimics) {
+    for ((joint, section), parent) in joints.iter_mut().zip(mimics).zip(tree::parents(&parents)?) {
         joint.mimic = section.map(|section| mimic(section, &leads)).transpose()?;
+        joint.parent = parent;
     }
-    Ok(if form == Form::Standard { standard::modified(joints) } else { joints })
+    let is_standard = form == Form::Standard;
+    Ok((if is_standard { standard::modified(joints) } else { joints }, is_standard))
 }
 
 /// In which order a row of the joint table moves.
@@ -85,8 +92,8 @@ fn joint(
     let bodies = bodies(&mut section, "body", "com", false)?;
     section.finish()?;
     let location = section.location();
-    let mimic = None;
-    Ok(Joint { name, kind, placement, mimic, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
+    let (parent, mimic) = (None, None);
+    Ok(Joint { name, kind, parent, placement, mimic, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
 }
 
 /// `xyz_m` and `rpy_deg`, in URDF's order, if one of them is there.

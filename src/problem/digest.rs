@@ -7,7 +7,8 @@ use sha2::{Digest as _, Sha256};
 
 use super::quoted::quoted;
 use super::{
-    BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem, Statics, Tool,
+    BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem, Statics, Target,
+    Tool,
 };
 
 impl Problem {
@@ -17,8 +18,11 @@ impl Problem {
     /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
     /// (`5.00000000000e-1`):
     /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
-    ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector;
-    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it is placed by xyz and rpy `placed` and these; where
+    ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector; where another
+    ///   joint than the last carries it, `on` and its number;
+    /// - for each target a new line with `target`, its name in quotes, the number of its joint, place and rotation vector;
+    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it stands on another than the one before `on` and the number of
+    ///   that, 0 for the base; where it is placed by xyz and rpy `placed` and these; where
     ///   it follows another `mimic`, its number and the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
     ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
     ///   and with a hoist `hoist`, force, hook and direction;
@@ -27,9 +31,9 @@ impl Problem {
     ///
     /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not enter.
     pub fn digest(&self) -> String {
-        let Self { gravity, statics, joints, tool, base, effects, data, .. } = self;
+        let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
-        let Tool { target, rotation: turned, payload_at, payload_mass } = tool;
+        let Tool { joint: carrier, target, rotation: turned, payload_at, payload_mass } = tool;
         let BasePose { translation, rotation } = base;
         let mut text = match equilibrium {
             Equilibrium::Undeflected => "undeflected".to_owned(),
@@ -42,8 +46,15 @@ impl Problem {
             text.push_str(" turned");
             vectors(&mut text, &[turned]);
         }
-        for own in joints {
-            joint(&mut text, own);
+        if carrier + 1 != joints.len() {
+            let _ = write!(text, " on {}", carrier + 1);
+        }
+        for Target { name, joint, at, rotation, .. } in targets {
+            let _ = write!(text, "\ntarget {} {}", quoted(name), joint + 1);
+            vectors(&mut text, &[at, rotation]);
+        }
+        for (index, own) in joints.iter().enumerate() {
+            joint(&mut text, index, own);
         }
         // The order in which effects are declared changes nothing.
         let mut declared: Vec<String> = effects.iter().map(|own| format!("\n{}", own.effect.declaration())).collect();
@@ -67,13 +78,16 @@ pub(crate) fn hexadecimal(text: &str) -> String {
     })
 }
 
-fn joint(text: &mut String, joint: &Joint) {
-    let Joint { kind, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } = joint;
+fn joint(text: &mut String, index: usize, joint: &Joint) {
+    let Joint { kind, parent, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } = joint;
     text.push_str(match kind {
         JointKind::Revolute => "\nrevolute",
         JointKind::Prismatic => "\nprismatic",
         JointKind::Fixed => "\nfixed",
     });
+    if *parent != index.checked_sub(1) {
+        let _ = write!(text, " on {}", parent.map_or(0, |parent| parent + 1));
+    }
     if let Some(Placement { xyz, rpy }) = placement {
         text.push_str(" placed");
         vectors(text, &[xyz, rpy]);

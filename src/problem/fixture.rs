@@ -187,7 +187,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<(Vec<Fixture>, Vec<Know
             let name = item.text()?.trim().to_owned();
             let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
             if name.is_empty() || name.contains(barred) {
-                return Err(item.error(InputErrorKind::NotAFixtureName { name }));
+                return Err(item.error(InputErrorKind::NotAFixtureName { what: "a fixture", name }));
             }
             if let Some(first) = fixtures.iter().find(|own| own.kind.word() == table && own.name == name) {
                 let line = first.location.line.unwrap_or(0);

@@ -22,6 +22,8 @@ pub struct Joint {
     pub name: String,
     /// What q does.
     pub kind: JointKind,
+    /// Index of the joint on whose frame it stands, an earlier one; `None`: the base.
+    pub parent: Option<usize>,
     /// A transform before all others of this joint; of fixed joints alone.
     pub placement: Option<Placement>,
     /// Whose command the joint follows, if it has none of its own.

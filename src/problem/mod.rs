@@ -22,10 +22,12 @@ pub(crate) mod read;
 mod robust;
 pub(crate) mod section;
 mod standard;
+mod target;
+mod tree;
 
 use nalgebra::Vector3;
 
-use crate::error::{Location, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 
 pub use argument::{Argument, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
@@ -37,6 +39,8 @@ pub use fixture::{Fixture, FixtureKind, KnownDistance, Observation};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub use robust::{Robust, RobustLoss};
+pub use target::{Target, Tool};
+pub use tree::Tree;
 
 /// A problem as declared in `problem.toml`.
 #[derive(Debug, Clone)]
@@ -49,10 +53,12 @@ pub struct Problem {
     pub gravity: Vector3<f64>,
     /// How static loads act.
     pub statics: Statics,
-    /// Joints from the base outwards; joint `i` of the files is element `i − 1`.
+    /// Joints from the base outwards, branch by branch; joint `i` of the files is element `i − 1`.
     pub joints: Vec<Joint>,
     /// The measured point and the payload.
     pub tool: Tool,
+    /// The measured points, where rows name theirs.
+    pub targets: Vec<Target>,
     /// Pose of the arm's base in the measuring frame.
     pub base: BasePose,
     /// Which links of a URDF the arm lies between, if it came from one.
@@ -80,7 +86,41 @@ impl Problem {
         self.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
     }
 
-    /// A warning where the target lies further from the last frame than the arm could reach twice.
+    /// How the joints stand on each other.
+    pub fn tree(&self) -> Tree {
+        Tree::of(&self.joints)
+    }
+
+    /// Whether the joints are one chain, which carries the tool and every target behind its last joint.
+    pub fn is_chain(&self) -> bool {
+        let last = self.joints.len().saturating_sub(1);
+        let mut carriers = self.targets.iter().map(|own| own.joint).chain([self.tool.joint]);
+        self.tree().is_chain() && carriers.all(|joint| joint == last)
+    }
+
+    /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where none is declared.
+    ///
+    /// # Errors
+    /// There are targets, and none has that name.
+    pub fn target(&self, word: &str) -> Result<Target, InputError> {
+        let location = Location { line: None, excerpt: None, ..self.data.location.clone() };
+        if self.targets.is_empty() {
+            return Ok(Target::of_tool(&self.tool, location.with_key("tool")));
+        }
+        let found = self.targets.iter().find(|own| own.name == word).cloned();
+        found.ok_or_else(|| location.with_key("target").error(self.unknown_target(word)))
+    }
+
+    /// The mistake of a word that names no target.
+    pub(crate) fn unknown_target(&self, word: &str) -> InputErrorKind {
+        let known: Vec<String> = self.targets.iter().map(|own| own.name.clone()).collect();
+        match word {
+            "" => InputErrorKind::TargetsUnnamed { targets: known },
+            _ => InputErrorKind::UnknownFixture { what: "target", name: word.to_owned(), known },
+        }
+    }
+
+    /// A warning where a target lies further from its frame than the arm could reach twice.
     pub fn far_target(&self) -> Option<Warning> {
         let length = |joint: &Joint| {
             let placed = joint.placement.as_ref().map_or(0.0, |own| own.xyz.norm());
@@ -88,8 +128,10 @@ impl Problem {
             let way = if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
             joint.a.hypot(joint.d) + placed + way
         };
-        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), self.tool.target.norm());
-        let location = Location { line: None, excerpt: None, ..self.data.location.clone().with_key("tool.target") };
+        let whole = || Location { line: None, excerpt: None, ..self.data.location.clone().with_key("tool.target") };
+        let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
+        let (location, target) = farthest.map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
+        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
         let kind = WarningKind::FarTarget { distance: format!("{distance:.3}"), links: format!("{links:.3}") };
         (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
     }
@@ -112,19 +154,6 @@ pub enum Equilibrium {
     Undeflected,
     /// On the bent arm, in equilibrium.
     Deflected,
-}
-
-/// `[tool]`.
-#[derive(Debug, Clone)]
-pub struct Tool {
-    /// The measured point in the last frame \[m\].
-    pub target: Vector3<f64>,
-    /// Orientation of what is measured in the last frame, a rotation vector \[rad\].
-    pub rotation: Vector3<f64>,
-    /// Where a payload hangs, in the last frame \[m\].
-    pub payload_at: Vector3<f64>,
-    /// Payload where no column `payload_kg` says otherwise \[kg\].
-    pub payload_mass: f64,
 }
 
 /// `[urdf]`: the links of a URDF at both ends of the arm.

@@ -7,9 +7,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::item::Document;
 use super::section::Section;
+use super::target::Carriers;
 use super::{
-    BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, Tool, UrdfEnds, arm, constraints,
-    data, effects, fixture, parameters, robust,
+    BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm, constraints, data,
+    effects, fixture, parameters, robust, target,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -78,8 +79,10 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let title = root.text("title")?.unwrap_or(&name).to_owned();
     let gravity = root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
-    let joints = arm::joints(&mut root)?;
-    let tool = tool(root.section("tool")?)?;
+    let (joints, is_standard) = arm::joints(&mut root)?;
+    let carriers = Carriers { joints: &joints, is_standard };
+    let tool = target::tool(root.section("tool")?, &carriers)?;
+    let targets = target::targets(&mut root, &tool, &carriers)?;
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
     let effects = effects::read(&mut root, &joints)?;
@@ -97,6 +100,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         statics,
         joints,
         tool,
+        targets,
         base,
         urdf,
         effects,
@@ -137,18 +141,6 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     }
     section.finish()?;
     Ok(statics)
-}
-
-fn tool(section: Option<Section<'_, '_>>) -> Result<Tool, InputError> {
-    let mut tool =
-        Tool { target: Vector3::zeros(), rotation: Vector3::zeros(), payload_at: Vector3::zeros(), payload_mass: 0.0 };
-    let Some(mut section) = section else { return Ok(tool) };
-    tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
-    tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
-    tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
-    tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
-    section.finish()?;
-    Ok(tool)
 }
 
 fn urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {

@@ -34,6 +34,7 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
         joints.push(Joint {
             name: "flange".to_owned(),
             kind: JointKind::Fixed,
+            parent: joints.len().checked_sub(1),
             placement: None,
             mimic: None,
             alpha,

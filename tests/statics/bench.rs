@@ -2,7 +2,7 @@
 
 use flexcal::mechanics::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, StaticsError, Workspace};
 use flexcal::problem::PoseView;
-use flexcal::problem::{Equilibrium, JointKind};
+use flexcal::problem::{Equilibrium, JointKind, Tree};
 use flexcal::spatial::Frame;
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -52,6 +52,8 @@ pub fn arm(joints: Vec<Joint<f64>>) -> Arm<f64> {
         equilibrium: Equilibrium::Deflected,
         beam_elements: 1,
         joints,
+        tree: Tree::default(),
+        payload_on: None,
         payload_at: Vector3::zeros(),
         payload_mass: 0.0,
     }

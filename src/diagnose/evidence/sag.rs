@@ -63,7 +63,7 @@ impl Columns<'_, '_> {
     }
 }
 
-/// Moments about the axis of `joint` of 1 kg at the origin of each link outboard of it and of what 1 kg there gains by moving by a link's
+/// Moments about the axis of `joint` of 1 kg at the origin of each link that stands on it and of what 1 kg there gains by moving by a link's
 /// length along x, y and z, shape = (N, functions).
 fn moments<'a>(problem: &Problem, joint: usize, configurations: impl Iterator<Item = &'a [f64]>) -> DMatrix<f64> {
     let arm = Arm::nominal(problem);
@@ -77,7 +77,8 @@ fn moments<'a>(problem: &Problem, joint: usize, configurations: impl Iterator<It
             let along = frame.axes.map(|own| about(own * length));
             std::iter::once(about(frame.origin - at)).chain(along).collect::<Vec<f64>>()
         };
-        joints.iter().skip(joint).flat_map(|(.., frame)| of_link(frame)).collect()
+        let outboard = joints.iter().enumerate().filter(|(k, _)| arm.tree.leads_through(joint, *k));
+        outboard.flat_map(|(_, (.., frame))| of_link(frame)).collect()
     };
     let rows: Vec<Vec<f64>> = configurations.map(of_pose).collect();
     DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |pose, k| rows[pose][k])

@@ -33,9 +33,11 @@ pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
-    let (own, beyond) = (&problem.joints[joint - 1], &problem.joints[joint..]);
-    let mass = all(&own.bodies) + beyond.iter().map(|joint| all(&joint.bodies) + beam(joint)).sum::<f64>();
-    let reach: f64 = beyond.iter().map(|joint| joint.a.hypot(joint.d)).sum();
+    let tree = problem.tree();
+    let own = &problem.joints[joint - 1];
+    let beyond = || problem.joints.iter().enumerate().skip(joint).filter(|(k, _)| tree.leads_through(joint - 1, *k));
+    let mass = all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
+    let reach: f64 = beyond().map(|(_, joint)| joint.a.hypot(joint.d)).sum();
     problem.gravity.norm() * (mass + problem.tool.payload_mass) * (reach + problem.tool.target.norm())
 }
 

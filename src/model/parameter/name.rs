@@ -30,7 +30,7 @@ pub enum Slot {
         /// 0..6.
         axis: usize,
     },
-    /// A coordinate of a target in the last frame: x, y, z, then the rotation vector of its orientation x, y, z.
+    /// A coordinate of a target in the frame that carries it: x, y, z, then the rotation vector of its orientation x, y, z.
     Target {
         /// Index of the target.
         target: usize,

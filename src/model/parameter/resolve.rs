@@ -220,8 +220,10 @@ pub(super) fn candidates(
         }
     }
     for (target, word) in targets.iter().enumerate() {
-        let turned = problem.tool.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
-        let pose = problem.tool.target.iter().chain(turned);
+        // A word that names no target is refused where the model is made.
+        let Ok(own) = problem.target(word) else { continue };
+        let turned = own.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
+        let pose = own.at.iter().chain(turned);
         for (axis, (suffix, &nominal)) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate() {
             let name = format!("{}.{suffix}", label("tool", word));
             out.push(declared(name, format!("tool.{suffix}"), Slot::Target { target, axis }, nominal));
