@@ -74,13 +74,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
-/// What the rows of the tables set.
-fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<PoseConditions>, InputError> {
+/// What the rows of the tables set, and the target that each names.
+fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<(PoseConditions, String)>, InputError> {
     let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
     if !arguments.flags.quiet {
         diagnostic::print_warnings(&warnings);
     }
-    Ok(rows.all_conditions())
+    let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
+    let word = |row: usize| target.map_or_else(String::new, |own| own.names[own.of_row[row]].clone());
+    Ok(rows.all_conditions().into_iter().enumerate().map(|(row, own)| (own, word(row))).collect())
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {

@@ -48,7 +48,7 @@ impl PoseRanges {
     }
 
     /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by
-    /// itself; positions are zero.
+    /// itself, of the targets one after the other; positions are zero.
     pub fn draw(&self, problem: &Problem, count: usize, extremes: Extremes, seed: u64, stream: u64) -> Measurements {
         let (mut random, mut apart) = (random::stream(seed, stream), random::stream(seed, APART + stream));
         let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
@@ -59,15 +59,16 @@ impl PoseRanges {
                 _ => from + (to - from) * within,
             }
         };
-        let mut drawn = Table::new(self, problem.joints.len());
-        for _ in 0..count {
+        let mut drawn = Table::new(self, problem);
+        for pose in 0..count {
             let joints = self.joints.iter().map(|&range| value(&mut random, range)).collect();
             let choice = value(&mut random, (0.0, 1.0));
             let hoist = self.hoist.map(|range| value(&mut random, range));
             let temperature = self.temperature.map(|range| value(&mut apart, range));
             let covariates = self.covariates.iter().map(|&range| value(&mut apart, range)).collect();
             let sides = self.joints.iter().map(|_| random.random()).collect();
-            drawn.push(problem, &Draft { joints, choice, hoist, temperature, covariates, sides });
+            let target = pose % problem.targets.len().max(1);
+            drawn.push(problem, &Draft { joints, choice, hoist, temperature, covariates, sides, target });
         }
         drawn.finish()
     }
@@ -83,7 +84,7 @@ impl PoseRanges {
         (seed, stream): (u64, u64),
     ) -> Measurements {
         let mut random = random::stream(seed, stream);
-        let mut drawn = Table::new(self, problem.joints.len());
+        let mut drawn = Table::new(self, problem);
         for row in 0..poses.len() {
             let own = Draft::of(self, poses, row);
             drawn.push(problem, &own);
@@ -124,6 +125,8 @@ struct Draft {
     covariates: Vec<f64>,
     /// Whether each joint comes from above.
     sides: Vec<bool>,
+    /// Index of the target that is measured.
+    target: usize,
 }
 
 impl Draft {
@@ -144,6 +147,7 @@ impl Draft {
             temperature: at(&poses.temperature),
             covariates: poses.covariates_of(row).to_vec(),
             sides,
+            target: poses.target.as_ref().map_or(0, |target| target.of_row[row]),
         }
     }
 }
@@ -152,6 +156,9 @@ impl Draft {
 struct Table<'a> {
     ranges: &'a PoseRanges,
     joints: usize,
+    /// Names of the targets that rows may measure, where there are several.
+    names: Vec<String>,
+    target: Vec<usize>,
     configurations: Vec<f64>,
     payload: Vec<f64>,
     hoist: Vec<f64>,
@@ -161,9 +168,11 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(ranges: &'a PoseRanges, joints: usize) -> Self {
+    fn new(ranges: &'a PoseRanges, problem: &Problem) -> Self {
+        let (joints, target) = (problem.joints.len(), Vec::new());
+        let names = problem.targets.iter().map(|own| own.name.clone()).collect();
         let (configurations, payload, hoist, temperature, covariates, approach) = Default::default();
-        Self { ranges, joints, configurations, payload, hoist, temperature, covariates, approach }
+        Self { ranges, joints, names, target, configurations, payload, hoist, temperature, covariates, approach }
     }
 
     fn push(&mut self, problem: &Problem, draft: &Draft) {
@@ -191,6 +200,7 @@ impl<'a> Table<'a> {
         self.hoist.extend(set(draft.hoist, self.ranges.hoist));
         self.temperature.extend(set(draft.temperature, self.ranges.temperature));
         self.covariates.extend(&draft.covariates);
+        self.target.push(draft.target);
     }
 
     fn finish(self) -> Measurements {
@@ -208,6 +218,7 @@ impl<'a> Table<'a> {
             time: (0_u32..).take(count).map(f64::from).collect(),
             approach: self.ranges.approach.then_some(self.approach),
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },
+            target: (!self.names.is_empty()).then_some(Labels { names: self.names, of_row: self.target }),
             ..Measurements::default()
         }
     }

@@ -134,14 +134,9 @@ impl<'a> Site<'a> {
 
     /// Rows of a table in which the nominal target stays in a workspace.
     pub(super) fn inside(&self, table: &Measurements, workspace: &Workspace) -> Vec<usize> {
-        let (rows, nominal) = ((0..table.len()).collect::<Vec<_>>(), vec![0.0; self.model.parameters.len()]);
-        let mut poses = Placement::of(table).poses(table, &rows, 1.0);
-        // One target is as good as another to say where the tool is.
-        for pose in &mut poses {
-            pose.target = 0;
-        }
-        let points = self.model.points(&poses, &nominal);
-        rows.into_iter().filter(|&row| points[row].is_some_and(|point| workspace.holds(&point))).collect()
+        let nominal = vec![0.0; self.model.parameters.len()];
+        let points = self.model.points(&self.poses(table, &Placement::of(table)), &nominal);
+        (0..table.len()).filter(|&row| points[row].is_some_and(|point| workspace.holds(&point))).collect()
     }
 
     /// A table without the poses in which the arm does not come to rest, and what the others tell.

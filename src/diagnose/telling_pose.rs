@@ -16,6 +16,8 @@ pub struct TellingPose {
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
+    /// Target that is measured, where the data have such a column.
+    pub target: Option<String>,
     /// Payload \[kg\], hoist force \[N\] and temperature [°C] there, where the data have such a column.
     pub payload: Option<f64>,
     /// Hoist force \[N\].
@@ -70,6 +72,7 @@ pub(super) fn telling_pose(
     Some(TellingPose {
         other: other.clone(),
         configuration: poses.configuration(best).to_vec(),
+        target: poses.target.as_ref().and_then(|own| own.names.get(own.of_row[best]).cloned()),
         payload: at(&poses.payload),
         hoist: at(&poses.hoist),
         temperature: at(&poses.temperature),

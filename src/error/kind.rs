@@ -100,8 +100,14 @@ pub enum InputErrorKind {
     BeamWithoutLength,
     #[error("a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")")]
     BeamInStandardForm,
-    #[error("a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")")]
+    #[error(
+        "a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")"
+    )]
     NotInStandardForm,
+    #[error(
+        "{what} takes one chain of joints, with the tool behind the last of them; this arm is a tree, or measured elsewhere"
+    )]
+    NotAChain { what: &'static str },
     #[error("joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on")]
     StandsOnLater { joint: usize, parent: u64 },
     #[error("the branch of joint {parent} has ended; list everything that stands on a joint right behind it")]

@@ -51,12 +51,13 @@ impl Baseline {
 /// Every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow: its closed forms corrected and
 /// as printed, the stiffness known, from positions, or from load differences; and once with elasticity ignored, the first.
 ///
-/// None where the procedure does not apply: it knows base and target, so that there are no sessions or targets, it knows no
+/// None where the procedure does not apply: it knows base and target, so that there are no sessions or targets, it knows one chain, no
 /// joints placed by xyz and rpy and none that follow others, and it needs as many equations as it has geometric parameters. Without elasticity there is the rigid one alone.
 pub(super) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
     let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
-    if measurements.session.names.len() > 1 || measurements.target.is_some() || problem.joints.iter().any(beyond) {
+    let is_one = measurements.session.names.len() < 2 && measurements.target.is_none() && problem.is_chain();
+    if !is_one || problem.joints.iter().any(beyond) {
         return Vec::new();
     }
     let rigid = (Form::Corrected, StiffnessStage::Rigid);

@@ -54,8 +54,8 @@ impl Command {
 }
 
 /// Where targets without positions are: where the nominal arm would have been with the commands of the rows, on the bases and with
-/// the tools of the full parameter vector `x`, measuring frame. With their orientations for an arm of six moving joints and more;
-/// with fewer it could not have both.
+/// the tools of the full parameter vector `x`, measuring frame. With their orientations where six moving joints and more lead to them;
+/// with fewer they could not have both.
 ///
 /// # Errors
 /// The nominal arm has no equilibrium in one of the rows.
@@ -73,7 +73,13 @@ pub fn waypoints(
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = placement.poses(rows, &all, 1.0);
     let mut targets = rows.clone();
-    if problem.joints.iter().filter(|joint| joint.commanded() != JointKind::Fixed).count() >= POSE {
+    let tree = problem.tree();
+    let commanded = |row: usize| {
+        let carrier = model.carrier(placement.target_of(row));
+        let leads = problem.joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, carrier));
+        leads.filter(|(_, joint)| joint.commanded() != JointKind::Fixed).count()
+    };
+    if (0..rows.len()).all(|row| commanded(row) >= POSE) {
         let turns = model.orientations(&poses, nominal.as_slice());
         targets.orientations = Some(turns.into_iter().map(UnitQuaternion::from_scaled_axis).collect());
     } else {
@@ -116,6 +122,8 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
 /// For each row of `targets`, the configuration nearest to the row's own that brings the arm with parameters `x` to the
 /// row's position, and to its orientation where it has one, within the joint limits of `problem`.
 ///
+/// Joints of other branches than the one that carries the row's target keep to the row's commands.
+///
 /// What effects do to the measurement (an instrument that drifts or has a scale) is left out: targets are where the arm shall be.
 ///
 /// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q − seed‖²: Newton's method by dual
@@ -135,12 +143,19 @@ pub fn compensate(
     let rows: Vec<usize> = (0..targets.len()).collect();
     let moving = arm.moving_joints();
     let led = arm.clone().with_followers(problem);
+    let tree = problem.tree();
     let mut commands = Vec::with_capacity(rows.len());
     let weights = (POSITION_WEIGHT, Some(ORIENTATION_WEIGHT));
     for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate() {
         pose.sigma = POSITION_WEIGHT;
         let seed = targets.configuration(row);
         let n = moving.len();
+        let carrier = model.carrier(pose.target);
+        let leads = |joint: usize| tree.leads_through(joint, carrier);
+        let led_by = |joint: usize| {
+            (0..).zip(&problem.joints).filter(move |(_, own)| own.mimic.is_some_and(|own| own.joint == joint))
+        };
+        let serves = |joint: usize| leads(joint) || led_by(joint).any(|(follower, _)| leads(follower));
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
             let turn = pose.orientation.map(|_| arm.orientation_residuals(vec![pose], &DVector::zeros(n))[0]);
@@ -149,7 +164,8 @@ pub fn compensate(
         let mut configuration = seed.to_vec();
         for _ in 0..MAX_PASSES {
             let bound = |pick: fn((f64, f64)) -> f64| {
-                let room = moving.iter().map(|&j| pick(problem.joints[j].limits) - configuration[j]);
+                let own = |j: usize| pick(problem.joints[j].limits) - configuration[j];
+                let room = moving.iter().map(|&j| if serves(j) { own(j) } else { 0.0 });
                 DVector::from_iterator(n, room)
             };
             let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;

@@ -64,7 +64,7 @@ impl Misreading {
         let plain = [Self::Degrees, Self::Radians, Self::Metres, Self::Millimetres, Self::Mirrored];
         let moving = (1..).zip(&problem.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         let reversed = moving.map(|(joint, _)| Self::Reversed { joint });
-        let far = problem.tool.target.norm() > 1.0;
+        let far = problem.targets.is_empty() && problem.tool.target.norm() > 1.0;
         plain.into_iter().chain(far.then_some(Self::TargetInMillimetres)).chain(reversed)
     }
 

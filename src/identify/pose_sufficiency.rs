@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::Placement;
 use super::fitting::Fitting;
 use super::quality::{QualityFlag, TooFewPoses};
-use crate::measurement::{Measurements, different};
+use crate::measurement::different;
 use crate::model::Model;
 use crate::model::parameter::{Parameter, Slot};
 use crate::problem::{Observation, Problem};
@@ -40,7 +40,7 @@ impl PoseSufficiency {
             other => other.coordinates(),
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
-        let coordinates = coordinates((&numbers, &of_arm), (measurements, placement), &split.identification, &of_row);
+        let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
         let parameters = unknowns.len();
         let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
@@ -58,28 +58,29 @@ impl PoseSufficiency {
 }
 
 /// Coordinates that tell of the arm and of its targets: as many as each different point has, but no more than six for a pose of
-/// the arm, with those of contacts and distances added one by one; the shape of its targets is one measurement more.
-fn coordinates(
-    (numbers, of_arm): (&[usize], &[usize]),
-    (measurements, placement): (&Measurements, &Placement),
-    rows: &[usize],
-    of_row: &[usize],
-) -> usize {
+/// the frame that carries them, with those of contacts and distances added one by one; the shape of a frame's targets is one
+/// measurement more.
+fn coordinates(fitting: &Fitting, (numbers, of_arm): (&[usize], &[usize]), rows: &[usize], of_row: &[usize]) -> usize {
+    let Fitting { model, measurements, placement, .. } = fitting;
     let (positions, others): (Vec<usize>, Vec<usize>) =
         rows.iter().partition(|&&row| measurements.observation(row).is_position());
-    let mut points: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
-    let mut targets = BTreeMap::new();
+    // By the frame that carries them.
+    let mut points: BTreeMap<(usize, usize), BTreeMap<usize, usize>> = BTreeMap::new();
+    let mut targets: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
     for &row in &positions {
-        points.entry(of_arm[row]).or_default().insert(numbers[row], of_row[row]);
-        targets.insert(placement.target_of(row), of_row[row]);
+        let target = placement.target_of(row);
+        let carrier = model.carrier(target);
+        points.entry((carrier, of_arm[row])).or_default().insert(numbers[row], of_row[row]);
+        targets.entry(carrier).or_default().insert(target, of_row[row]);
     }
     let of_pose = |own: &BTreeMap<usize, usize>| own.values().sum::<usize>();
     let of_poses: usize = points.values().map(|own| of_pose(own).min(BODY)).sum();
-    let several = points.values().any(|own| of_pose(own) > BODY);
+    let several = |carrier: usize| points.iter().any(|(own, all)| own.0 == carrier && of_pose(all) > BODY);
     let contacts: BTreeSet<(usize, Observation)> =
         others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
     let of_contacts: usize = contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
-    let of_targets = if several { targets.values().sum::<usize>().saturating_sub(BODY) } else { 0 };
+    let of_targets = targets.iter().filter(|(carrier, _)| several(**carrier));
+    let of_targets: usize = of_targets.map(|(_, all)| of_pose(all).saturating_sub(BODY)).sum();
     of_poses + of_targets + of_contacts
 }
 

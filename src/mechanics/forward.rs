@@ -117,7 +117,8 @@ impl<S: Scalar> Arm<S> {
         ws.beyond.resize(self.joints.len(), zero);
         ws.weights.clear();
         let (mut mass, mut hoisted) = (S::from(0.0), zero);
-        for (index, ((joint, beyond), rope)) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev() {
+        for (index, ((joint, beyond), rope)) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
+        {
             for (more, pull) in (0..self.tree.further_on(index)).filter_map(|_| ws.weights.pop()) {
                 mass += more;
                 hoisted += pull;

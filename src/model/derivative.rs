@@ -138,7 +138,8 @@ impl Linearised {
             probe.column_mut(column).fill(0.0);
         }
         let mut moves = Rows { block: probe, row: 0, scale: 1.0 };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut moves) else {
+        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut moves)
+        else {
             put(last_column, Vector3::from_element(f64::NAN));
             return;
         };
@@ -182,7 +183,8 @@ impl Linearised {
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
         let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut rows) else {
+        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut rows)
+        else {
             rows.put(last_column, &Vector3::from_element(f64::NAN));
             return;
         };

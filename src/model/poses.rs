@@ -131,7 +131,12 @@ impl<'a> PoseResiduals<'a> {
                 use_it(pose, Seen { position: seen, turn: None });
                 continue;
             }
-            let seen = match arm.equilibrate_at(&commands.apply(&pose.setup), self.model.carrier(pose.target), &mut ws, &mut rest) {
+            let seen = match arm.equilibrate_at(
+                &commands.apply(&pose.setup),
+                self.model.carrier(pose.target),
+                &mut ws,
+                &mut rest,
+            ) {
                 Ok(()) => {
                     let base = instrument.base(&bases[pose.base], &pose.setup);
                     let position = base.point(&rest.frame.point(&targets[pose.target]));

@@ -67,7 +67,7 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let title = root.text("title")?.unwrap_or(&name).to_owned();
     let (problem, problem_text, problem_file) =
         problem_of(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
-    let model = Model::new(&problem, &[String::new()], &[String::new()])?;
+    let model = Model::new(&problem, &[String::new()], &problem.target_words())?;
     let source = source(&mut root)?;
     let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
     let repetitions = count(&root.require("repetitions", "repetitions = …, fits per cell")?)?;

@@ -78,7 +78,7 @@ fn seed_of(study: &Study, repetition: usize) -> u64 {
 fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     // What no rule speaks of is free where it is an effect's, and held where it is the arm's.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
-    let model = Model::new(&arm, &[String::new()], &[String::new()]).ok()?;
+    let model = Model::new(&arm, &[String::new()], &arm.target_words()).ok()?;
     let x = model.parameters.iter().map(|own| Some(own.deviation(strengths.of(&own.name)?)));
     let x = DVector::from_vec(x.collect::<Option<Vec<f64>>>()?);
     let mut table = table(rows);
@@ -91,7 +91,7 @@ fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec
 /// Positions on the virtual test rig \[m\].
 fn by_rig(arm: Problem, effects: Vec<TrueEffect>, segments: usize, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     let rig = Rig::new(arm, effects).with_segments(segments);
-    rows.iter().map(|row| rig.position(&row.conditions).ok()).collect()
+    rows.iter().map(|row| Some(rig.pose_of(&row.target, &row.conditions).ok()?.0)).collect()
 }
 
 /// What the virtual test rig measured, as a table of measurements.
@@ -113,6 +113,7 @@ pub fn table(rows: &[Row]) -> Measurements {
         approach: (!approach.is_empty()).then_some(approach),
         covariates: rows.iter().flat_map(|row| row.conditions.covariates.iter().copied()).collect(),
         session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
+        target: rows.iter().any(|row| !row.target.is_empty()).then(|| rows.iter().map(|row| &row.target).collect()),
         ..Measurements::default()
     }
 }

@@ -93,7 +93,23 @@ fn joint(
     section.finish()?;
     let location = section.location();
     let (parent, mimic) = (None, None);
-    Ok(Joint { name, kind, parent, placement, mimic, alpha, a, theta, d, beta, limits, stiffness, beam, bodies, location })
+    Ok(Joint {
+        name,
+        kind,
+        parent,
+        placement,
+        mimic,
+        alpha,
+        a,
+        theta,
+        d,
+        beta,
+        limits,
+        stiffness,
+        beam,
+        bodies,
+        location,
+    })
 }
 
 /// `xyz_m` and `rpy_deg`, in URDF's order, if one of them is there.

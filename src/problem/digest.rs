@@ -79,7 +79,8 @@ pub(crate) fn hexadecimal(text: &str) -> String {
 }
 
 fn joint(text: &mut String, index: usize, joint: &Joint) {
-    let Joint { kind, parent, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } = joint;
+    let Joint { kind, parent, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } =
+        joint;
     text.push_str(match kind {
         JointKind::Revolute => "\nrevolute",
         JointKind::Prismatic => "\nprismatic",

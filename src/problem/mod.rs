@@ -98,6 +98,21 @@ impl Problem {
         self.tree().is_chain() && carriers.all(|joint| joint == last)
     }
 
+    /// Refuses an arm that is no chain, for the sake of `what`.
+    ///
+    /// # Errors
+    /// It is none: at the first joint that stands elsewhere than on the one before, or else at the tool.
+    pub fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
+        if self.is_chain() {
+            return Ok(());
+        }
+        let mut joints = self.joints.iter().enumerate();
+        let elsewhere = joints.find(|(index, own)| own.parent != index.checked_sub(1));
+        let file = || Location::file(&self.data.location.file).with_key("tool.joint");
+        let location = elsewhere.map_or_else(file, |(_, own)| own.location.clone().with_key("joint.parent"));
+        Err(location.error(InputErrorKind::NotAChain { what }))
+    }
+
     /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where none is declared.
     ///
     /// # Errors
@@ -109,6 +124,14 @@ impl Problem {
         }
         let found = self.targets.iter().find(|own| own.name == word).cloned();
         found.ok_or_else(|| location.with_key("target").error(self.unknown_target(word)))
+    }
+
+    /// The words by which rows may name their target: the empty one where none is declared.
+    pub fn target_words(&self) -> Vec<String> {
+        if self.targets.is_empty() {
+            return vec![String::new()];
+        }
+        self.targets.iter().map(|own| own.name.clone()).collect()
     }
 
     /// The mistake of a word that names no target.
@@ -130,7 +153,8 @@ impl Problem {
         };
         let whole = || Location { line: None, excerpt: None, ..self.data.location.clone().with_key("tool.target") };
         let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
-        let (location, target) = farthest.map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
+        let (location, target) =
+            farthest.map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
         let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
         let kind = WarningKind::FarTarget { distance: format!("{distance:.3}"), links: format!("{links:.3}") };
         (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })

@@ -83,11 +83,7 @@ pub(super) fn tool(section: Option<Section<'_, '_>>, carriers: &Carriers) -> Res
 }
 
 /// Every `[[target]]`; what one does not say of itself is as in `[tool]`.
-pub(super) fn targets(
-    root: &mut Section<'_, '_>,
-    tool: &Tool,
-    carriers: &Carriers,
-) -> Result<Vec<Target>, InputError> {
+pub(super) fn targets(root: &mut Section<'_, '_>, tool: &Tool, carriers: &Carriers) -> Result<Vec<Target>, InputError> {
     let mut targets: Vec<Target> = Vec::new();
     for mut section in root.sections("target")? {
         let item = section.require("name", "name = \"…\", a word of the column target")?;

@@ -43,7 +43,10 @@ pub(super) fn assumptions<'a>(problem: &Problem, expected: &[Expected], fitted: 
             number(share, 1).trim_end_matches(".0"),
         ));
     }
-    if problem.tool.target.norm() == 0.0 && expected.iter().any(|own| own.name.starts_with("tool")) {
+    if problem.targets.is_empty()
+        && problem.tool.target.norm() == 0.0
+        && expected.iter().any(|own| own.name.starts_with("tool"))
+    {
         points.push(
             "The target sits at the origin of the last frame (target_m = [0, 0, 0] in [tool]). Put in where yours sits: poses tell \
              other things of another point."

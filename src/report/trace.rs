@@ -72,6 +72,8 @@ object! {
         from: &'a Effect = &apart.other,
         /// Configuration \[rad\] or \[m\].
         q: &'a [f64] = &apart.configuration,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        target: Option<&'a str> = apart.target.as_deref(),
         payload_kg: Option<f64> = apart.payload,
         #[serde(rename = "hoist_N")]
         hoist: Option<f64> = apart.hoist,
@@ -359,6 +361,7 @@ fn pose(problem: &Problem, apart: &TellingPose) -> String {
             JointKind::Fixed => None,
         })
         .collect();
+    words.extend(apart.target.as_ref().map(|target| format!("target {target}")));
     words.extend(apart.payload.map(|mass| format!("payload {} kg", number(mass, 2))));
     words.extend(apart.hoist.map(|force| format!("hoist {} N", number(force, 1))));
     words.extend(apart.temperature.map(|degrees| format!("{} °C", number(degrees, 1))));

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Rig;
-use super::chain::{Chain, Force, Hinge};
+use super::chain::{Chain, Force, Hinge, Place};
 use super::effect::TrueEffect;
 use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
@@ -12,13 +12,15 @@ use crate::spatial::rotate;
 pub(super) type Part<'a> = (&'a Effect, &'a [f64]);
 
 impl Rig {
-    /// The chain of one pose, in the base frame.
-    pub(super) fn chain(&self, conditions: &PoseConditions) -> Chain {
+    /// The chain of one pose, in the base frame, and where the frame of each joint is on it.
+    pub(super) fn chain(&self, conditions: &PoseConditions) -> (Chain, Vec<Place>) {
         let gravity = self.gravity();
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut chain = Chain::new(self.base_hinge());
+        let (base, mut frames) = (chain.place(), Vec::with_capacity(self.arm.joints.len()));
         for (index, joint) in self.arm.joints.iter().enumerate() {
             let number = index + 1;
+            chain.go_on_from(joint.parent.and_then(|parent| frames.get(parent)).unwrap_or(&base));
             if let Some(Placement { xyz, rpy }) = &joint.placement {
                 chain.end().translate(xyz);
                 chain.end().rotate_z(rpy.z.sin_cos());
@@ -45,12 +47,14 @@ impl Rig {
             for body in &joint.bodies {
                 chain.load(&body.position, weight(body.mass));
             }
+            frames.push(chain.place());
         }
         let payload = self.payload(conditions);
-        if payload != 0.0 {
+        if let Some(tool) = frames.get(self.arm.tool.joint).filter(|_| payload != 0.0) {
+            chain.go_on_from(tool);
             chain.load(&self.arm.tool.payload_at, weight(payload));
         }
-        chain
+        (chain, frames)
     }
 
     /// The effects of the catalogue with their strengths.

@@ -46,12 +46,21 @@ pub(super) struct Motion {
     pub stretch: f64,
 }
 
-/// A rigid piece: the hinge before it, and where it ends.
+/// A rigid piece behind a hinge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     pub hinge: Hinge,
-    /// The next hinge, or the last frame of the arm, seen from this piece's own hinge.
-    pub end: Frame<f64>,
+    /// Where the hinge sits.
+    pub root: Place,
+}
+
+/// A frame on a piece.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// Index of the piece, an earlier one than any that sits there; `None`: the base.
+    pub piece: Option<usize>,
+    /// Seen from the piece's own hinge, or from the base.
+    pub frame: Frame<f64>,
 }
 
 /// A force on a rigid piece.
@@ -93,35 +102,48 @@ impl Force {
     }
 }
 
-/// Pieces from the base outwards; their loads in the same order.
+/// Pieces from the base outwards, several perhaps on one; their loads in any order.
 #[derive(Debug)]
 pub(super) struct Chain {
     pub pieces: Vec<Piece>,
     pub loads: Vec<Load>,
+    /// Index of the piece at which it goes on, and where that ends so far, seen from its hinge.
+    last: usize,
+    end: Frame<f64>,
 }
 
 impl Chain {
     /// A single piece of no length, clamped to the base by `hinge`.
     pub fn new(hinge: Hinge) -> Self {
-        Self { pieces: vec![Piece { hinge, end: Frame::identity() }], loads: Vec::new() }
+        let root = Place { piece: None, frame: Frame::identity() };
+        Self { pieces: vec![Piece { hinge, root }], loads: Vec::new(), last: 0, end: Frame::identity() }
     }
 
     /// Where the chain ends so far, seen from its last hinge.
     pub fn end(&mut self) -> &mut Frame<f64> {
-        let last = self.pieces.len() - 1;
-        &mut self.pieces[last].end
+        &mut self.end
+    }
+
+    /// The same as a place to come back to.
+    pub fn place(&self) -> Place {
+        Place { piece: Some(self.last), frame: self.end }
+    }
+
+    /// Goes on from a place where it has been.
+    pub fn go_on_from(&mut self, place: &Place) {
+        (self.last, self.end) = (place.piece.unwrap_or(0), place.frame);
     }
 
     /// Goes on behind a hinge; a rigid one is none.
     pub fn hinge(&mut self, hinge: Hinge) {
         if !hinge.is_rigid() {
-            self.pieces.push(Piece { hinge, end: Frame::identity() });
+            self.pieces.push(Piece { hinge, root: self.place() });
+            (self.last, self.end) = (self.pieces.len() - 1, Frame::identity());
         }
     }
 
     /// Hangs a load at a point \[m\] seen from where the chain ends so far.
     pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
-        let at = self.end().point(point);
-        self.loads.push(Load { piece: self.pieces.len() - 1, at, force });
+        self.loads.push(Load { piece: self.last, at: self.end.point(point), force });
     }
 }

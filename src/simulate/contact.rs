@@ -44,13 +44,13 @@ impl Rig {
         let noise = row.position;
         let (fixture, target) = match row.observation {
             Observation::Position | Observation::Tilt(_) | Observation::Between(..) => {
-                let (position, orientation) = self.pose(&row.conditions)?;
+                let (position, orientation) = self.pose_of(&row.target, &row.conditions)?;
                 row.position += position;
                 row.orientation = row.orientation.map(|noise| noise * orientation);
                 return Ok(Some(()));
             }
             Observation::Distance(anchor) => {
-                let (target, _) = self.placed(&row.conditions)?;
+                let (target, _) = self.placed(&row.target, &row.conditions)?;
                 row.position = self.seen(anchor, &target) + Vector3::new(noise.x, 0.0, 0.0);
                 row.orientation = None;
                 return Ok(Some(()));
@@ -59,9 +59,9 @@ impl Rig {
             Observation::Surface(fixture) => (fixture, Vector3::new(noise.x, 0.0, 0.0)),
         };
         (row.position, row.orientation) = (Vector3::zeros(), None);
-        let numbers = row.observation.coordinates();
+        let (numbers, measured) = (row.observation.coordinates(), row.target.clone());
         let missing = |conditions: &PoseConditions| -> Result<DVector<f64>, NoRest> {
-            let seen = self.seen(fixture, &self.placed(conditions)?.0) - target;
+            let seen = self.seen(fixture, &self.placed(&measured, conditions)?.0) - target;
             Ok(DVector::from_column_slice(&seen.as_slice()[..numbers]))
         };
         for _ in 0..TRIES {

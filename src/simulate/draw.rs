@@ -28,6 +28,8 @@ const CONTACTS: u64 = 1000;
 pub struct Row {
     /// What was set.
     pub conditions: PoseConditions,
+    /// Name of the target that is measured; empty where the problem declares none.
+    pub target: String,
     /// What is measured.
     pub observation: Observation,
     /// What the tracker read, measuring frame, or a distance; 0 of a contact \[m\].
@@ -131,18 +133,19 @@ pub fn simulate(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Re
     measured(problem, truth, draw(problem, truth, poses, seed), seed)
 }
 
-/// The same in given poses, one after the other; what they do not say of temperature and sides is drawn where the truth has it.
+/// The same in given poses, each of the target with its name, one after the other; what they do not say of temperature and sides is drawn where the truth has it.
 ///
 /// # Errors
 /// The arm is too soft for its loads.
 pub fn simulate_poses(
     problem: &Problem,
     truth: &Truth,
-    poses: Vec<PoseConditions>,
+    poses: Vec<(PoseConditions, String)>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
     let mut rows = draw_poses(problem, truth, poses.len(), stream(seed, POSES));
-    for (row, given) in rows.iter_mut().zip(poses) {
+    for (row, (given, target)) in rows.iter_mut().zip(poses) {
+        row.target = target;
         let drawn = std::mem::take(&mut row.conditions);
         row.conditions = PoseConditions {
             temperature: given.temperature.or(drawn.temperature),
@@ -232,6 +235,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
     let ranges = &truth.poses;
     let mut rows: Vec<Row> = Vec::with_capacity(poses);
     let mut time = 0.0;
+    let mut targets = problem.target_words().into_iter().cycle();
     for _ in 0..poses {
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
@@ -256,6 +260,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         conditions.covariates = ranges.covariates.iter().map(|&range| between(&mut random, range)).collect();
         rows.push(Row {
             conditions,
+            target: targets.next().unwrap_or_default(),
             observation: Observation::Position,
             position: Vector3::zeros(),
             orientation: None,

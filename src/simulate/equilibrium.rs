@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::chain::{Chain, Motion};
+use super::chain::{Chain, Load, Motion, Place};
 use crate::spatial::Frame;
 
 /// Hinges have settled when one more pass would move all of them together by less [rad, m].
@@ -19,8 +19,8 @@ pub(super) struct AtRest {
     /// Frames of the pieces.
     pieces: Vec<Frame<f64>>,
     motions: Vec<Motion>,
-    /// The last frame of the arm.
-    pub end: Frame<f64>,
+    /// Force \[N\] of all that each piece carries, and its moment about the origin of the base frame [N·m].
+    carried: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl AtRest {
@@ -34,15 +34,18 @@ impl AtRest {
             hinges: Vec::with_capacity(count),
             pieces: Vec::with_capacity(count),
             motions: vec![Motion::default(); count],
-            end: Frame::identity(),
+            carried: Vec::with_capacity(count),
         };
+        // Those of a piece may lie apart where others have come to sit on it.
+        let mut loads = chain.loads.clone();
+        loads.sort_by_key(|load| load.piece);
         let mut from = rest.motions.clone();
         let mut missing = rest.motions.clone();
         let mut next_missing = rest.motions.clone();
         let (mut step, mut least) = (1.0, f64::INFINITY);
         for _ in 0..MAX_PASSES {
             rest.place(chain);
-            let change = rest.load(chain, &mut next_missing);
+            let change = rest.load(chain, &loads, &mut next_missing);
             if change <= SETTLED {
                 return Some(rest);
             }
@@ -67,32 +70,42 @@ impl AtRest {
     fn place(&mut self, chain: &Chain) {
         self.hinges.clear();
         self.pieces.clear();
-        let mut frame = Frame::identity();
         for (piece, motion) in chain.pieces.iter().zip(&self.motions) {
+            let mut frame = self.frame(&piece.root);
             let half = motion.rotation * 0.5;
             frame.rotate(&half);
             self.hinges.push(frame);
             frame.translate_x(motion.stretch);
             frame.rotate(&half);
             self.pieces.push(frame);
-            let axes = piece.end.axes.map(|axis| frame.vector(&axis));
-            frame = Frame { axes, origin: frame.point(&piece.end.origin) };
         }
-        self.end = frame;
     }
 
-    /// Sums the loads from the tip inwards: how far each hinge is from what it does under its load, and their sum.
-    fn load(&self, chain: &Chain, missing: &mut [Motion]) -> f64 {
+    /// Where a place on a piece that has been placed is, base frame.
+    pub fn frame(&self, place: &Place) -> Frame<f64> {
+        let Place { piece, frame: seen } = place;
+        let frame = piece.map_or(Frame::identity(), |piece| self.pieces[piece]);
+        Frame { axes: seen.axes.map(|axis| frame.vector(&axis)), origin: frame.point(&seen.origin) }
+    }
+
+    /// Sums `loads`, in the order of their pieces, from the tips inwards: how far each hinge is from what it does under its load, and
+    /// their sum.
+    fn load(&mut self, chain: &Chain, loads: &[Load], missing: &mut [Motion]) -> f64 {
         let mut sum = 0.0;
-        let mut loads = chain.loads.iter().rev().peekable();
-        // Moments about the origin of the base frame.
-        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let mut loads = loads.iter().rev().peekable();
+        self.carried.clear();
+        self.carried.resize(chain.pieces.len(), (Vector3::zeros(), Vector3::zeros()));
         for (k, piece) in chain.pieces.iter().enumerate().rev() {
+            let (mut force, mut moment) = self.carried[k];
             while let Some(load) = loads.next_if(|load| load.piece == k) {
                 let at = self.pieces[k].point(&load.at);
                 let pull = load.force.at(&at);
                 force += pull;
                 moment += at.cross(&pull);
+            }
+            if let Some(below) = piece.root.piece {
+                self.carried[below].0 += force;
+                self.carried[below].1 += moment;
             }
             let hinge = &self.hinges[k];
             let about_hinge = moment - hinge.origin.cross(&force);

@@ -56,7 +56,7 @@ pub struct Rig {
 pub struct NoRest;
 
 impl Rig {
-    /// An arm with its true parameters and the effects at work; its base, tool, gravity and T₀ are those of `arm`.
+    /// An arm with its true parameters and the effects at work; its base, tool, targets, gravity and T₀ are those of `arm`.
     pub fn new(arm: Problem, effects: Vec<TrueEffect>) -> Self {
         Self { arm, effects, segments: SEGMENTS }
     }
@@ -81,19 +81,38 @@ impl Rig {
     /// # Errors
     /// The arm is too soft for its loads.
     pub fn pose(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
-        let (seen, orientation) = self.placed(conditions)?;
+        self.pose_of("", conditions)
+    }
+
+    /// The same of the target with this name; of the tool where there is none.
+    ///
+    /// # Errors
+    /// The arm is too soft for its loads.
+    pub fn pose_of(
+        &self,
+        target: &str,
+        conditions: &PoseConditions,
+    ) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
+        let (seen, orientation) = self.placed(target, conditions)?;
         Ok((self.track(seen, conditions), orientation))
     }
 
-    /// Where the target is, measuring frame \[m\], and its orientation there.
-    fn placed(&self, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
-        let rest = AtRest::find(&self.chain(conditions)).ok_or(NoRest)?;
+    /// Where the target with this name is, measuring frame \[m\], and its orientation there.
+    fn placed(&self, target: &str, conditions: &PoseConditions) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoRest> {
+        let (chain, frames) = self.chain(conditions);
+        let rest = AtRest::find(&chain).ok_or(NoRest)?;
+        let tool = &self.arm.tool;
+        let (joint, at, rotation) = match self.arm.targets.iter().find(|own| own.name == target) {
+            Some(own) => (own.joint, own.at, own.rotation),
+            None => (tool.joint, tool.target, tool.rotation),
+        };
+        let carrier = rest.frame(frames.get(joint).ok_or(NoRest)?);
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
         let base = self.mounted(conditions).seen(&base);
-        let seen = base.point(&rest.end.point(&self.arm.tool.target));
-        let axes = base.seen(&rest.end).axes;
+        let seen = base.point(&carrier.point(&at));
+        let axes = base.seen(&carrier).axes;
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
-        let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(self.arm.tool.rotation);
+        let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(rotation);
         let finite = seen.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());
         if finite { Ok((seen, orientation)) } else { Err(NoRest) }
     }

@@ -43,6 +43,11 @@ impl Simulation {
         joints.filter(|(_, kind)| *kind != JointKind::Fixed).map(|(index, kind)| (index, kind == JointKind::Revolute))
     }
 
+    /// Whether rows name their targets.
+    fn names_targets(&self) -> bool {
+        self.rows.iter().any(|row| !row.target.is_empty())
+    }
+
     fn header(&self) -> Vec<String> {
         let set = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
@@ -65,6 +70,7 @@ impl Simulation {
             (set.temperature.is_some(), "temperature_C"),
             (true, "time_s"),
         ];
+        names.extend(self.names_targets().then(|| "target".to_owned()));
         names.extend(columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
         names.extend(self.covariates.iter().cloned());
         if set.approach.is_some() {
@@ -81,6 +87,7 @@ impl Simulation {
             q if turns => format!("{:.6}", q.to_degrees()),
             q => format!("{q:.9}"),
         }));
+        cells.extend(self.names_targets().then(|| row.target.clone()));
         self.observed(row, &mut cells);
         let turn = row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
         let turned = self.truth.orientation_sigma.is_some();

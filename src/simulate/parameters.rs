@@ -1,6 +1,6 @@
 //! The parameters of an arm by name, to be given true values.
 
-use crate::problem::{Fixture, Placement, Problem};
+use crate::problem::{Fixture, Placement, Problem, Target};
 use crate::quantity::Unit;
 
 /// A parameter with its nominal and its true value, SI.
@@ -67,8 +67,17 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
         }
         rigidity("GJ", FlexuralRigidity, &mut beam.gj);
     }
-    for (axis, value) in ["x", "y", "z"].into_iter().zip(problem.tool.target.iter_mut()) {
-        see(format!("tool.{axis}"), Length, value);
+    let mut targets = Vec::new();
+    for Target { name, at, rotation, .. } in &mut problem.targets {
+        targets.push((format!("tool[{name}]"), at, rotation));
+    }
+    if targets.is_empty() {
+        targets.push(("tool".to_owned(), &mut problem.tool.target, &mut problem.tool.rotation));
+    }
+    for (name, at, _) in &mut targets {
+        for (axis, value) in ["x", "y", "z"].into_iter().zip(at.iter_mut()) {
+            see(format!("{name}.{axis}"), Length, value);
+        }
     }
     for (axis, value) in ["x", "y", "z"].into_iter().zip(problem.base.translation.iter_mut()) {
         see(format!("base.{axis}"), Length, value);
@@ -78,8 +87,10 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
     }
     // Behind all others, so that they are drawn as without it.
     if problem.data.orientation_sigma.is_some() {
-        for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(problem.tool.rotation.iter_mut()) {
-            see(format!("tool.{axis}"), Angle, value);
+        for (name, _, rotation) in targets {
+            for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(rotation.iter_mut()) {
+                see(format!("{name}.{axis}"), Angle, value);
+            }
         }
     }
     visit_fixtures(&mut problem.fixtures, see);
