@@ -18,3 +18,5 @@ mod reciprocity;
 mod symmetry;
 #[path = "statics/textbook.rs"]
 mod textbook;
+#[path = "statics/tree.rs"]
+mod tree;

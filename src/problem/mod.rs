@@ -109,7 +109,8 @@ impl Problem {
         let mut joints = self.joints.iter().enumerate();
         let elsewhere = joints.find(|(index, own)| own.parent != index.checked_sub(1));
         let file = || Location::file(&self.data.location.file).with_key("tool.joint");
-        let location = elsewhere.map_or_else(file, |(_, own)| own.location.clone().with_key("joint.parent"));
+        let location = elsewhere
+            .map_or_else(file, |(index, own)| own.location.clone().with_key(format!("joint[{}].parent", index + 1)));
         Err(location.error(InputErrorKind::NotAChain { what }))
     }
 

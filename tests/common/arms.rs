@@ -23,6 +23,9 @@ pub const TABLE_2: [[f64; 5]; 4] = [
 /// stiffnesses that differ, a rope that leans, a payload away from the target.
 pub const ODD: &str = include_str!("odd.toml");
 
+/// A tree of joints: branches of branches, one on the base, beams, a rope, a target in the midst of the arm.
+pub const TREE: &str = include_str!("tree.toml");
+
 /// A path below the package's folder.
 pub fn path(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(relative)

@@ -24,6 +24,14 @@ pub fn at_random(problem: &Problem, count: usize, reach: f64, rng: &mut ChaCha8R
     Dataset::builder(configurations, vec![Vector3::zeros(); count]).measurements().unwrap()
 }
 
+/// The same, with the targets of the problem measured one after the other.
+pub fn of_targets(problem: &Problem, rows: Measurements) -> Measurements {
+    let words = problem.target_words();
+    let target =
+        (!problem.targets.is_empty()).then(|| labels(words.iter().cycle().map(String::as_str).take(rows.len())));
+    Measurements { target, ..rows }
+}
+
 /// Labels of the rows, in order of appearance.
 pub fn labels<'a>(words: impl Iterator<Item = &'a str>) -> Labels {
     words.collect()

@@ -13,9 +13,9 @@ use nalgebra::DVector;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::common::arms::{ODD, golden_problem, parse};
+use crate::common::arms::{ODD, TREE, golden_problem, parse};
 use crate::common::effects::{Strong, of_lunar_sampler};
-use crate::common::made::at_random;
+use crate::common::made::{at_random, of_targets};
 
 /// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts on it.
 pub fn lunar() -> (Problem, Vec<Strong>) {
@@ -70,6 +70,38 @@ pub fn odd() -> (Problem, Vec<Strong>) {
     (arm, all)
 }
 
+/// A tree of joints, with effects on its trunk and on several of its branches.
+pub fn tree() -> (Problem, Vec<Strong>) {
+    let mut arm = parse(TREE);
+    arm.parameters.clear();
+    arm.data.reference_temperature = Some(20.0);
+    let link = |name: &str| name.to_owned();
+    let all = vec![
+        (Effect::JointCompliance { joint: 1 }, vec![1e-5]),
+        (Effect::JointCompliance { joint: 7 }, vec![2e-4]),
+        (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::GearRatio { joint: 8 }, vec![4e-3]),
+        (Effect::Backlash { joint: 3 }, vec![5e-4]),
+        (Effect::JointNonlinearStiffness { joint: 5 }, vec![1e-8]),
+        (Effect::JointLateralCompliance { joint: 2 }, vec![1e-5, 2e-5]),
+        (Effect::JointThermalDrift { joint: 9 }, vec![2e-5]),
+        (Effect::JointCoupling { joint: 6, from: 3 }, vec![3e-3]),
+        (Effect::LinkBending { joint: 6 }, vec![3e-4]),
+        (Effect::LinkThermalBending { link: link("T") }, vec![1e-5, 2e-5]),
+        (Effect::LinkThermalExpansion { link: link("R") }, vec![12e-6]),
+        (Effect::UnmodelledMass { link: link("L") }, vec![1.4, 0.3]),
+        (Effect::PayloadMass, vec![0.6]),
+        (Effect::HoistForce, vec![0.08]),
+        (Effect::HoistDirection, vec![0.05, -0.03, 0.04]),
+        (Effect::BaseCompliance, vec![1e-5, 2e-5]),
+        (Effect::GravityDirection, vec![0.03, -0.02]),
+        (Effect::DeflectedEquilibrium, vec![1.0]),
+        (Effect::TrackerScale, vec![5e-4]),
+        (Effect::PayloadBacklash { joint: 8 }, vec![4e-3]),
+    ];
+    (arm, all)
+}
+
 /// Columns of one's own.
 fn covariates(names: &[&str]) -> Vec<OwnCovariate> {
     let location = Location::file(Path::new("problem.toml"));
@@ -95,9 +127,9 @@ pub fn in_truth(arm: &Problem, (effect, values): &Strong) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect.clone()), values, &arm.joints).unwrap()
 }
 
-/// Random poses in which every effect may act, every second with directions of approach if wanted.
+/// Random poses in which every effect may act, of the targets one after the other, every second with directions of approach if wanted.
 pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng) -> Measurements {
-    let mut rows = at_random(arm, count, 1.5, rng);
+    let mut rows = of_targets(arm, at_random(arm, count, 1.5, rng));
     let n = arm.joints.len();
     rows.payload = Some((0..count).map(|k| if k % 3 == 0 { 0.0 } else { rng.random_range(0.5..3.0) }).collect());
     rows.hoist = Some((0..count).map(|_| rng.random_range(30.0..60.0)).collect());

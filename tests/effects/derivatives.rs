@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::catalogue::{declared, lunar, odd, of_effects, poses, strengths};
+use crate::catalogue::{declared, lunar, odd, of_effects, poses, strengths, tree};
 use crate::common::arms::path;
 use crate::common::effects::Strong;
 use crate::common::made::{labels, model_of};
@@ -109,6 +109,21 @@ fn every_effect_on_elastic_arms() {
             }
         }
     }
+}
+
+#[test]
+fn every_effect_on_a_tree_of_joints_and_all_at_once() {
+    let (mut arm, all) = tree();
+    let rows = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(9));
+    for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
+        arm.statics.equilibrium = equilibrium;
+        for effect in &all {
+            check("tree", &arm, std::slice::from_ref(effect), &rows, false, &[]);
+        }
+    }
+    arm.statics.equilibrium = Equilibrium::Undeflected;
+    arm.parameters = crate::common::arms::parse(crate::common::arms::TREE).parameters;
+    check("tree", &arm, &all, &rows, true, &[]);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::catalogue::{conditions, declared, in_truth, lunar, odd, poses, strengths};
+use crate::catalogue::{conditions, declared, in_truth, lunar, odd, poses, strengths, tree};
 use crate::common::effects::Strong;
 use crate::common::made::{model_of, predicted};
 
@@ -19,7 +19,8 @@ const FLOOR: f64 = 1e-6;
 fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vector3<f64>> {
     let effects = effects.iter().map(|effect| in_truth(arm, effect)).collect();
     let rig = Rig::new(arm.clone(), effects);
-    (0..rows.len()).map(|row| rig.position(&conditions(rows, row)).unwrap()).collect()
+    let word = |row: usize| rows.target.as_ref().map_or("", |own| own.names[own.of_row[row]].as_str());
+    (0..rows.len()).map(|row| rig.pose_of(word(row), &conditions(rows, row)).unwrap().0).collect()
 }
 
 /// Compares what an effect changes: largest change, largest difference, and whether that is allowed.
@@ -58,7 +59,7 @@ fn check_all((mut arm, all): (Problem, Vec<Strong>), seed: u64) {
     arm.statics.beam_elements = 12;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for approaches in [true, false] {
-        let rows = poses(&arm, 8, approaches, &mut rng);
+        let rows = poses(&arm, 8.max(2 * arm.targets.len()), approaches, &mut rng);
         for effect in &all {
             check(&arm, effect, &rows);
         }
@@ -76,8 +77,13 @@ fn effects_on_an_arm_with_every_kind_of_joint_are_those_of_the_rig() {
 }
 
 #[test]
+fn effects_on_a_tree_of_joints_are_those_of_the_rig() {
+    check_all(tree(), 7);
+}
+
+#[test]
 fn several_effects_at_once_are_those_of_the_rig() {
-    for (mut arm, mut all) in [lunar(), odd()] {
+    for (mut arm, mut all) in [lunar(), odd(), tree()] {
         arm.statics.beam_elements = 12;
         all.retain(|(effect, _)| *effect != Effect::DeflectedEquilibrium);
         let rows = poses(&arm, 8, true, &mut ChaCha8Rng::seed_from_u64(3));
@@ -95,7 +101,7 @@ fn several_effects_at_once_are_those_of_the_rig() {
 
 #[test]
 fn every_effect_is_inert_at_zero() {
-    for (arm, all) in [lunar(), odd()] {
+    for (arm, all) in [lunar(), odd(), tree()] {
         for approaches in [true, false] {
             let rows = poses(&arm, 6, approaches, &mut ChaCha8Rng::seed_from_u64(4));
             for (effect, _) in &all {

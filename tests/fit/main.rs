@@ -17,4 +17,5 @@ mod recovery;
 mod robust;
 mod runaway;
 mod sigma;
+mod tree;
 mod trust;

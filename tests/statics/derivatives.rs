@@ -2,8 +2,8 @@
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
-use crate::common::arms::{ODD, golden_problem, measured, parse, path, with_parameters};
-use crate::common::made::{at_random, draw, labels, model_of, part};
+use crate::common::arms::{ODD, TREE, golden_problem, measured, parse, path, with_parameters};
+use crate::common::made::{at_random, draw, labels, model_of, of_targets, part};
 use flexcal::identify::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
@@ -151,4 +151,35 @@ fn some_parameters_among_many_have_the_same_columns() {
         let scale = whole.column(k).norm();
         assert!((column - whole.column(k)).norm() <= 1e-12 * scale, "{}", model.parameters[k].name);
     }
+}
+
+#[test]
+fn every_parameter_of_a_tree_with_targets_on_all_of_its_branches() {
+    for (what, mut problem) in [("tree", parse(TREE)), ("two arms", free(&path("problems/two-arms/problem.toml")))] {
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let mut rows = of_targets(&problem, at_random(&problem, 15, 1.2, &mut random));
+        rows.payload = Some((0..rows.len()).map(|row| row as f64 * 0.1).collect());
+        for elements in [1, 2] {
+            problem.statics.beam_elements = elements;
+            for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
+                problem.statics.equilibrium = equilibrium;
+                let x = draw(&model_of(&problem, &rows), |unit| 0.1 * size(unit), &mut random);
+                check_at(&format!("{what}, {elements} elements, {equilibrium:?}"), &problem, &rows, &x, &[]);
+            }
+        }
+        for joint in &mut problem.joints {
+            (joint.stiffness, joint.beam) = (None, None);
+        }
+        let rows = of_targets(&problem, at_random(&problem, 15, 1.2, &mut random));
+        let x = draw(&model_of(&problem, &rows), |unit| 0.1 * size(unit), &mut random);
+        check_at(&format!("rigid {what}"), &problem, &rows, &x, &[]);
+    }
+}
+
+/// A problem with everything free.
+fn free(file: &std::path::Path) -> Problem {
+    let text = std::fs::read_to_string(file).unwrap();
+    let (before, after) = text.split_once("[parameters]\n").unwrap();
+    let (_, after) = after.split_once("\n[data]\n").unwrap();
+    parse(&format!("{before}[parameters]\n\"*\" = {{ free = true }}\n[data]\n{after}"))
 }

@@ -1,6 +1,6 @@
 //! Sections of a problem.
 
-use super::reading::check_problems;
+use super::reading::{ARM, check, check_problems, problem, table};
 
 #[test]
 fn joints_and_beams() {
@@ -45,6 +45,49 @@ fn joints_and_beams() {
         ("[[joint.body]]\nmass_kg = 1\nat_m = [0, 0, 0]", &[":5: joint[1].body[1].at_m: unknown key", "com_m"]),
         ("[[joint]]\n[[joint.body]]", &[":4: joint[2].body[1].mass_kg: missing"]),
     ]);
+}
+
+#[test]
+fn trees_and_targets() {
+    const RIGHT: &str = "[[joint]]\n[[joint]]\nparent = 1\n";
+    let ended = format!("{RIGHT}[[joint]]\nparent = 2");
+    let twice = "[[target]]\nname = 'a'\n[[target]]\nname = 'a'";
+    check_problems(&[
+        ("parent = 1", &[":3: joint[1].parent: joint 1 cannot stand on joint 1: list it behind"]),
+        ("parent = 2\n[[joint]]\nparent = 1", &[":3: joint[1].parent: joint 1 cannot stand on joint 2"]),
+        ("[[joint]]\nparent = 7", &[":4: joint[2].parent: no joint 7; the arm has 2"]),
+        ("parent = -1", &[":3: joint[1].parent: -1 is not a whole number of at least 0"]),
+        (
+            &ended,
+            &[":7: joint[4].parent: the branch of joint 2 has ended; list everything that stands on a joint right"],
+        ),
+        ("[tool]\njoint = 2", &[":4: tool.joint: no joint 2; the arm has 1"]),
+        ("[[target]]\nname = 'a'\njoint = 0", &[":5: target[1].joint: no joint 0; the arm has 1"]),
+        (
+            "[[target]]\nat_m = [0, 0, 0]",
+            &[":3: target[1].name: missing; write name = \"…\", a word of the column target"],
+        ),
+        ("[[target]]\nname = 'a b'", &[":4: target[1].name: \"a b\" cannot name a target"]),
+        ("[[target]]\nname = 'a'\nat = [0, 0, 0]", &[":5: target[1].at: a length needs a unit"]),
+        (twice, &[":6: target[2].name: another target is called \"a\" (line 3)"]),
+    ]);
+    for (text, key) in [("[[joint]]\nparent = 0", "joint[2].parent"), ("[tool]\njoint = 1", "tool.joint")] {
+        let error = problem(&format!("dh = 'standard'\n{ARM}{text}\n")).expect_err(text);
+        check(&error, text, &[&format!(":5: {key}: a standard table has one chain and one tool")]);
+    }
+    let named = format!("{ARM}[[target]]\nname = 'left'\n[[target]]\nname = 'right'\n");
+    for (text, words) in [
+        (
+            "q1_deg,x_m,y_m,z_m\n1,2,3,4\n",
+            "rows.csv:1: column target: the rows name no target; each of them measures one of left, right: add a column target",
+        ),
+        (
+            "q1_deg,x_m,y_m,z_m,target\n1,2,3,4,lft\n",
+            "rows.csv:2: column target: no target is called \"lft\" (did you mean left?); there are left, right",
+        ),
+    ] {
+        check(&table(&named, text.as_bytes()).expect_err(text), text, &[words]);
+    }
 }
 
 #[test]
