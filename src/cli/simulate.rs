@@ -81,7 +81,7 @@ fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<(PoseConditi
         diagnostic::print_warnings(&warnings);
     }
     let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
-    let word = |row: usize| target.map_or_else(String::new, |own| own.names[own.of_row[row]].clone());
+    let word = |row: usize| target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default();
     Ok(rows.all_conditions().into_iter().enumerate().map(|(row, own)| (own, word(row))).collect())
 }
 

@@ -22,15 +22,17 @@ impl Tree {
         if is_chain {
             return Self::default();
         }
-        let mut ends: Vec<usize> = (1..=joints.len()).collect();
-        let mut begun = vec![0_usize; joints.len() + 1];
+        let mut stands = Self { ends: (1..=joints.len()).collect(), further: Vec::new() };
+        // Everything that stands on a joint is behind it, the last of it in the last branch.
         for (index, own) in joints.iter().enumerate().rev() {
-            begun[own.parent.map_or(0, |parent| parent + 1)] += 1;
-            if let Some(parent) = own.parent {
-                ends[parent] = ends[parent].max(ends[index]);
+            let end = stands.ends.get(index).copied().unwrap_or(index + 1);
+            if let Some(of_parent) = own.parent.and_then(|parent| stands.ends.get_mut(parent)) {
+                *of_parent = end.max(*of_parent);
             }
         }
-        Self { ends, further: begun.into_iter().map(|begun| begun.saturating_sub(1)).collect() }
+        let on = |carrier: Option<usize>| joints.iter().filter(|own| own.parent == carrier).count().saturating_sub(1);
+        stands.further = std::iter::once(None).chain((0..joints.len()).map(Some)).map(on).collect();
+        stands
     }
 
     /// Whether each joint stands on the one before it.
