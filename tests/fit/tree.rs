@@ -1,7 +1,5 @@
 //! Two arms on one torso, measured on the virtual test rig: what a fit and the loop make of it.
 
-#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
-
 use flexcal::diagnose::{Verdict, close};
 use flexcal::identify::{Options, Placement, compensate, identify};
 use flexcal::measurement::{Dataset, Split};

@@ -1,7 +1,5 @@
 //! Two arms on a torso: where both hands rest, from transforms multiplied and moments summed here.
 
-#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
-
 use flexcal::identify::Placement;
 use flexcal::least_squares::jacobian;
 use flexcal::measurement::Measurements;
