@@ -138,6 +138,32 @@ fn fixture(
     })
 }
 
+/// Refuses a table without a column of targets where the problem declares some.
+pub(super) fn names_targets(table: &Table, columns: &Columns, problem: &Problem) -> Result<(), InputError> {
+    if problem.targets.is_empty() || columns.has(Role::Target) {
+        return Ok(());
+    }
+    Err(table.column("target").error(problem.unknown_target("")))
+}
+
+/// Refuses the row that the table is at, in a file with this `stem`, where it names a target that the problem does not declare
+/// among others.
+pub(super) fn known_target(table: &Table, columns: &Columns, stem: &str, problem: &Problem) -> Result<(), InputError> {
+    if problem.targets.is_empty() {
+        return Ok(());
+    }
+    let place = columns.place(Role::Target);
+    let word = place.map_or(Ok(stem), |place| table.name(place))?;
+    if problem.targets.iter().any(|own| own.name == word) {
+        return Ok(());
+    }
+    let kind = problem.unknown_target(word);
+    Err(match place {
+        Some(place) => table.cell_error(place, kind),
+        None => table.error(kind),
+    })
+}
+
 /// Adds the known distances between points as rows of their own, behind the others, and settles the σ of every row.
 pub(super) fn complete(measurements: &mut Measurements, problem: &Problem) -> Result<(), InputError> {
     if measurements.observations.is_empty() || measurements.is_empty() {

@@ -94,9 +94,7 @@ impl<'a> Tables<'a> {
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
         let mut columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
-        if !self.problem.targets.is_empty() && !columns.has(Role::Target) {
-            return Err(table.column("target").error(self.problem.unknown_target("")));
-        }
+        observed::names_targets(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
             return Err(Location::file(&table.file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
@@ -112,7 +110,7 @@ impl<'a> Tables<'a> {
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
-                known_target(&table, &columns, rows.stem(index), self.problem)?;
+                observed::known_target(&table, &columns, rows.stem(index), self.problem)?;
                 let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
                 for observed in observed::of_row(&table, &columns, (self.problem, self.measured, lost), in_point)? {
                     rows.push(index, &table, &columns, &observed)?;
@@ -152,24 +150,6 @@ impl<'a> Tables<'a> {
             None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
         }
     }
-}
-
-/// Refuses the row that the table is at, in a file with this `stem`, where it names a target that the problem does not declare
-/// among others.
-fn known_target(table: &Table, columns: &Columns, stem: &str, problem: &Problem) -> Result<(), InputError> {
-    if problem.targets.is_empty() {
-        return Ok(());
-    }
-    let place = columns.place(Role::Target);
-    let word = place.map_or(Ok(stem), |place| table.name(place))?;
-    if problem.targets.iter().any(|own| own.name == word) {
-        return Ok(());
-    }
-    let kind = problem.unknown_target(word);
-    Err(match place {
-        Some(place) => table.cell_error(place, kind),
-        None => table.error(kind),
-    })
 }
 
 /// Rows of a table in which nothing was measured.
