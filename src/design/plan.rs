@@ -137,7 +137,10 @@ pub fn plan(
     if tried < poses {
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });
     }
-    let attainable = Forecast::new(parameters, &all).open;
+    let Forecast { open: attainable, identifiability, .. } = Forecast::new(parameters, &all);
+    if identifiability.rank == 0 {
+        return Err(DesignError::NothingSeen);
+    }
     let exchange =
         Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
     let (ends, starts) = starts(&exchange, options);

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::fitting::Fitting;
 use super::outliers::{Outlier, chances, scatter};
@@ -33,24 +34,27 @@ pub(super) fn outliers(
     let residuals = stage.residuals(x);
     let at = residuals.reduced(x);
     let n = unknowns.len();
-    let mut lengths = Vec::with_capacity(rows.len());
-    for first in (0..rows.len()).step_by(CHUNK_ITEMS) {
-        let items = first..(first + CHUNK_ITEMS).min(rows.len());
-        let of_pose = stage.coordinates();
-        let mut block = Block::zeros(of_pose * items.len(), n);
-        residuals.linearise(&at, items.clone(), &mut block);
-        for pose in 0..items.len() {
-            let jacobian = DMatrix::from_fn(3, n, |i, j| block.column(j)[of_pose * pose + i]);
+    let of_pose = stage.coordinates();
+    let of_chunk = |chunk: usize| -> Vec<f64> {
+        let items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(rows.len());
+        let poses = items.len();
+        let mut block = Block::zeros(of_pose * poses, n);
+        residuals.linearise(&at, items, &mut block);
+        let jacobian = DMatrix::from_fn(3 * poses, n, |row, j| block.column(j)[of_pose * (row / 3) + row % 3]);
+        let spread = &jacobian * covariance;
+        let length = |pose: usize| {
             let residual = Vector3::from_fn(|i, _| block.column(n)[of_pose * pose + i]);
-            let own = &jacobian * covariance * jacobian.transpose();
-            let spread = Matrix3::identity() + Matrix3::from_fn(|i, j| own[(i, j)]);
+            let entry = |i: usize, k: usize| spread.row(3 * pose + i).dot(&jacobian.row(3 * pose + k));
+            let own = Matrix3::identity() + Matrix3::from_fn(entry);
             // Scaled: squares of what is far off overflow.
             let size = residual.amax().max(1.0);
             let square =
-                spread.cholesky().map_or(f64::NAN, |factor| (residual / size).dot(&factor.solve(&(residual / size))));
-            lengths.push(size * square.max(0.0).sqrt());
-        }
-    }
+                own.cholesky().map_or(f64::NAN, |factor| (residual / size).dot(&factor.solve(&(residual / size))));
+            size * square.max(0.0).sqrt()
+        };
+        (0..poses).map(length).collect()
+    };
+    let lengths: Vec<f64> = (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().flat_map_iter(of_chunk).collect();
     let numbers: Vec<usize> = stage.poses.iter().map(|pose| pose.observation.coordinates()).collect();
     let chances = chances(&numbers);
     let scatter = scatter(&lengths, &chances).max(1.0);

@@ -1,5 +1,6 @@
 //! From measurements to estimates with their errors.
 
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use nalgebra::DVector;
@@ -19,7 +20,7 @@ use super::statistics::Statistics;
 use super::{Placement, ProgressSink, SolverChoice, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
-use crate::least_squares::{Identifiability, Loss, Memory};
+use crate::least_squares::{Loss, Memory};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::effect::Columns;
@@ -286,7 +287,7 @@ pub fn identify_model(
         weak: end.gauge.weak.clone(),
         orientation: fitting.orientation(&start, &end.x),
         coordinates: whole.count(),
-        identifiability: Identifiability::of(&fitting.whole().data_triangle(&start)),
+        sight: (fitting.whole().data_triangle(&start), OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),

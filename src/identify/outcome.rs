@@ -1,6 +1,8 @@
 //! What an identification gives.
 
-use nalgebra::DVector;
+use std::sync::OnceLock;
+
+use nalgebra::{DMatrix, DVector};
 
 use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
@@ -116,10 +118,10 @@ pub struct Identification {
     pub weak: Vec<UnidentifiableCombination>,
     /// Measured coordinates that were fitted.
     pub coordinates: usize,
-    /// Names of the fitted parameters, in the order of `identifiability`.
+    /// Names of the fitted parameters, in the order of [`Identification::identifiability`].
     pub unknowns: Vec<String>,
-    /// What the identification data can tell about them, at the registered nominal arm.
-    pub identifiability: Identifiability,
+    /// Triangular factor of their whitened Jacobian, data alone, at the registered nominal arm, and what it tells once that was asked.
+    pub(super) sight: (DMatrix<f64>, OnceLock<Identifiability>),
     /// Every free parameter.
     pub estimates: Vec<Estimate>,
     /// Covariance of the estimates.
@@ -142,6 +144,13 @@ impl Identification {
     /// Whether the fit is to be trusted.
     pub fn is_trusted(&self) -> bool {
         self.quality_flag.is_none()
+    }
+
+    /// What the identification data can tell about the fitted parameters, at the registered nominal arm: worked out when it is first asked
+    /// for.
+    pub fn identifiability(&self) -> &Identifiability {
+        let (triangle, found) = &self.sight;
+        found.get_or_init(|| Identifiability::of(triangle))
     }
 
     /// What to ask about the fit, in words: whether priors decide most of it, and its cautions.

@@ -14,7 +14,7 @@ use crate::least_squares::solver::{
     Solution,
 };
 use crate::least_squares::{
-    Fit, Identifiability, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied, Triangle,
+    Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied, Triangle,
     UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
@@ -204,12 +204,7 @@ impl<'a> Stage<'a> {
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
         let seen = Triangle::of(&stacked.select_columns(&free));
-        let (unseen, outside) = if Identifiability::sees_all(&seen) {
-            (DMatrix::zeros(0, free.len()), vec![1.0; free.len()])
-        } else {
-            let found = Identifiability::of(&seen);
-            (found.gauge, found.visible)
-        };
+        let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
         let all = self.sizes();
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
         let weak = Weak::of(&below(&seen, &unseen), &sizes);

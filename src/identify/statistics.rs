@@ -9,7 +9,7 @@ use super::noise_model::{IMPROBABLE, NoiseModel};
 use super::outliers::Lengths;
 use super::prices::Prices;
 use super::stage::{Stage, StageError};
-use crate::least_squares::{Identifiability, Loss, Uncertainty};
+use crate::least_squares::{Blind, Loss, Uncertainty};
 use crate::model::Pose;
 
 /// A part this large in unidentifiable combinations leaves an unknown without an error of its own.
@@ -72,7 +72,7 @@ impl Statistics {
         let visible = if priors.iter().all(Option::is_some) {
             vec![1.0; errors.len()]
         } else {
-            Identifiability::of(&stage.data_triangle(&end.x)).visible
+            Blind::in_triangle(&stage.data_triangle(&end.x)).visible
         };
         let identified = (0..errors.len())
             .map(|j| match priors[j] {

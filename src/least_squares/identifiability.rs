@@ -17,6 +17,10 @@ const ZERO_COLUMN: f64 = 1e-14;
 const SIZEABLE: f64 = 0.1;
 /// Entries of a combination below this are rounding.
 const NEGLIGIBLE: f64 = 1e-6;
+/// A triangle without a singular value below this part of the largest sees everything, however that is counted.
+const CERTAIN: f64 = 2.0 * BLIND_BELOW;
+/// What moves nothing by more than this part of the largest is blind, however that is counted.
+const ROUNDING: f64 = 1e-12;
 
 /// What the data of a problem can identify, from the triangular factor R of its Jacobian.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,33 +49,13 @@ pub struct UnidentifiableCombination {
 impl Identifiability {
     /// Of the least-squares problem with triangular factor `triangle` (n × n).
     pub fn of(triangle: &DMatrix<f64>) -> Self {
-        let n = triangle.ncols();
-        let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm()).collect();
-        let largest = norms.iter().copied().fold(0.0, f64::max);
-        let scale: Vec<f64> = norms.iter().map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 }).collect();
-        let mut scaled = triangle.clone();
-        for (mut column, (norm, scale)) in scaled.column_iter_mut().zip(norms.iter().zip(&scale)) {
-            column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
-        }
+        let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
         let threshold = BLIND_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
         let null = complement(&right.columns(0, rank).into_owned());
-        let visible = (0..n).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
-        let unidentifiable = named(null.clone(), &scaled);
-        let gauge = DMatrix::from_fn(n - rank, n, |i, j| null[(i, j)] * scale[j]);
-        Self { singular_values, rank, unidentifiable, gauge, visible }
-    }
-
-    /// Whether the problem with triangular factor `triangle` sees every combination for certain: quicker to say than what it does
-    /// not see.
-    pub(crate) fn sees_all(triangle: &DMatrix<f64>) -> bool {
-        let mut unit = triangle.clone();
-        for mut column in unit.column_iter_mut() {
-            let norm = column.norm();
-            column.unscale_mut(norm);
-        }
-        regular_inverse(&unit, 2.0 * BLIND_BELOW).is_some()
+        let Blind { gauge, visible } = Blind::of(&null, &scale);
+        Self { singular_values, rank, unidentifiable: named(null, &scaled), gauge, visible }
     }
 
     /// Ratio of the largest singular value to the smallest that is not zero.
@@ -97,6 +81,80 @@ impl Identifiability {
             used.iter().map(|value| value.recip()).sum::<f64>().recip(),
         ]
     }
+}
+
+/// What the data do not see, without the singular values of what they see.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Blind {
+    /// As [`Identifiability::gauge`].
+    pub gauge: DMatrix<f64>,
+    /// As [`Identifiability::visible`].
+    pub visible: Vec<f64>,
+}
+
+impl Blind {
+    /// Of the least-squares problem with triangular factor `triangle` (n × n).
+    ///
+    /// Singular values are formed only where triangles do not decide: if R with unit columns has no small singular value for certain,
+    /// nothing is blind; and if by pivoted QR, R P = Q [R₁ R₂; 0 ε] with R₁ such a triangle and ε rounding, what is blind is spanned by
+    /// P [−R₁⁻¹R₂; 1].
+    pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
+        let n = triangle.ncols();
+        let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
+        if regular_inverse(&scaled, CERTAIN).is_some() {
+            return Self { gauge: DMatrix::zeros(0, n), visible: vec![1.0; n] };
+        }
+        if let Some(null) = certain_null(&scaled) {
+            return Self::of(&null, &scale);
+        }
+        let Identifiability { gauge, visible, .. } = Identifiability::of(triangle);
+        Self { gauge, visible }
+    }
+
+    /// Of orthonormal rows that span it in scaled unknowns.
+    fn of(null: &DMatrix<f64>, scale: &[f64]) -> Self {
+        let visible = (0..null.ncols()).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
+        Self { gauge: DMatrix::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] * scale[j]), visible }
+    }
+}
+
+/// A triangle with columns of unit norm, those that count as zero left zero, and their norms.
+struct Scaled {
+    matrix: DMatrix<f64>,
+    scale: Vec<f64>,
+}
+
+impl Scaled {
+    fn of(triangle: &DMatrix<f64>) -> Self {
+        let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm()).collect();
+        let largest = norms.iter().copied().fold(0.0, f64::max);
+        let scale: Vec<f64> = norms.iter().map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 }).collect();
+        let mut matrix = triangle.clone();
+        for (mut column, (norm, scale)) in matrix.column_iter_mut().zip(norms.iter().zip(&scale)) {
+            column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
+        }
+        Self { matrix, scale }
+    }
+}
+
+/// Orthonormal rows that span what a matrix with columns of unit norm makes zero, where pivoted QR decides that for certain.
+fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = scaled.ncols();
+    let qr = scaled.clone().col_piv_qr();
+    let triangle = qr.r();
+    let largest = triangle.get((0, 0))?.abs();
+    let rank = (0..n).take_while(|&k| triangle[(k, k)].abs() > ROUNDING * largest).count();
+    let rest = triangle.view((rank, rank), (n - rank, n - rank)).norm();
+    if rank == 0 || rank == n || rest.is_nan() || rest > ROUNDING * n as f64 * largest {
+        return None;
+    }
+    let first = triangle.view((0, 0), (rank, rank)).into_owned();
+    let inverse = regular_inverse(&first, CERTAIN)?;
+    let mut null = DMatrix::zeros(n, n - rank);
+    null.rows_mut(0, rank).copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
+    null.rows_mut(rank, n - rank).fill_with_identity();
+    qr.p().inv_permute_rows(&mut null);
+    Some(null.qr().q().transpose())
 }
 
 /// Orthonormal rows that span what the orthonormal columns of `basis` leave out.
@@ -197,5 +255,23 @@ mod tests {
         let rows = unscaled(&found.gauge);
         assert!((&rows * rows.transpose() - DMatrix::identity(3, 3)).amax() < 1e-12);
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
+        // Without singular values the same space.
+        let blind = Blind::in_triangle(&triangle);
+        assert!(certain_null(&Scaled::of(&triangle).matrix).is_some());
+        let own = unscaled(&blind.gauge);
+        assert!((own.transpose() * &own - rows.transpose() * &rows).amax() < 1e-12);
+        assert!(blind.visible.iter().zip(&found.visible).all(|(own, other)| (own - other).abs() < 1e-12));
+    }
+
+    #[test]
+    fn what_pivots_do_not_decide_is_left_to_singular_values() {
+        for small in [1e-6, 1e-9, 1e-11, 1e-13] {
+            let mut triangle =
+                DMatrix::from_fn(6, 6, |i, j| if i <= j { ((1 + 3 * i + 7 * j) as f64).sin() + 1.5 } else { 0.0 });
+            triangle[(5, 5)] = small;
+            let (blind, found) = (Blind::in_triangle(&triangle), Identifiability::of(&triangle));
+            assert_eq!(blind.gauge.nrows(), 6 - found.rank, "{small}");
+            assert!(blind.visible.iter().zip(&found.visible).all(|(own, other)| (own - other).abs() < 1e-9), "{small}");
+        }
     }
 }

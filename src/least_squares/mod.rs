@@ -24,6 +24,7 @@ use curvature::{Slopes, by_differences};
 use nalgebra::{DMatrix, DVector};
 
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
+pub(crate) use identifiability::Blind;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub use loss::Loss;
 pub use memory::Memory;

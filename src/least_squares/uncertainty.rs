@@ -10,8 +10,8 @@ use super::singular::SingularValues;
 const HARD: f64 = 1e5;
 /// Scaled singular values below this part of the largest carry no information.
 const NO_INFORMATION: f64 = 1e-13;
-/// Where no singular value is below this part of the largest, an inverse is exact enough.
-const WELL_CONDITIONED: f64 = 1e-6;
+/// Where no singular value is below this part of the largest, an inverse is exact enough: to 1e-7 at worst.
+const WELL_CONDITIONED: f64 = 1e-9;
 
 /// Covariance of the unknowns of a fit, and what it rests on.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Linearisation;
+use super::inverse::inverse_rows;
 use super::singular::SingularValues;
 
 /// Weight that turns rows of held combinations into constraints.
@@ -69,6 +70,12 @@ impl VarianceLikelihood {
         let left = reduced.view((first, first), (k, k)).into_owned();
         let y = reduced.view((first, width), (k, 1)).column(0).into_owned();
         let rest = (squares - data.projected.norm_squared()).max(0.0) + reduced[(width, width)].powi(2);
+        let free_rows = (rows + closed.nrows()) as f64 - first as f64;
+        // ‖left⁻¹‖² bounds every a² from below: where all directions are projected out, no singular value is needed.
+        let inverse = inverse_rows(&left, (0..k).map(|j| (j, 1.0)));
+        if inverse.is_some_and(|squares| squares * DECIDED < 1.0) {
+            return Self { directions: Vec::new(), rest, free_rows: free_rows - k as f64 };
+        }
         // Singular vectors on the left: of the transpose those on the right.
         let SingularValues { values, right } = SingularValues::of(&left.transpose());
         let along = right.tr_mul(&y);
@@ -77,8 +84,7 @@ impl VarianceLikelihood {
         directions.retain(|(a, _)| *a > 0.0);
         let seen = directions.len() as f64;
         directions.retain(|(a, _)| *a <= DECIDED);
-        let free_rows = (rows + closed.nrows()) as f64 - first as f64 - seen;
-        Self { directions, rest: rest + lost, free_rows }
+        Self { directions, rest: rest + lost, free_rows: free_rows - seen }
     }
 
     /// −2 ln L at ln s².

@@ -1,9 +1,11 @@
 //! Small numerical methods that several rooms need.
 
 mod bootstrap;
+mod product;
 
 pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
+pub(crate) use product::{gram, product};
 
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {

@@ -15,6 +15,9 @@ use super::{
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
+/// Most elements of a beam: eight are as good as any number, and the time of a pose grows with their square.
+const MOST_ELEMENTS: usize = 64;
+
 impl Problem {
     /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
     ///
@@ -138,6 +141,7 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     }
     if let Some(item) = section.get("beam_elements") {
         statics.beam_elements = usize::from(item.small()?);
+        item.check_count("beam elements", statics.beam_elements, MOST_ELEMENTS)?;
     }
     section.finish()?;
     Ok(statics)

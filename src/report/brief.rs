@@ -57,7 +57,7 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
         format!("{n} too far off to be noise, the farthest {}: {error} mm", own.location)
     }));
     points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
-    let unidentifiable = found.identifiability.unidentifiable.len();
+    let unidentifiable = found.identifiability().unidentifiable.len();
     if unidentifiable > 0 {
         points.push(format!(
             "{} of {} not identifiable",

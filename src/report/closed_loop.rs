@@ -128,7 +128,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
     let mut seen = vec![
         Block::heading("What the poses can tell"),
-        Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&after.identifiability)]),
+        Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(after.identifiability())]),
     ];
     seen.extend(told(after, &file));
     blocks.push(Block::Page(seen));

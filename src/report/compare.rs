@@ -52,7 +52,7 @@ impl<'a> From<&'a Identification> for Row<'a> {
             termination: own.termination.as_str(),
             trusted: own.is_trusted(),
             reduced_chi2: own.reduced_chi2,
-            condition_number: Some(own.identifiability.condition_number()),
+            condition_number: Some(own.identifiability().condition_number()),
         }
     }
 }

@@ -60,12 +60,12 @@ object! {
         chance: Option<[f64; 2]> = found.chance.map(<[f64; 2]>::from),
         noise_factor: f64 = found.noise_factor,
         sigma_taken_mm: f64 = found.sigma_taken * 1e3,
-        rank: usize = found.identifiability.rank,
+        rank: usize = found.identifiability().rank,
         #[serde(flatten)]
-        conditioning: Conditioning<'a> = Conditioning::of(&found.identifiability, found.coordinates),
+        conditioning: Conditioning<'a> = Conditioning::of(found.identifiability(), found.coordinates),
         orientation: Option<OrientationEntry> = found.orientation.as_ref().map(OrientationEntry::of),
         parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
-        unidentified: Vec<Unidentified<'a>> = unidentified(&found.identifiability, |k| found.unknowns[k].as_str()),
+        unidentified: Vec<Unidentified<'a>> = unidentified(found.identifiability(), |k| found.unknowns[k].as_str()),
         weak: Vec<Unidentified<'a>> = found.weak.iter().map(|own| Unidentified::of(own, |k: usize| found.unknowns[k].as_str())).collect(),
         covariance: Vec<Box<RawValue>> = covariance(found),
         correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
@@ -322,7 +322,7 @@ pub(super) fn remainder<'a>(
     blocks.extend(shadow_prices(found).map(|own| Block::Page(vec![own])));
     blocks.extend(alternation(found).map(|own| Block::Page(vec![own])));
     blocks.push(Block::heading("What the poses can tell"));
-    blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(&found.identifiability)]));
+    blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(found.identifiability())]));
     blocks.extend(told(found, file));
     blocks
 }
@@ -339,8 +339,8 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
 /// What the poses can tell, in words.
 pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
-        conditioning(&found.identifiability, found.unknowns.len(), found.coordinates),
-        unidentifiable(&found.identifiability, &found.unknowns, file),
+        conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
+        unidentifiable(found.identifiability(), &found.unknowns, file),
     ];
     blocks.extend(more_unidentifiable(found, file));
     blocks.extend(weak(found, file));
@@ -473,7 +473,7 @@ pub(super) fn poses(found: &Identification) -> (&'static str, String) {
 }
 
 pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String) {
-    ("Parameters", format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability.rank))
+    ("Parameters", format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability().rank))
 }
 
 pub(super) fn spread(errors: &ErrorSummary) -> String {

@@ -232,7 +232,7 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
 
 /// Those that [`unidentifiable`] leaves out, on the page.
 pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
-    let unidentifiable = found.identifiability.unidentifiable.iter().skip(SHOWN);
+    let unidentifiable = found.identifiability().unidentifiable.iter().skip(SHOWN);
     let words: Vec<String> = unidentifiable.map(|own| combination_words(own, &found.unknowns)).collect();
     let count = words.len();
     let on_paper = format!("{count} more are left out on paper: they are in {file}.");
@@ -264,7 +264,7 @@ pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
         let holds =
             |own: &UnidentifiableCombination, name: &str| own.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
-        found.identifiability.unidentifiable.iter().any(|own| holds(own, a) && holds(own, b))
+        found.identifiability().unidentifiable.iter().any(|own| holds(own, a) && holds(own, b))
     };
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
 }

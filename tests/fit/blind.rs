@@ -41,7 +41,7 @@ fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
     let truth = [("joint2.d", 0.02), ("joint3.d", -0.02), ("joint3.alpha", 2.0_f64.to_radians())];
     let data = measured(&problem, &truth);
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    assert_eq!(found.identifiability.rank, 2);
+    assert_eq!(found.identifiability().rank, 2);
     assert!(found.is_trusted() && found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
     for (name, deviation) in truth {
         let estimate = estimate(&found, name);
@@ -141,7 +141,7 @@ fn everything_free_and_no_prior_converges() {
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
     let data = Dataset::of(&problem, rows).unwrap();
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    assert!(found.is_trusted() && found.identifiability.rank < found.unknowns.len());
+    assert!(found.is_trusted() && found.identifiability().rank < found.unknowns.len());
     assert!(found.fitted.held_out.rms.norm < 0.2e-3);
 }
 
@@ -175,5 +175,5 @@ fn two_points_do_not_turn_a_base() {
     data.split = split_at(2, &data.measurements);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let turned: f64 = ["base.rx", "base.ry", "base.rz"].iter().map(|name| estimate(&found, name).estimate.abs()).sum();
-    assert!(turned < 0.01 && !found.identifiability.unidentifiable.is_empty(), "{turned} rad");
+    assert!(turned < 0.01 && !found.identifiability().unidentifiable.is_empty(), "{turned} rad");
 }

@@ -59,7 +59,7 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
     // β1 turns about the axis of θ2; d2, d3 and d4 lie along parallel axes.
     let unidentifiable: Vec<Vec<&str>> = found
-        .identifiability
+        .identifiability()
         .unidentifiable
         .iter()
         .map(|own| own.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect())
@@ -87,7 +87,7 @@ fn table_2_comes_back_once_the_blind_parameters_are_known() {
     (problem.joints[2].d, problem.joints[3].d) = (-0.095, -0.092);
     let rows = rigid_rows(&problem);
     let found = fit(&problem, &rows, &split_at(28, &rows));
-    assert_eq!((found.identifiability.rank, found.unknowns.len()), (17, 17));
+    assert_eq!((found.identifiability().rank, found.unknowns.len()), (17, 17));
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
     let error = &found.x - table_2_deviations(&model_of(&problem, &rows).parameters);
     let worst = error.amax();
@@ -175,7 +175,7 @@ fn sessions_far_apart_are_registered_without_a_guess() {
     assert!(found.registered.held_out.max.norm < 0.05, "{:?}", found.registered.held_out);
     assert!(found.registered.held_out.max.norm > 1e-3, "{:?}", found.registered.held_out);
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
-    assert_eq!(found.identifiability.rank, found.unknowns.len());
+    assert_eq!(found.identifiability().rank, found.unknowns.len());
     let worst = (&found.x - &truth).amax();
     println!("sessions, {} steps, worst {worst:.1e} m or rad", found.iterations);
     assert!(worst < 1e-8, "{:e}", found.x - truth);

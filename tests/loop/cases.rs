@@ -72,7 +72,7 @@ fn three_sessions_of_a_measured_ur10() {
     println!(
         "UR10: {} poses, held-out mean {fitted:.4} mm (registered {registered:.3}), rank {} of {}, {} steps, {:.2} s",
         data.measurements.len(),
-        found.identifiability.rank,
+        found.identifiability().rank,
         found.unknowns.len(),
         found.iterations,
         found.seconds

@@ -83,7 +83,7 @@ fn what_contacts_cannot_tell_is_named() {
     for name in ["base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"] {
         assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
     }
-    assert!(found.identifiability.unidentifiable.len() >= 6);
+    assert!(found.identifiability().unidentifiable.len() >= 6);
 }
 
 /// Distances to anchors on a line, wherever these are known to be, leave a turn of the base about the line open.
@@ -100,7 +100,7 @@ fn collinear_anchors_leave_a_turn_of_the_base_open() {
     let named = |own: &UnidentifiableCombination| {
         own.weights.iter().map(|&(k, _)| found.unknowns[k].clone()).collect::<Vec<String>>()
     };
-    let all: Vec<Vec<String>> = found.identifiability.unidentifiable.iter().map(named).collect();
+    let all: Vec<Vec<String>> = found.identifiability().unidentifiable.iter().map(named).collect();
     let of_base = |own: &&Vec<String>| own.iter().all(|name| name.starts_with("base."));
     let open: Vec<&Vec<String>> = all.iter().filter(of_base).collect();
     assert!(open.len() == 1 && open[0].contains(&"base.ry".to_owned()), "{all:?}");

@@ -128,6 +128,7 @@ impl Block {
                         .column(0)
                         .into_owned(),
                 };
+                let normal = normal.whole_if_less_work();
                 Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, coefficients }
             }
         }

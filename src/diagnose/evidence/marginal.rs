@@ -78,8 +78,20 @@ impl Normal {
                 let (few, more) = (less.nrows(), along.nrows());
                 let mut less = less.clone().resize_vertically(few + more, 0.0);
                 less.rows_mut(few, more).copy_from(along);
-                Self::LessFew { diagonal: diagonal.clone(), less, product }
+                Self::LessFew { diagonal: diagonal.clone(), less, product }.whole_if_less_work()
             }
+        }
+    }
+
+    /// The same kept whole where rows in L are so many that this is less work for every size.
+    pub fn whole_if_less_work(self) -> Self {
+        match self {
+            Self::LessFew { diagonal, less, product } if 2 * less.nrows() > less.ncols() => {
+                let mut gram = DMatrix::from_diagonal(&diagonal);
+                gram.gemm(-1.0, &less.transpose(), &less, 1.0);
+                Self::Dense { gram, product }
+            }
+            other => other,
         }
     }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
+use crate::numeric::product;
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
 /// the others say nothing of it.
@@ -74,7 +75,7 @@ impl LinearNeighbourhood {
         let (basis, root) = match open(&active, &scale) {
             Some(open) => {
                 columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-                let (basis, within) = orthonormal(&(columns * &open), None);
+                let (basis, within) = orthonormal(&product(&columns, &open), None);
                 let mut root = open * within;
                 root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
                 (basis, root)
@@ -117,8 +118,9 @@ impl LinearNeighbourhood {
         let mut along = DMatrix::zeros(first, k);
         // Twice is enough [Giraud, Langou & Rozložník 2005].
         for _ in 0..2 {
-            let more = self.basis.tr_mul(&left);
-            left -= &self.basis * &more;
+            // The narrow side is transposed: this is the product that is fast.
+            let more = product(&left.transpose(), &self.basis).transpose();
+            left -= product(&self.basis, &more);
             along += more;
         }
         let (new, within) = orthonormal(&left, Some(&lengths));
@@ -182,7 +184,7 @@ impl LinearNeighbourhood {
     ///
     /// With T_x their rows of T and T_xᵀ = U S its QR factors, only they fit the directions Q U, and take − S⁻ᵀ x off along them.
     pub fn share(&self, unknowns: &[usize]) -> Option<Share> {
-        self.share_within(unknowns).map(|(turned, part)| Share { directions: &self.basis * turned, part })
+        self.share_within(unknowns).map(|(turned, part)| Share { directions: product(&self.basis, &turned), part })
     }
 
     /// U and − S⁻ᵀ x.
@@ -215,11 +217,6 @@ impl LinearNeighbourhood {
     /// Whitened residual at the optimum, priors below.
     pub fn residual(&self) -> &DVector<f64> {
         &self.residual
-    }
-
-    /// Part of the residual along orthonormal directions.
-    pub fn along(&self, directions: &DMatrix<f64>) -> DVector<f64> {
-        directions.tr_mul(&self.residual)
     }
 
     /// What the residual says about columns, shape = (3 N, k).

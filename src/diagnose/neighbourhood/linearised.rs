@@ -1,11 +1,11 @@
 //! Columns of every effect without a fit of it: the derivative at the place where it enters, times what it is multiplied by.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use crate::least_squares::{Block, LeastSquares};
 use crate::model::effect::Term;
-use crate::model::parameter::{BeamField, Slot};
+use crate::model::parameter::{BeamField, Driver, Slot};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
@@ -119,19 +119,46 @@ impl<'a> Linearised<'a> {
 
     /// Columns of an effect's parameters, shape = (3 N, k).
     pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
-        let terms = effect.terms(self.problem);
+        self.columns_of(&Driven::of(self, std::slice::from_ref(effect)), 0)
+    }
+
+    /// The same of one of some effects.
+    pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
+        let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
         let mut columns = DMatrix::zeros(self.jacobian.nrows(), terms.len());
-        for (term, mut out) in terms.iter().zip(columns.column_iter_mut()) {
-            let Some(&(_, place)) = self.places.iter().find(|(slot, _)| *slot == term.slot) else { continue };
-            let at_place = self.jacobian.column(place);
-            for (k, pose) in self.poses.iter().enumerate() {
-                let driver = term.driver.value(&pose.setup);
-                for row in 3 * k..3 * k + 3 {
-                    out[row] = at_place[row] * driver;
-                }
+        for (&(place, driver), mut out) in terms.iter().zip(columns.column_iter_mut()) {
+            let Some(place) = place else { continue };
+            let (at_place, values) = (self.jacobian.column(place), &driven.values[driver]);
+            for (row, (out, derivative)) in out.iter_mut().zip(at_place.iter()).enumerate() {
+                *out = derivative * values[row / 3];
             }
         }
         columns
+    }
+
+    /// Cᵀ D of the columns C of each of some effects, shape = (3 N, k), and directions D, shape = (3 N, m): summed over the rows of a
+    /// pose first, for all effects at a place.
+    pub fn along(&self, driven: &Driven, directions: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        let (poses, width) = (self.poses.len(), directions.ncols());
+        let of_place = |place: &usize| {
+            let at_place = self.jacobian.column(*place);
+            let sum = |pose: usize, k: usize| {
+                at_place.fixed_rows::<3>(3 * pose).dot(&directions.fixed_view::<3, 1>(3 * pose, k))
+            };
+            DMatrix::from_fn(poses, width, sum)
+        };
+        let places: Vec<usize> = self.places.iter().map(|(_, place)| *place).collect();
+        let sums: Vec<DMatrix<f64>> = places.par_iter().map(of_place).collect();
+        let of_effect = |terms: &Vec<(Option<usize>, usize)>| {
+            let mut along = DMatrix::zeros(terms.len(), width);
+            for (&(place, driver), mut row) in terms.iter().zip(along.row_iter_mut()) {
+                let Some(known) = place.and_then(|place| places.iter().position(|own| *own == place)) else { continue };
+                let values = DVectorView::from_slice(&driven.values[driver], poses);
+                row.tr_copy_from(&sums[known].tr_mul(&values));
+            }
+            along
+        };
+        driven.terms.par_iter().map(of_effect).collect()
     }
 
     /// For each of an effect's parameters, whether it is never negative.
@@ -143,6 +170,33 @@ impl<'a> Linearised<'a> {
     pub fn place(&self, slot: Slot) -> Option<DVector<f64>> {
         let &(_, place) = self.places.iter().find(|(known, _)| *known == slot)?;
         Some(self.jacobian.column(place).into_owned())
+    }
+}
+
+/// Effects by where they enter and what they are multiplied by there in every pose, each driver evaluated once.
+pub(crate) struct Driven {
+    /// For each effect and each of its terms the column of the place, if it has one, and the number of the driver.
+    terms: Vec<Vec<(Option<usize>, usize)>>,
+    /// Values of each driver in every pose.
+    values: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    /// In the poses and at the places of a linearised model.
+    pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
+        let mut drivers: Vec<Driver> = Vec::new();
+        let mut term = |Term { slot, driver, .. }: Term| {
+            let place = linearised.places.iter().find(|(known, _)| *known == slot).map(|(_, place)| *place);
+            let number = drivers.iter().position(|known| *known == driver).unwrap_or(drivers.len());
+            if number == drivers.len() {
+                drivers.push(driver);
+            }
+            (place, number)
+        };
+        let terms = effects.iter().map(|effect| effect.terms(linearised.problem).into_iter().map(&mut term).collect());
+        let terms = terms.collect();
+        let value = |driver: &Driver| linearised.poses.iter().map(|pose| driver.value(&pose.setup)).collect();
+        Self { terms, values: drivers.par_iter().map(value).collect() }
     }
 }
 

@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::numeric::{gram, product};
+
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
 /// Products of columns are exact to some 1e-15 of their lengths, so that what is left of a length² is known to some 1e-14:
@@ -23,12 +25,12 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
         within[(j, k)] = own[j].recip();
     }
     let inverse = turning(&first).unwrap_or_default();
-    basis *= &inverse;
+    basis = product(&basis, &inverse);
     within *= inverse;
     // Once more, for what rounding left.
-    let again = (basis.transpose() * &basis).cholesky().and_then(|factor| turning(&factor.l()));
+    let again = gram(&basis).cholesky().and_then(|factor| turning(&factor.l()));
     let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
-    (basis * &again, within * again)
+    (product(&basis, &again), within * again)
 }
 
 /// L⁻ᵀ, which takes columns with the Gram matrix L Lᵀ to orthonormal ones.
@@ -39,7 +41,7 @@ fn turning(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
 fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
-    let gram = columns.transpose() * columns;
+    let gram = gram(columns);
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
     for j in (0..columns.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::linear::{LinearNeighbourhood, Share};
-use super::linearised::Linearised;
+use super::linearised::{Driven, Linearised};
 use super::score::{Gain, Score, Sums};
 use crate::diagnose::rules::SelectionRules;
 use crate::problem::Effect;
@@ -17,6 +17,7 @@ pub(crate) struct Scan<'a, 'l> {
     pub linear: LinearNeighbourhood,
     /// The candidates tried.
     pub effects: Vec<Effect>,
+    driven: Driven,
     /// Those that cannot be tried: a derivative of theirs is not a finite number.
     pub refused: Vec<Effect>,
     scores: Vec<Score>,
@@ -52,15 +53,18 @@ impl<'a, 'l> Scan<'a, 'l> {
         effects: Vec<Effect>,
         rules: &'l SelectionRules,
     ) -> Self {
-        let scored = |effects: &[Effect]| -> Vec<Option<Score>> {
-            let columns: Vec<DMatrix<f64>> = effects.iter().map(|effect| linearised.columns(effect)).collect();
+        let driven = Driven::of(linearised, &effects);
+        let numbers: Vec<usize> = (0..effects.len()).collect();
+        let scored = |numbers: &[usize]| -> Vec<Option<Score>> {
+            let columns: Vec<DMatrix<f64>> =
+                numbers.iter().map(|&number| linearised.columns_of(&driven, number)).collect();
             let is_finite: Vec<bool> = columns.iter().map(|all| all.iter().all(|value| value.is_finite())).collect();
             let finite: Vec<DMatrix<f64>> =
                 columns.into_iter().zip(&is_finite).filter_map(|(all, fine)| fine.then_some(all)).collect();
             let mut scores = linear.scores(&finite).into_iter();
             is_finite.into_iter().map(|fine| if fine { scores.next() } else { None }).collect()
         };
-        let all: Vec<Option<Score>> = effects.par_chunks(TOGETHER).flat_map_iter(scored).collect();
+        let all: Vec<Option<Score>> = numbers.par_chunks(TOGETHER).flat_map_iter(scored).collect();
         let mut refused = Vec::new();
         let (mut known, mut scores) = (Vec::new(), Vec::new());
         for (effect, score) in effects.into_iter().zip(all) {
@@ -72,9 +76,10 @@ impl<'a, 'l> Scan<'a, 'l> {
                 None => refused.push(effect),
             }
         }
+        let driven = if refused.is_empty() { driven } else { Driven::of(linearised, &known) };
         let (tries, families) = tries(&known);
         let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
-        Self { linearised, linear, effects: known, refused, scores, tries, families, never_negative, rules }
+        Self { linearised, linear, effects: known, driven, refused, scores, tries, families, never_negative, rules }
     }
 
     /// Candidates that the fit does not absorb and that are possible, best first.
@@ -85,10 +90,9 @@ impl<'a, 'l> Scan<'a, 'l> {
     /// The ranking that there would be without some unknowns of the fit.
     pub fn ranking_without(&self, share: &Share) -> Vec<Tried> {
         let data = share.directions.rows(0, self.linear.rows()).into_owned();
-        let without = |(effect, score): (&Effect, &Score)| {
-            score.give_back(&self.linearised.columns(effect).tr_mul(&data), &share.part)
-        };
-        let scores: Vec<Score> = self.effects.par_iter().zip(&self.scores).map(without).collect();
+        let along = self.linearised.along(&self.driven, &data);
+        let without = |(along, score): (&DMatrix<f64>, &Score)| score.give_back(along, &share.part);
+        let scores: Vec<Score> = along.par_iter().zip(&self.scores).map(without).collect();
         self.ranked(&scores, self.linear.sums_without(share))
     }
 
@@ -125,20 +129,17 @@ impl<'a, 'l> Scan<'a, 'l> {
     /// Takes a candidate into the fit, in the linear neighbourhood.
     pub fn take(&mut self, index: usize) {
         let columns = self.columns(index);
-        let before = self.linear.clone();
+        let before = self.linear.residual().clone();
         let added = self.linear.add(&columns);
         let data = added.rows(0, self.linear.rows()).into_owned();
-        let given = before.along(&added);
-        let linearised = self.linearised;
-        let update = |(effect, score): (&Effect, &mut Score)| {
-            score.take_off(&linearised.columns(effect).tr_mul(&data), &given);
-        };
-        self.effects.par_iter().zip(&mut self.scores).for_each(update);
+        let given = added.tr_mul(&before);
+        let along = self.linearised.along(&self.driven, &data);
+        along.par_iter().zip(&mut self.scores).for_each(|(along, score)| score.take_off(along, &given));
     }
 
     /// Columns of a candidate, shape = (3 N, k).
     pub fn columns(&self, index: usize) -> DMatrix<f64> {
-        self.linearised.columns(&self.effects[index])
+        self.linearised.columns_of(&self.driven, index)
     }
 
     /// Largest principal angle \[rad\] between what two candidates add to the fit; none where one of them adds nothing.

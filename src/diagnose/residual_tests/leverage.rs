@@ -5,6 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::diagnose::neighbourhood::LEAST_DECIDED;
+use crate::numeric::{gram, product};
 
 /// Degrees of freedom below which nothing is tested.
 const LEAST_FREEDOM: f64 = 4.0;
@@ -39,8 +40,7 @@ impl Leverage {
     /// The fit leaves too few degrees of freedom.
     pub fn of(fitted: &DMatrix<f64>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let p = fitted.ncols();
-        let transposed = fitted.transpose();
-        let gram = &transposed * fitted;
+        let (transposed, gram) = (fitted.transpose(), gram(fitted));
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
         if freedom < LEAST_FREEDOM {
             return Err(Untestable::NoFreedom);
@@ -127,7 +127,8 @@ impl Kept {
         }
         let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
         let residual = fit.residual.select_rows(&kept) + &fitted * pull;
-        let fitted = decided.l().solve_lower_triangular(&fitted.transpose())?.transpose();
+        let inverse = decided.l().solve_lower_triangular(&DMatrix::identity(p, p))?;
+        let fitted = product(&fitted, &inverse.transpose());
         Some(Self { poses, residual, leverage: Leverage::of(&fitted, coordinates).ok()? })
     }
 }
@@ -148,7 +149,7 @@ pub(super) struct Others {
 /// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a,  tr H becomes tr H − tr H_bb + tr D (W − H_bb²)
 pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
     let fitted = &leverage.fitted;
-    let gram_rows = &leverage.transposed * fitted * &leverage.transposed;
+    let gram_rows = product(&gram(fitted), &leverage.transposed);
     let again = fitted * (&leverage.transposed * residual);
     let total = residual.norm_squared();
     let poses = residual.as_slice().chunks_exact(3).zip(again.as_slice().chunks_exact(3)).zip(&leverage.whiteners);
