@@ -185,7 +185,7 @@ pub fn plan(
         };
         // A sweep is a step at which an interrupt ends the work.
         let sweep = |sweep: PlanProgress| {
-            sink(Progress { iteration: sweep.sweep as u64, unknowns: 0, poses, cost: sweep.value });
+            sink(Progress::Step { iteration: sweep.sweep as u64, unknowns: 0, poses, cost: sweep.value });
         };
         let options = PlanOptions { poses, criterion: &chosen, seed, workspace: None, progress: Some(&sweep) };
         match &pair {

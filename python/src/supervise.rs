@@ -68,8 +68,8 @@ fn watched<T: Send>(
     loop {
         let receiver = &mut receiver;
         match py.detach(move || receiver.recv_timeout(PATIENCE)) {
-            Ok(Event::Step(Progress { iteration, unknowns, poses, cost })) => {
-                if let Some(progress) = progress {
+            Ok(Event::Step(told)) => {
+                if let (Some(progress), Progress::Step { iteration, unknowns, poses, cost }) = (progress, told) {
                     progress.call1((iteration, unknowns, poses, cost))?;
                 }
                 py.check_signals()?;

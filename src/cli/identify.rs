@@ -11,7 +11,7 @@ use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{diagnostic, output};
+use super::{diagnostic, interrupt, output};
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -57,10 +57,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
              \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
         );
     }
-    let line = common.talks().then(Line::new);
+    let stop = interrupt::stop();
+    let line = common.talks().then(|| Line::until(stop.clone()));
     let options = Options::default()
         .with_strategy(arguments.strategy)
         .with_solver(arguments.solver)
+        .with_stop(stop)
         .with_progress(line.as_ref().map(Line::sink));
     let result = identify::identify(&problem, &data, &options)
         .and_then(|found| Ok((identify::joint_sources(&problem, &data, &options, &found)?, found)));

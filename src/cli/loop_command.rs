@@ -14,7 +14,7 @@ use super::input::Common;
 use super::outcome::Outcome;
 use super::output::{REPORT, WriteError};
 use super::progress::Line;
-use super::{diagnostic, output};
+use super::{diagnostic, interrupt, output};
 
 /// Arguments of `flexcal loop`.
 #[derive(Debug, Args)]
@@ -42,8 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = common.results("loop", &problem, &[], &names)?;
     let mut data = common.measurements(&problem)?;
     common.say_of_orientation(&problem, &mut data);
-    let line = common.talks().then(Line::new);
-    let options = Options::default().with_progress(line.as_ref().map(Line::sink));
+    let stop = interrupt::stop();
+    let line = common.talks().then(|| Line::until(stop.clone()));
+    let options = Options::default().with_stop(stop).with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::close(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();
@@ -84,7 +85,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             output::print(&format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n"))?;
         }
     }
-    Ok(diagnostic::judged(&closure.after, common.quiet))
+    let outcome = diagnostic::judged(&closure.after, common.quiet);
+    if closure.interrupted && !common.quiet {
+        diagnostic::warn(&report::interrupted(&closure));
+    }
+    Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 
 /// Data that a closed problem cannot name.

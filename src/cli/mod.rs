@@ -7,12 +7,14 @@ mod check;
 mod compare;
 mod compensate;
 mod completions;
+mod course;
 mod diagnostic;
 mod export;
 mod flags;
 mod identify;
 mod init;
 mod input;
+mod interrupt;
 mod loop_command;
 mod man;
 mod outcome;
@@ -28,6 +30,7 @@ mod trace;
 use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use flexcal::identify::IdentifyError;
 
 use outcome::Outcome;
 
@@ -42,7 +45,7 @@ use outcome::Outcome;
   flexcal identify problems/lunar-sampler
   flexcal help identify
 
-Exit status: 0 done; 1 the result is not to be trusted; 2 bad input."
+Exit status: 0 done; 1 the result is not to be trusted; 2 bad input; 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -84,7 +87,7 @@ enum Command {
 }
 
 /// Runs the command line, `arguments` being the program's name and what follows it: exit status 0 done, 1 the fit is not to be
-/// trusted, 2 bad input.
+/// trusted, 2 bad input, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
@@ -113,10 +116,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     match outcome {
         Ok(Outcome::Done) => 0,
-        Ok(Outcome::NotTrusted) => 1,
+        Ok(Outcome::NotTrusted | Outcome::Interrupted) => 1,
         Err(error) => {
             diagnostic::print(error.as_ref());
-            2
+            if error.downcast_ref().is_some_and(IdentifyError::is_interrupted) { interrupt::STATUS } else { 2 }
         }
     }
 }

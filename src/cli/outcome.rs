@@ -7,4 +7,6 @@ pub enum Outcome {
     Done,
     /// Exit status 1: the fit is not to be trusted.
     NotTrusted,
+    /// Exit status 1: what was written is of work that ended early.
+    Interrupted,
 }

@@ -8,7 +8,7 @@ use flexcal::error::{is_hidden, visible};
 use flexcal::files::{Ready, Record, same_file};
 use flexcal::report::{Report, is_figure};
 
-use super::diagnostic;
+use super::{diagnostic, interrupt};
 
 /// Names of the files of a report, and of the folder of its figures.
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
@@ -108,6 +108,7 @@ impl Results {
             }
             record.add(self.command, name, text);
         }
+        let _unbroken = interrupt::unbroken();
         // Before the files, with what stands in their place now: they are known whenever this is interrupted.
         self.write_record(&record)?;
         for (file, path) in ready {

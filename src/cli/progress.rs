@@ -1,41 +1,60 @@
-//! Progress of long fits, on standard error and only on a terminal.
+//! Progress of long work, on standard error and only on a terminal.
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use flexcal::identify::{Progress, ProgressSink};
+use flexcal::identify::{Progress, ProgressSink, Stop};
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A fit faster than this shows nothing.
+use super::course::Course;
+
+/// Work faster than this shows nothing.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// Time between two pictures of a line that goes on by itself.
+const TICK: Duration = Duration::from_millis(200);
 
 /// A line of progress and what feeds it.
 pub struct Line {
     bar: ProgressBar,
-    begun: std::time::Instant,
+    begun: Instant,
+    course: Mutex<Course>,
+    stop: Option<Stop>,
 }
 
 impl Line {
     /// A line that has not begun to show.
     pub fn new() -> Arc<Self> {
-        Arc::new(Self { bar: ProgressBar::new_spinner(), begun: std::time::Instant::now() })
+        Self::until(None)
+    }
+
+    /// The same of work that `stop` ends early.
+    pub fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
+        let bar = ProgressBar::new_spinner();
+        let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
+        bar.set_style(shown.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        Arc::new(Self { bar, begun: Instant::now(), course: Mutex::default(), stop: stop.into() })
     }
 
     /// What the library reports to.
     pub fn sink(self: &Arc<Self>) -> ProgressSink {
         let line = Arc::clone(self);
-        Arc::new(move |progress| line.show(progress))
+        Arc::new(move |progress| line.show(&progress))
     }
 
-    fn show(&self, Progress { iteration, unknowns, poses, cost }: Progress) {
+    fn show(&self, progress: &Progress) {
+        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
+        course.take(progress, self.begun.elapsed().as_secs_f64());
+        let interrupted = self.stop.as_ref().is_some_and(Stop::is_requested);
         self.say(|| {
-            format!("{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")
+            let end = if interrupted { "interrupted (Ctrl-C again ends at once): " } else { "" };
+            format!("{end}{course}")
         });
     }
 
     /// Shows a message, once it is time to show anything.
     pub fn say(&self, message: impl FnOnce() -> String) {
-        if self.begun.elapsed() > PATIENCE {
+        if self.begun.elapsed() > PATIENCE && !self.bar.is_hidden() {
+            self.bar.enable_steady_tick(TICK);
             self.bar.set_message(message());
             self.bar.tick();
         }

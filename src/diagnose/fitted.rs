@@ -71,6 +71,14 @@ impl Fitted {
         Ok(fitted)
     }
 
+    /// Fits on until it converges, if it was stopped before that.
+    pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
+        if self.found.termination.converged() {
+            return Ok(self);
+        }
+        Self::new(self.problem.clone(), data, &self.onwards(options))
+    }
+
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
     pub fn onwards(&self, options: &Options) -> Options {
         let values = self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));

@@ -224,6 +224,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         counts_fixed: true,
         memory: &memory,
         progress: None,
+        stop: None,
     };
     let placed = stage.run(&x)?.x;
     let open = stage.gauge(&placed, &vec![false; missing.len()], &[]).rows;

@@ -10,7 +10,7 @@ use super::registration::register;
 use super::spread::{PointSpread, spreads};
 use super::stage::{Gauge, Stage, StageEnd, StageError};
 use super::surroundings::locate;
-use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Strategy};
+use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Measurements, Split};
@@ -38,6 +38,7 @@ pub(super) struct Fitting<'a> {
     /// How the residual of a pose counts in the strategy's fits.
     pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
+    pub stop: Option<&'a Stop>,
     /// Steps after which a stage of the strategy is stopped.
     pub max_steps: Option<u64>,
     /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
@@ -127,6 +128,7 @@ impl<'a> Fitting<'a> {
             counts_fixed: false,
             memory: self.memory,
             progress: self.progress,
+            stop: self.stop,
         }
     }
 

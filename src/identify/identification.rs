@@ -17,7 +17,7 @@ use super::pose_sufficiency::PoseSufficiency;
 use super::quality::QualityFlag;
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::{Placement, ProgressSink, SolverChoice, Strategy};
+use super::{Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
@@ -37,6 +37,8 @@ pub struct Options {
     pub solver: SolverChoice,
     /// Told of every step.
     pub progress: Option<ProgressSink>,
+    /// Asks for an early end: of a fit with [`StageError::Interrupted`], of a loop with what it has found until then.
+    pub stop: Option<Stop>,
     /// Values \[SI\] by name from which the fit starts; the registered nominal arm gives the others.
     pub start: Vec<(String, f64)>,
     /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
@@ -63,6 +65,19 @@ impl Options {
     #[must_use]
     pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
         Self { progress: progress.into(), ..self }
+    }
+
+    /// The same, ending early once `stop` asks for it; `None`: never.
+    #[must_use]
+    pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
+        Self { stop: stop.into(), ..self }
+    }
+
+    /// Tells of progress, if anybody listens.
+    pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
+        if let Some(sink) = &self.progress {
+            sink(progress());
+        }
     }
 
     /// The same, starting from these values \[SI\] by name.
@@ -151,6 +166,13 @@ pub enum IdentifyError {
     },
 }
 
+impl IdentifyError {
+    /// Whether the work was stopped from outside.
+    pub fn is_interrupted(&self) -> bool {
+        matches!(self, Self::Stage(StageError::Interrupted))
+    }
+}
+
 /// Identifies the free parameters of `problem` from the identification rows; held-out rows decide nothing.
 ///
 /// # Errors
@@ -218,6 +240,7 @@ pub fn identify_model(
         solver,
         loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
+        stop: options.stop.as_ref(),
         max_steps: options.max_steps,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
@@ -245,9 +268,7 @@ pub fn identify_model(
     if let Some(termination) = place_held_out(&fitting, &mut end, (&mut estimates, &mut covariance), noise)? {
         not_converged = not_converged.or(Some(QualityFlag::HeldOutNotConverged(termination)));
     }
-    for estimate in estimates.iter_mut().filter(|_| noise == Noise::Unknown) {
-        estimate.std_error = None;
-    }
+    estimates.iter_mut().filter(|_| noise == Noise::Unknown).for_each(|own| own.std_error = None);
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let declared_all = together(whole.declared.iter().copied());
     let taken = together(whole.poses.iter().map(|pose| pose.sigma));

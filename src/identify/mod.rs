@@ -59,7 +59,7 @@ pub use outliers::Outlier;
 pub use placement::Placement;
 pub use predict::Residual;
 pub use procedure::{Procedure, TableEntry};
-pub use progress::{Progress, ProgressSink};
+pub use progress::{Progress, ProgressSink, Stop};
 pub use quality::{QualityFlag, TooFewPoses};
 pub use saved::{SavedEstimate, SavedEstimateError};
 pub use shadow_price::ShadowPrice;

@@ -7,11 +7,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::SolverChoice;
 use super::active::Held;
-use super::progress::{ProgressSink, Reporter};
+use super::progress::{ProgressSink, Reporter, Stop};
 use super::sizes::plausible;
 use crate::least_squares::solver::{
     self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError, PseudoInverseSettings, Settings,
-    Solution,
+    Solution, Termination,
 };
 use crate::least_squares::{
     Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied, Triangle,
@@ -40,6 +40,9 @@ pub enum StageError {
     /// Priors do not fit the unknowns.
     #[error(transparent)]
     Rows(#[from] RowsError),
+    /// The fit was stopped.
+    #[error("interrupted before there was a result")]
+    Interrupted,
 }
 
 /// What a stage works on.
@@ -63,6 +66,7 @@ pub(super) struct Stage<'a> {
     /// Linearisations that fits of the same data share.
     pub memory: &'a Memory,
     pub progress: Option<&'a ProgressSink>,
+    pub stop: Option<&'a Stop>,
 }
 
 /// Where a stage ended.
@@ -234,7 +238,7 @@ impl<'a> Stage<'a> {
     /// set free.
     ///
     /// # Errors
-    /// Bounds and constraints leave the parameters no values.
+    /// Bounds and constraints leave the parameters no values, or the fit was stopped.
     pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
         let residuals = self.residuals(start);
         let mut begin = residuals.reduced(start);
@@ -249,7 +253,13 @@ impl<'a> Stage<'a> {
         let mut gauge = self.gauge(start, &vec![false; begin.len()], &[]);
         let (mut iterations, mut cost_evaluations, mut linearisations) = (0, 0, 0);
         loop {
+            if self.stop.is_some_and(Stop::is_requested) {
+                return Err(StageError::Interrupted);
+            }
             let mut solution = self.solve(&residuals, begin, &hold, &gauge, (&bounds, &rows))?;
+            if solution.termination == Termination::Interrupted {
+                return Err(StageError::Interrupted);
+            }
             iterations += solution.iterations;
             cost_evaluations += solution.cost_evaluations;
             linearisations += solution.linearisations;
@@ -287,8 +297,10 @@ impl<'a> Stage<'a> {
         let fit = Steadied { objective: fit, sizes: &sizes };
         let settings =
             Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
-        let reporter = self.progress.map(|sink| Reporter {
-            sink: Arc::clone(sink),
+        let watched = self.progress.is_some() || self.stop.is_some();
+        let reporter = watched.then(|| Reporter {
+            sink: self.progress.map(Arc::clone),
+            stop: self.stop.cloned(),
             unknowns: self.unknowns.len(),
             poses: self.poses.len(),
         });

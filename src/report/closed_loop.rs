@@ -179,8 +179,22 @@ pub(super) fn verdict_word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// The outcome in a sentence or two.
+/// That the search ended early.
+pub fn interrupted(closure: &ClosedLoop) -> String {
+    let rounds = match closure.rounds.len() {
+        0 => "before the first round was done".to_owned(),
+        rounds => format!("after {}", counted(rounds, "round")),
+    };
+    format!("interrupted {rounds}: there may be more to find")
+}
+
+/// The outcome in a sentence or two, after a word that it is not the last one where the search ended early.
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
+    let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
+    end + &came_to(closure)
+}
+
+fn came_to(closure: &ClosedLoop) -> String {
     if !closure.after.is_trusted() {
         return "Nothing is claimed of causes: the fit is not to be trusted. Mend first what stands below.".to_owned();
     }

@@ -14,6 +14,9 @@ object! {
     Document<'a>(problem: &'a Problem, closure: &'a ClosedLoop) {
         problem: &'a str = &problem.name,
         verdict: &'static str = verdict_word(closure.verdict),
+        /// Only where the search was stopped before it ended.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        interrupted: bool = closure.interrupted,
         trusted: bool = closure.after.is_trusted(),
         /// Whether structure in the residual could be tested for.
         tested: bool = closure.findings.is_testable(),

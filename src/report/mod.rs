@@ -43,7 +43,7 @@ mod unexplained;
 pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
 pub use brief::{estimate_brief, loop_brief};
 pub use check::{check_json, check_text, why_not_sufficient};
-pub use closed_loop::{loop_report, loop_text};
+pub use closed_loop::{interrupted, loop_report, loop_text};
 pub use closed_problem::closed_problem;
 pub use columns::{Column, Columns, residual_columns, residuals_csv};
 pub use compare::{compare_json, compare_text, comparison_report};

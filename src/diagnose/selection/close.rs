@@ -15,7 +15,7 @@ use super::interval;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
 use crate::error::Location;
-use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options};
+use crate::identify::{ErrorSummary, Estimate, Identification, IdentifyError, Options, Progress};
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
@@ -71,6 +71,8 @@ impl Found {
 pub struct ClosedLoop {
     /// What it came to.
     pub verdict: Verdict,
+    /// Whether it was stopped before the search ended: it is finished as of the last round that was done, and more may be there.
+    pub interrupted: bool,
     /// The fit of the declared problem, its residual tests, and what its residual points to.
     pub before: Trace,
     /// The fit with every effect that was found.
@@ -102,8 +104,10 @@ impl ClosedLoop {
 
 /// Finds what `problem` lacks, from the identification rows alone; held-out rows only measure the outcome.
 ///
+/// Stopped by [`Options::stop`], it leaves the round under way and finishes with what the rounds before came to.
+///
 /// # Errors
-/// Problem, data and options do not fit each other.
+/// Problem, data and options do not fit each other, or it was stopped before the problem as declared was fitted.
 pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<ClosedLoop, IdentifyError> {
     close_by(problem, data, options, &SelectionRules::DEFAULT)
 }
@@ -111,7 +115,7 @@ pub fn close(problem: &Problem, data: &Dataset, options: &Options) -> Result<Clo
 /// The same by other rules.
 ///
 /// # Errors
-/// Problem, data and options do not fit each other.
+/// As of [`close`].
 pub fn close_by(
     problem: &Problem,
     data: &Dataset,
@@ -124,12 +128,18 @@ pub fn close_by(
     let first = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
-    let mut rounds = Rounds::new(&data, options, first.effects());
+    let mut rounds = Rounds::new(&data, options, &first);
     let declared = first.clone();
-    let (fitted, harmonic_sigma, evidence) = chosen(&mut rounds, first)?;
+    // What was found is finished in any case.
+    let unhurried = options.clone().with_stop(None);
+    let result = chosen(&mut rounds, first);
+    let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
+    options.tell(|| Progress::Finishing);
+    let (fitted, harmonic_sigma, evidence) =
+        if interrupted { (rounds.taken.clone().settled(&data, &unhurried)?, None, None) } else { result? };
     // What was missing at first may have driven a parameter to where no step leads back from: such a fit begins anew.
     let anew =
-        if fitted.found.is_trusted() { None } else { Some(Fitted::new(fitted.problem.clone(), &data, options)?) };
+        if fitted.found.is_trusted() { None } else { Some(Fitted::new(fitted.problem.clone(), &data, &unhurried)?) };
     let anew = anew.filter(|anew| anew.found.is_trusted());
     let evidence = evidence.filter(|_| anew.is_none());
     let fitted = anew.unwrap_or(fitted);
@@ -160,6 +170,7 @@ pub fn close_by(
     let set_aside = fitted.set_aside.iter().map(|&row| data.measurements.location(row)).collect();
     Ok(ClosedLoop {
         verdict,
+        interrupted,
         before,
         after: fitted.found,
         findings,
@@ -184,25 +195,34 @@ fn chosen(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>, Op
     if data.is_led() {
         let (fitted, evidence) = weighed(rounds, first.clone())?;
         let evidence = evidence.filter(|_| fitted.found.termination.converged());
-        let fitted = rounds.settled(fitted)?;
+        let fitted = fitted.settled(data, rounds.options)?;
         if data.rows().len() <= rules.weighed_poses || noise(&fitted) {
             return Ok((fitted, None, evidence));
         }
-        led = Some((fitted, evidence, std::mem::replace(rounds, Rounds::new(data, rounds.options, first.effects()))));
+        led = Some((fitted, evidence, std::mem::replace(rounds, Rounds::new(data, rounds.options, &first))));
     }
-    let mut fitted = rounds.run(first)?;
-    for _ in 0..rules.exchanges.min(rounds.affordable_fits(&fitted)) {
-        let Some(next) = exchanged(rounds, &fitted)? else { break };
-        fitted = rounds.run(next)?;
-    }
-    let (fitted, sigma) = harmonics::filled(rounds, fitted)?;
-    match led {
-        Some((led, evidence, story)) if !noise(&fitted) => {
+    match (tried(rounds, first), led) {
+        (Ok((fitted, _)), Some((led, evidence, story))) if !noise(&fitted) => {
             *rounds = story;
             Ok((led, None, evidence))
         }
-        _ => Ok((fitted, sigma, None)),
+        (Err(error), Some((led, _, story))) => {
+            *rounds = story;
+            rounds.taken = led;
+            Err(error)
+        }
+        (result, _) => result.map(|(fitted, sigma)| (fitted, sigma, None)),
     }
+}
+
+/// The fit with what rounds found, and the prior that many harmonics share.
+fn tried(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
+    let mut fitted = rounds.run(first)?;
+    for _ in 0..rounds.data.rules.exchanges.min(rounds.affordable_fits(&fitted)) {
+        let Some(next) = exchanged(rounds, &fitted)? else { break };
+        fitted = rounds.run(next)?;
+    }
+    harmonics::filled(rounds, fitted)
 }
 
 /// The fit with the effects of the explanation that is sure, weighed again about every fit until that is what the model holds; and the
@@ -211,11 +231,13 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
     rounds.is_new(&first);
     let mut fitted = first;
     while rounds.done.len() < rounds.data.rules.rounds {
+        rounds.tell(0, 0);
         let added = rounds.added(&fitted);
         let Some(evidence) = weigh(&fitted, rounds.data, &added) else { return Ok((fitted, None)) };
         let Some(best) = evidence.sure(rounds.data.rules.sure) else { return Ok((fitted, Some(evidence))) };
         let mut next = None;
         if !is_held(best, &added) {
+            rounds.tell(1, 1);
             next = Some(rounds.fit(&fitted, &best.effects())?).filter(|next| rounds.is_new(next));
         }
         // Where the model holds what is sure: is there a better one at a fit of its own?
@@ -254,7 +276,9 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     let rivals = evidence.exchanged(&best, rules.rivals);
     let mut odds: Vec<(Explanation, f64)> = Vec::new();
     let mut better: Option<(f64, Fitted)> = None;
-    for rival in rivals {
+    let count = rivals.len();
+    for (k, rival) in rivals.into_iter().enumerate() {
+        rounds.tell(k + 1, count);
         let next = rounds.fit(fitted, &rival.effects())?;
         let Some(other) = ln_posterior(&next, data, &rounds.added(&next), &functions) else { continue };
         odds.push((rival, other - own));

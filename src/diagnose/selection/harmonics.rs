@@ -29,7 +29,7 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
         rounds.added(&fitted).into_iter().map(all).fold(rounds.declared.clone(), |all, own| joined(&all, &own));
     let dense = fitted.with_effects(&effects);
     if coefficients.len() < rules.many_coefficients || !takes_prior(&dense) {
-        return Ok((rounds.settled(fitted)?, None));
+        return Ok((fitted.settled(rounds.data, rounds.options)?, None));
     }
     let squares: f64 = coefficients.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / coefficients.len() as f64).sqrt();

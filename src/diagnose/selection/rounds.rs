@@ -7,7 +7,7 @@ use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{Scan, tries};
 use super::pick::{Pick, pick};
-use crate::identify::{ErrorSummary, IdentifyError, Options};
+use crate::identify::{ErrorSummary, IdentifyError, Options, Progress};
 use crate::problem::{Effect, Problem};
 
 /// One round of the loop.
@@ -36,14 +36,22 @@ pub(super) struct Rounds<'a> {
     pub declared: Vec<Effect>,
     /// What each round came to.
     pub done: Vec<Round>,
+    /// The fit of the last of them; of the problem as declared before the first.
+    pub taken: Fitted,
     /// Sets of effects that were fitted.
     seen: Vec<Vec<Effect>>,
 }
 
 impl<'a> Rounds<'a> {
-    /// None yet.
-    pub fn new(data: &'a Data<'a>, options: &'a Options, declared: Vec<Effect>) -> Self {
-        Self { data, options, declared, done: Vec::new(), seen: Vec::new() }
+    /// None yet, from the fit of the problem as declared.
+    pub fn new(data: &'a Data<'a>, options: &'a Options, first: &Fitted) -> Self {
+        Self { data, options, declared: first.effects(), done: Vec::new(), taken: first.clone(), seen: Vec::new() }
+    }
+
+    /// Tells that the round at hand begins the `fit`-th of so many fits; the 0th while it weighs candidates.
+    pub fn tell(&self, fit: usize, fits: usize) {
+        let (round, effects) = (self.done.len() + 1, || self.added(&self.taken));
+        self.options.tell(|| Progress::Round { round, effects: effects(), fit, fits });
     }
 
     /// Effects that the loop added.
@@ -58,6 +66,7 @@ impl<'a> Rounds<'a> {
     pub fn run(&mut self, mut fitted: Fitted) -> Result<Fitted, IdentifyError> {
         self.is_new(&fitted);
         while self.done.len() < self.data.rules.rounds {
+            self.tell(0, 0);
             let candidates = Candidates::of(&fitted.problem, self.data);
             let picks = {
                 let linearised = fitted.linearised(self.data, &candidates.testable);
@@ -81,14 +90,6 @@ impl<'a> Rounds<'a> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         let count = (self.data.rules.round_work / one.max(1.0)) as usize;
         count.max(1)
-    }
-
-    /// Fits on until it converges, if the rounds stopped before that.
-    pub fn settled(&self, fitted: Fitted) -> Result<Fitted, IdentifyError> {
-        if fitted.found.termination.converged() {
-            return Ok(fitted);
-        }
-        self.fit_whole(fitted.problem.clone(), &fitted)
     }
 
     /// A problem fitted from where another fit ended.
@@ -117,6 +118,7 @@ impl<'a> Rounds<'a> {
         let errors = fitted.found.fitted;
         let effects = self.added(fitted);
         self.done.push(Round { effects, identification: errors.identification, held_out: errors.held_out });
+        self.taken = fitted.clone();
     }
 
     /// Whether these effects were not fitted together before.
@@ -144,7 +146,9 @@ impl<'a> Rounds<'a> {
             [] => Ok(None),
             [Pick { effect, rivals: others }] if !others.is_empty() && rivals > 0 => {
                 let mut best: Option<(f64, Fitted)> = None;
-                for candidate in std::iter::once(effect).chain(others.iter().take(rivals)) {
+                let tried: Vec<&Effect> = std::iter::once(effect).chain(others.iter().take(rivals)).collect();
+                for (k, candidate) in tried.iter().enumerate() {
+                    self.tell(k + 1, tried.len());
                     let next = self.fit(fitted, &joined(&present, candidate))?;
                     let criterion = self.criterion(&next, candidate);
                     if best.as_ref().is_none_or(|(least, _)| criterion < *least) {
@@ -154,6 +158,7 @@ impl<'a> Rounds<'a> {
                 Ok(best.map(|(_, next)| next))
             }
             picks => {
+                self.tell(1, 1);
                 let all = picks.iter().fold(present, |all, pick| joined(&all, &pick.effect));
                 Ok(Some(self.fit(fitted, &all)?))
             }

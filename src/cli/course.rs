@@ -1,0 +1,165 @@
+//! What is said of work under way: where it stands, and how long it may take.
+
+use std::fmt;
+
+use flexcal::identify::Progress;
+
+/// Relative gain of a step at which fits end.
+const SETTLED: f64 = 1e-11;
+/// Steps beyond which nothing is said of the time that is left.
+const FORESEEN: f64 = 200.0;
+
+/// Where work stands. Times in seconds since it began.
+#[derive(Debug, Default)]
+pub struct Course {
+    round: Option<Round>,
+    finishing: bool,
+    step: Option<Step>,
+    /// When the fit at hand began, of a problem or of a round.
+    fit_begun: Option<f64>,
+    /// Fits of rounds that are done, the one before the first among them, and their time.
+    fits_done: (f64, f64),
+}
+
+#[derive(Debug)]
+struct Round {
+    number: usize,
+    effects: usize,
+    last: Option<String>,
+    fit: usize,
+    fits: usize,
+    /// Time that the round may yet take from when its fit began.
+    left: Option<f64>,
+}
+
+#[derive(Debug)]
+struct Step {
+    iteration: u64,
+    unknowns: usize,
+    poses: usize,
+    cost: f64,
+    /// What the last step that lowered the cost took off it.
+    gain: Option<f64>,
+    /// When the first step of its solver was done.
+    begun: (u64, f64),
+    /// Time that its solver may yet take.
+    left: Option<f64>,
+}
+
+impl Course {
+    /// Takes note of progress at the time `now`.
+    pub fn take(&mut self, progress: &Progress, now: f64) {
+        match progress {
+            &Progress::Step { iteration, unknowns, poses, cost } => {
+                let same = |last: &Step| last.iteration < iteration && last.unknowns == unknowns && last.poses == poses;
+                self.step = Some(match self.step.take().filter(same) {
+                    Some(last) => last.next(iteration, cost, now),
+                    None => Step { iteration, unknowns, poses, cost, gain: None, begun: (iteration, now), left: None },
+                });
+            }
+            Progress::Round { round, effects, fit, fits } => {
+                let begun = self.fit_begun.take().or(self.round.is_none().then_some(0.0));
+                if let Some(begun) = begun {
+                    self.fits_done = (self.fits_done.0 + 1.0, self.fits_done.1 + now - begun);
+                }
+                self.step = None;
+                self.fit_begun = (*fit > 0).then_some(now);
+                let (done, time) = self.fits_done;
+                let left = (*fit > 0).then(|| (fits + 1).saturating_sub(*fit) as f64 * time / done);
+                let last = effects.last().map(|effect| effect.name().to_owned());
+                self.round = Some(Round { number: *round, effects: effects.len(), last, fit: *fit, fits: *fits, left });
+            }
+            _ => (self.finishing, self.round, self.step) = (true, None, None),
+        }
+    }
+}
+
+impl Step {
+    /// The step after this one. Time is left for as many steps as gains need that go on to fall as the last two did.
+    fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
+        let gain = self.cost - cost;
+        let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;
+        let steps = |before: f64| ((SETTLED * cost / gain).ln() / (gain / before).ln()).max(0.0);
+        let left = self.gain.filter(|before| gain > 0.0 && gain < *before).map(steps);
+        let left = left.filter(|steps| *steps < FORESEEN).map(|steps| steps * each);
+        Self { iteration, cost, gain: if gain > 0.0 { Some(gain) } else { self.gain }, left, ..self }
+    }
+}
+
+impl fmt::Display for Course {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.finishing {
+            f.write_str("weighing what was found")?;
+        }
+        if let Some(round) = &self.round {
+            let plural = if round.effects == 1 { "" } else { "s" };
+            write!(f, "round {}, {} effect{plural}", round.number, round.effects)?;
+            round.last.iter().try_for_each(|last| write!(f, " (last {last})"))?;
+            match round.fit {
+                0 => f.write_str(", weighing candidates")?,
+                fit => write!(f, ", fit {fit} of {}", round.fits)?,
+            }
+            about(f, round.left, "round")?;
+        }
+        let Some(step) = &self.step else { return Ok(()) };
+        if self.finishing || self.round.is_some() {
+            f.write_str("; ")?;
+        }
+        let Step { iteration, unknowns, poses, cost, left, .. } = step;
+        write!(f, "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")?;
+        about(f, left.filter(|_| self.round.is_none()), "fit")
+    }
+}
+
+/// The time that is left of something, where any is.
+fn about(f: &mut fmt::Formatter<'_>, left: Option<f64>, of: &str) -> fmt::Result {
+    match left {
+        Some(left) if left >= 90.0 => write!(f, ", about {:.0} min left of the {of}", left / 60.0),
+        Some(left) if left >= 0.5 => write!(f, ", about {left:.0} s left of the {of}"),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(iteration: u64, cost: f64) -> Progress {
+        Progress::Step { iteration, unknowns: 4, poses: 20, cost }
+    }
+
+    #[test]
+    fn steps_that_gain_a_tenth_of_the_one_before_are_foreseen() {
+        let mut course = Course::default();
+        for (k, cost) in [2.11, 1.11, 1.01, 1.001].into_iter().enumerate() {
+            course.take(&step(k as u64 + 1, cost), 2.0 * k as f64);
+        }
+        // From a gain of 9e-3 to 1e-11 in steps of 2 s, each of which gains 0.09 of the one before.
+        assert!(
+            course.to_string().ends_with("step 4, half the sum of squares 1.001000e0, about 17 s left of the fit"),
+            "{course}"
+        );
+        course.take(&step(1, 5.0), 9.0);
+        assert!(!course.to_string().contains("left"), "another fit: {course}");
+        course.take(&step(2, 6.0), 10.0);
+        course.take(&step(3, 6.0), 11.0);
+        assert!(!course.to_string().contains("left"), "nothing gained: {course}");
+    }
+
+    #[test]
+    fn a_round_takes_as_long_as_fits_took_before() {
+        let mut course = Course::default();
+        let round = |fit| Progress::Round { round: 2, effects: Vec::new(), fit, fits: 3 };
+        course.take(&step(1, 1.0), 1.0);
+        course.take(&round(0), 4.0);
+        assert_eq!(course.to_string(), "round 2, 0 effects, weighing candidates");
+        course.take(&round(1), 10.0);
+        assert_eq!(course.to_string(), "round 2, 0 effects, fit 1 of 3, about 12 s left of the round");
+        course.take(&round(2), 12.0);
+        assert_eq!(course.to_string(), "round 2, 0 effects, fit 2 of 3, about 6 s left of the round");
+        course.take(&step(1, 1.0), 13.0);
+        assert!(course.to_string().contains("left of the round; 20 poses, 4 parameters: step 1"), "{course}");
+        course.take(&Progress::Finishing, 20.0);
+        assert_eq!(course.to_string(), "weighing what was found");
+    }
+}
