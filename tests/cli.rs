@@ -13,6 +13,9 @@ mod compensate;
 mod example;
 #[path = "cli/input.rs"]
 mod input;
+#[cfg(target_os = "linux")]
+#[path = "cli/interrupt.rs"]
+mod interrupt;
 #[path = "cli/printed.rs"]
 mod printed;
 #[path = "cli/results.rs"]

@@ -15,6 +15,8 @@ pub struct Course {
     round: Option<Round>,
     finishing: bool,
     step: Option<Step>,
+    /// When progress was last told of.
+    now: f64,
     /// When the fit at hand began, of a problem or of a round.
     fit_begun: Option<f64>,
     /// Fits of rounds that are done, the one before the first among them, and their time.
@@ -28,8 +30,8 @@ struct Round {
     last: Option<String>,
     fit: usize,
     fits: usize,
-    /// Time that the round may yet take from when its fit began.
-    left: Option<f64>,
+    /// When the round may end.
+    end: Option<f64>,
 }
 
 #[derive(Debug)]
@@ -49,6 +51,7 @@ struct Step {
 impl Course {
     /// Takes note of progress at the time `now`.
     pub fn take(&mut self, progress: &Progress, now: f64) {
+        self.now = now;
         match progress {
             &Progress::Step { iteration, unknowns, poses, cost } => {
                 let same = |last: &Step| last.iteration < iteration && last.unknowns == unknowns && last.poses == poses;
@@ -65,9 +68,9 @@ impl Course {
                 self.step = None;
                 self.fit_begun = (*fit > 0).then_some(now);
                 let (done, time) = self.fits_done;
-                let left = (*fit > 0).then(|| (fits + 1).saturating_sub(*fit) as f64 * time / done);
+                let end = (*fit > 0).then(|| now + (fits + 1).saturating_sub(*fit) as f64 * time / done);
                 let last = effects.last().map(|effect| effect.name().to_owned());
-                self.round = Some(Round { number: *round, effects: effects.len(), last, fit: *fit, fits: *fits, left });
+                self.round = Some(Round { number: *round, effects: effects.len(), last, fit: *fit, fits: *fits, end });
             }
             _ => (self.finishing, self.round, self.step) = (true, None, None),
         }
@@ -99,7 +102,7 @@ impl fmt::Display for Course {
                 0 => f.write_str(", weighing candidates")?,
                 fit => write!(f, ", fit {fit} of {}", round.fits)?,
             }
-            about(f, round.left, "round")?;
+            about(f, round.end.map(|end| end - self.now), "round")?;
         }
         let Some(step) = &self.step else { return Ok(()) };
         if self.finishing || self.round.is_some() {
@@ -158,7 +161,7 @@ mod tests {
         course.take(&round(2), 12.0);
         assert_eq!(course.to_string(), "round 2, 0 effects, fit 2 of 3, about 6 s left of the round");
         course.take(&step(1, 1.0), 13.0);
-        assert!(course.to_string().contains("left of the round; 20 poses, 4 parameters: step 1"), "{course}");
+        assert!(course.to_string().contains("about 5 s left of the round; 20 poses, 4 parameters: step 1"), "{course}");
         course.take(&Progress::Finishing, 20.0);
         assert_eq!(course.to_string(), "weighing what was found");
     }

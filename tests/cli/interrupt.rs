@@ -1,0 +1,117 @@
+//! Interrupts (SIGINT), sent when the line of progress on a terminal says how far the work is.
+
+use std::fs;
+use std::io::Read as _;
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+use assert_cmd::cargo::cargo_bin;
+use serde_json::Value;
+
+/// Poses that a loop takes seconds for in each round.
+const POSES: usize = 400;
+
+/// Measurements of an arm with an effect, most of them to identify from.
+fn measured(folder: &Path) {
+    let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler");
+    let poses = (POSES + 20).to_string();
+    let mut simulate = assert_cmd::Command::new(cargo_bin!("flexcal"));
+    simulate.current_dir(folder).arg("simulate").arg(&arm).arg("--truth").arg(arm.join("TRUTH.toml"));
+    simulate.args(["--poses", &poses, "--seed", "1", "--out", "rig"]).assert().success();
+    let table = fs::read_to_string(folder.join("rig/measurements.csv")).unwrap();
+    let lines = table.lines().enumerate();
+    let lines =
+        lines.map(|(k, line)| if k <= POSES { line.replace("validation", "identification") } else { line.to_owned() });
+    fs::write(folder.join("data.csv"), lines.collect::<Vec<String>>().join("\n") + "\n").unwrap();
+    fs::copy(arm.join("problem.toml"), folder.join("problem.toml")).unwrap();
+}
+
+/// flexcal on a terminal.
+struct Terminal {
+    script: Child,
+    output: ChildStdout,
+    /// What it has shown.
+    shown: String,
+}
+
+impl Terminal {
+    /// `script` gives it the terminal and passes on what it shows, after the number of its process.
+    fn run(folder: &Path, arguments: &str) -> Self {
+        let command = format!("echo pid=$$.; exec '{}' {arguments}", cargo_bin!("flexcal").display());
+        let mut script = Command::new("script")
+            .args(["-qefc", &command, "/dev/null"])
+            .current_dir(folder)
+            .env("TERM", "xterm")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let output = script.stdout.take().unwrap();
+        Self { script, output, shown: String::new() }
+    }
+
+    /// Waits until it has shown `words`.
+    fn wait_for(&mut self, words: &str) {
+        let mut piece = [0; 4096];
+        while !self.shown.contains(words) {
+            let read = self.output.read(&mut piece).unwrap();
+            assert!(read > 0, "it ended before {words:?}: {}", self.shown);
+            self.shown.push_str(&String::from_utf8_lossy(&piece[..read]));
+        }
+    }
+
+    fn interrupt(&self) {
+        let pid = self.shown.split_once("pid=").unwrap().1.split('.').next().unwrap();
+        assert!(Command::new("sh").args(["-c", &format!("kill -INT {pid}")]).status().unwrap().success());
+    }
+
+    /// Its exit status, and all that it has shown.
+    fn end(mut self) -> (Option<i32>, String) {
+        let mut rest = Vec::new();
+        self.output.read_to_end(&mut rest).unwrap();
+        (self.script.wait().unwrap().code(), self.shown + &String::from_utf8_lossy(&rest))
+    }
+}
+
+#[test]
+fn an_interrupted_loop_tells_what_it_has_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    measured(folder);
+    let run = |out: &str| Terminal::run(folder, &format!("loop . --data data.csv --out {out}"));
+
+    let mut once = run("once");
+    once.wait_for("round 2, 1 effect (last link-thermal-bending)");
+    once.interrupt();
+    let (status, shown) = once.end();
+    assert_eq!(status, Some(1), "{shown}");
+    assert!(shown.contains("interrupted after 1 round: there may be more to find"), "{shown}");
+    let told: Value = serde_json::from_str(&fs::read_to_string(folder.join("once/loop.json")).unwrap()).unwrap();
+    assert_eq!(told["interrupted"], true);
+    assert_eq!((&told["trusted"], &told["effects"][0]["effect"]), (&true.into(), &"link-thermal-bending".into()));
+    assert_eq!(told["steps"].as_array().unwrap().len(), 1);
+    for name in ["problem.closed.toml", "residuals.csv", "report.md", "report.html"] {
+        assert!(folder.join("once").join(name).is_file(), "{name}");
+    }
+    let report = fs::read_to_string(folder.join("once/report.md")).unwrap();
+    assert!(report.contains("Search interrupted after 1 round"), "{report}");
+
+    // Again before the story is finished: nothing is written.
+    let mut twice = run("twice");
+    twice.wait_for("round 2");
+    twice.interrupt();
+    twice.wait_for("Ctrl-C again ends at once");
+    twice.interrupt();
+    let (status, shown) = twice.end();
+    assert_eq!(status, Some(130), "{shown}");
+    assert!(!folder.join("twice").exists());
+
+    // Before there is anything to tell.
+    let mut early = Terminal::run(folder, "identify . --data data.csv --strategy sequential --out early");
+    early.wait_for("step ");
+    early.interrupt();
+    let (status, shown) = early.end();
+    assert_eq!(status, Some(130), "{shown}");
+    assert!(shown.contains("interrupted before there was a result"), "{shown}");
+    assert!(!folder.join("early").exists());
+}
