@@ -131,6 +131,18 @@ fn a_check_names_what_would_be_found() {
 }
 
 #[test]
+fn a_plan_that_would_tell_nothing_is_refused() {
+    let bench = Bench::new();
+    let text = "name = 'arm'\n[[joint]]\nd_m = 0.3\nmin_deg = -90\nmax_deg = 90\n[tool]\ntarget_m = [0, 0, 0.2]\n\
+                [parameters]\n'joint1.theta' = { sigma_deg = 1 }\n[data]\nposition_sigma_mm = 0.1\n";
+    fs::create_dir(bench.path("arm")).unwrap();
+    let problem = bench.write("arm/problem.toml", text);
+    let (_, error) = bench.run(2, "plan --poses 4", &[&problem]);
+    assert!(error.contains("no free parameter moves the target in any pose"), "{error}");
+    assert!(!bench.path("plan.csv").exists());
+}
+
+#[test]
 fn a_plan_tells_two_effects_apart() {
     let bench = Bench::new();
     let table = bench.write("some.csv", &drawn(60));

@@ -15,6 +15,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 /// of ν degrees of freedom is wide, 1/√(2ν).
 const REACH: f64 = 3.5;
 const STEP: f64 = 0.05;
+/// No closer than this: no data have more degrees of freedom.
+const LEAST_STEP: f64 = 1e-4;
 
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +30,7 @@ pub(super) struct Noise {
 impl Noise {
     /// For each factor f of the grid ln of its prior and of f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
-        let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt());
+        let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(LEAST_STEP);
         let least = self.least.clamp(-REACH, REACH);
         #[expect(clippy::cast_possible_truncation, reason = "few steps")]
         let steps = (REACH / step).ceil() as i32;
@@ -258,6 +260,12 @@ mod tests {
         let alone = gain(2, &Coefficients { largest: plausible(2), alone: true, ..Coefficients::default() });
         assert!(one > 50.0 && one - two > 2.0, "{one} {two}");
         assert!((one - alone - 3.0_f64.ln()).abs() < 0.2, "{one} {alone}");
+    }
+
+    #[test]
+    fn a_grid_is_bounded_whatever_the_degrees_of_freedom() {
+        let points = |freedom: f64| Noise { freedom, trust: 0.1, least: f64::NEG_INFINITY }.grid().len();
+        assert_eq!((points(30.0), points(1e300)), (141, 70_001));
     }
 
     #[test]
