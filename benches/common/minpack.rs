@@ -1,6 +1,6 @@
 //! The MINPACK port of the crate `levenberg-marquardt` on the same residuals and derivatives.
 
-use flexcal::least_squares::solver::Settings;
+use flexcal::least_squares::solver::{Bounds, Settings};
 use flexcal::least_squares::{LeastSquares, LinearRows, jacobian, residual_vector};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationReport};
 use nalgebra::storage::Owned;
@@ -10,18 +10,24 @@ use nalgebra::{DMatrix, DVector, Dyn};
 pub struct Minpack<'a, P> {
     problem: &'a P,
     rows: Option<&'a LinearRows>,
+    bounds: Option<&'a Bounds>,
     x: DVector<f64>,
 }
 
 impl<'a, P: LeastSquares> Minpack<'a, P> {
     /// To be solved from `x`.
     pub fn new(problem: &'a P, x: DVector<f64>) -> Self {
-        Self { problem, rows: None, x }
+        Self { problem, rows: None, bounds: None, x }
     }
 
     /// With linear rows below the data, as priors are.
     pub fn with_rows(self, rows: Option<&'a LinearRows>) -> Self {
         Self { rows, ..self }
+    }
+
+    /// With every point that the solver asks for moved to the nearest one within bounds, which it does not know of.
+    pub fn clamped(self, bounds: Option<&'a Bounds>) -> Self {
+        Self { bounds, ..self }
     }
 
     /// Where it ends, and why.
@@ -49,6 +55,9 @@ impl<P: LeastSquares> LeastSquaresProblem<f64, Dyn, Dyn> for Minpack<'_, P> {
 
     fn set_params(&mut self, x: &DVector<f64>) {
         self.x.copy_from(x);
+        if let Some(bounds) = self.bounds {
+            self.x = x.zip_zip_map(bounds.lower(), bounds.upper(), f64::clamp);
+        }
     }
 
     fn params(&self) -> DVector<f64> {

@@ -1,6 +1,7 @@
 //! A rigid UR10 with errors drawn at random, measured with noise.
 
 use flexcal::least_squares::LeastSquares as _;
+use flexcal::least_squares::solver::Bounds;
 use flexcal::model::{Model, Pose, PoseResiduals};
 use flexcal::problem::Problem;
 use flexcal::problem::{Observation, PoseView};
@@ -13,6 +14,10 @@ use rand_distr::{Distribution as _, StandardNormal};
 pub const NOISE: f64 = 5e-5;
 /// 1 σ of the errors of the arm: angles [rad], lengths [m].
 const ERRORS: (f64, f64) = (4e-3, 2e-3);
+/// Bounds of the unknowns [σ of the errors]: a few of the true values lie beyond.
+const WITHIN: f64 = 1.5;
+/// Every so many-th pose has a gross error of up to so much on each coordinate [m].
+const GROSS: (usize, f64) = (10, 5e-3);
 /// Parameters that positions cannot tell from others: d of parallel axes, β where the next link has an α, and those of
 /// the last link that the target's coordinates replace.
 const REDUNDANT: [&str; 8] =
@@ -78,6 +83,23 @@ impl Ur10 {
             orientation: None,
         });
         PoseResiduals::new(&self.model, poses.collect(), unknowns, at)
+    }
+
+    /// Bounds on `unknowns`.
+    pub fn bounds(&self, unknowns: &[usize]) -> Bounds {
+        let angle = |&k: &usize| self.model.parameters[k].unit() == flexcal::quantity::Unit::Angle;
+        let width = |k: &usize| WITHIN * if angle(k) { ERRORS.0 } else { ERRORS.1 };
+        let upper = DVector::from_iterator(unknowns.len(), unknowns.iter().map(width));
+        Bounds::new(-&upper, upper).unwrap()
+    }
+
+    /// The same arm with gross errors among its measurements.
+    pub fn with_gross_errors(mut self) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(2026);
+        for measured in self.measured.iter_mut().step_by(GROSS.0) {
+            *measured += Vector3::from_fn(|_, _| random.random_range(-GROSS.1..GROSS.1));
+        }
+        self
     }
 
     /// A parameter vector away from nominal, where derivatives are compared.

@@ -1,9 +1,11 @@
 //! The same fits for other programs: writes their data, times flexcal's own.
 //!
-//!     peers write <poses> <unknowns> <csv>       data of `benches/fit.rs`; unknowns: 25 identifiable, or all 33
-//!     peers fit <poses> <unknowns> <repeats>     median time [ms] on one thread, final cost, steps tried
-//!     peers serve <name>                         a problem of `tests/cases/bounded`: limits and flexcal's optimum, then for each line x
-//!                                                a line of residuals and derivatives
+//!     peers write <poses> <unknowns> <kind> <csv>       data of `benches/fit.rs`; unknowns: 25 identifiable, or all 33
+//!     peers fit <poses> <unknowns> <kind> <repeats>     median time [ms] on one thread, final cost, steps tried
+//!     peers serve <name>                                a problem of `tests/cases/bounded`: limits, flexcal's optimum and times, then
+//!                                                       for each line x a line of residuals and derivatives
+//!
+//! kind: plain; box (bounds that a few true values lie beyond); huber, l1 (gross errors, and flexcal's losses)
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
@@ -14,6 +16,7 @@
 )]
 
 #[path = "../../tests/common/bounded.rs"]
+#[expect(dead_code, reason = "only some of it is needed here")]
 mod bounded;
 #[path = "../common/mod.rs"]
 mod common;
@@ -24,26 +27,42 @@ use std::time::Instant;
 
 use bounded::Bounded;
 use common::ur10::{NOISE, Ur10};
-use flexcal::least_squares::solver::{Settings, minimise, minimise_constrained};
-use flexcal::least_squares::{Fit, jacobian, residual_vector};
+use flexcal::least_squares::solver::{Settings, minimise, minimise_bounded, minimise_constrained};
+use flexcal::least_squares::{Fit, Loss, Objective as _, jacobian, residual_vector};
 use nalgebra::DVector;
+
+/// Fits of which a median time is taken.
+const REPEATS: usize = 15;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).filter(|word| *word != "--bench").collect();
     match arguments[..] {
-        ["write", poses, unknowns, file] => {
-            let ur10 = Ur10::new(poses.parse().unwrap());
-            std::fs::write(file, csv(&ur10, chosen(&ur10, unknowns))).unwrap();
+        ["write", poses, unknowns, kind, file] => {
+            let ur10 = arm(poses, kind);
+            std::fs::write(file, csv(&ur10, chosen(&ur10, unknowns), kind)).unwrap();
         }
-        ["fit", poses, unknowns, repeats] => {
-            let ur10 = Ur10::new(poses.parse().unwrap());
-            time(&ur10, chosen(&ur10, unknowns), repeats.parse().unwrap());
+        ["fit", poses, unknowns, kind, repeats] => {
+            let ur10 = arm(poses, kind);
+            time(&ur10, chosen(&ur10, unknowns), kind, repeats.parse().unwrap());
         }
         ["serve", name] => serve(&Bounded::read(name)),
         _ => eprintln!(
-            "peers write <poses> <unknowns> <csv> | peers fit <poses> <unknowns> <repeats> | peers serve <name>"
+            "peers write <poses> <unknowns> <kind> <csv> | peers fit <poses> <unknowns> <kind> <repeats> | peers serve <name>"
         ),
+    }
+}
+
+fn arm(poses: &str, kind: &str) -> Ur10 {
+    let ur10 = Ur10::new(poses.parse().unwrap());
+    if loss(kind) == Loss::Squares { ur10 } else { ur10.with_gross_errors() }
+}
+
+fn loss(kind: &str) -> Loss {
+    match kind {
+        "huber" => Loss::Huber { threshold: Loss::HUBER_POSITION },
+        "l1" => Loss::L1 { slope: Loss::L1_POSITION, smoothing: Loss::L1_SMOOTHING },
+        _ => Loss::Squares,
     }
 }
 
@@ -52,13 +71,22 @@ fn chosen<'a>(ur10: &'a Ur10, unknowns: &str) -> &'a [usize] {
     sets.into_iter().find(|set| set.len().to_string() == unknowns).expect("25 or 33 unknowns")
 }
 
-/// σ; the nominal α, a, θ, d, β of each joint and the target; which of these are unknown; a pose a line.
-fn csv(ur10: &Ur10, unknowns: &[usize]) -> String {
+/// σ; the nominal α, a, θ, d, β of each joint and the target; which of these are unknown; lower and upper bounds of these, if any; the
+/// loss; a pose a line.
+fn csv(ur10: &Ur10, unknowns: &[usize], kind: &str) -> String {
     let mut out = format!("{NOISE}\n");
     let nominal: Vec<String> = ur10.geometric.iter().map(|&k| ur10.model.parameters[k].nominal.to_string()).collect();
     let place = |k: &usize| ur10.geometric.iter().position(|g| g == k).unwrap().to_string();
     let unknown: Vec<String> = unknowns.iter().map(place).collect();
-    writeln!(out, "{}\n{}", nominal.join(","), unknown.join(",")).unwrap();
+    let bounds = ur10.bounds(unknowns);
+    let bounds: Vec<String> = bounds.lower().iter().chain(bounds.upper()).map(f64::to_string).collect();
+    let bounds = if kind == "box" { bounds.join(",") } else { String::new() };
+    writeln!(out, "{}\n{}\n{bounds}", nominal.join(","), unknown.join(",")).unwrap();
+    match loss(kind) {
+        Loss::Huber { threshold } => writeln!(out, "huber,{threshold}").unwrap(),
+        Loss::L1 { slope, smoothing } => writeln!(out, "l1,{slope},{smoothing}").unwrap(),
+        _ => writeln!(out, "squares").unwrap(),
+    }
     for (q, p) in ur10.configurations.iter().zip(&ur10.measured) {
         let row: Vec<String> = q.iter().chain(p.iter()).map(f64::to_string).collect();
         writeln!(out, "{}", row.join(",")).unwrap();
@@ -66,39 +94,51 @@ fn csv(ur10: &Ur10, unknowns: &[usize]) -> String {
     out
 }
 
-fn time(ur10: &Ur10, unknowns: &[usize], repeats: usize) {
+fn time(ur10: &Ur10, unknowns: &[usize], kind: &str, repeats: usize) {
     let residuals = ur10.residuals(unknowns);
-    let objective = Fit::new(&residuals);
-    let solve = || minimise(&objective, DVector::zeros(unknowns.len()), &Settings::default());
-    let (mut times, solution) = common::pool(1).install(|| {
-        let timed = |_| {
-            let begin = Instant::now();
-            std::hint::black_box(solve());
-            begin.elapsed().as_secs_f64() * 1e3
-        };
-        ((0..repeats).map(timed).collect::<Vec<f64>>(), solve())
-    });
+    let objective = Fit::new(&residuals).with_loss(loss(kind));
+    let (start, settings, bounds) = (DVector::zeros(unknowns.len()), Settings::default(), ur10.bounds(unknowns));
+    let solve = || match kind {
+        "box" => minimise_bounded(&objective, start.clone(), &bounds, &settings),
+        _ => minimise(&objective, start.clone(), &settings),
+    };
+    let (seconds, solution) = common::pool(1).install(|| (median(repeats, solve), solve()));
+    println!("{:.4} {:.9e} {}", seconds * 1e3, solution.cost, solution.iterations);
+}
+
+/// Median time of a call [s].
+fn median<T>(repeats: usize, call: impl Fn() -> T) -> f64 {
+    let timed = |_| {
+        let begin = Instant::now();
+        std::hint::black_box(call());
+        begin.elapsed().as_secs_f64()
+    };
+    let mut times: Vec<f64> = (0..repeats.max(1)).map(timed).collect();
     times.sort_by(f64::total_cmp);
-    println!("{:.4} {:.9e} {}", times[times.len() / 2], solution.cost, solution.iterations);
+    times[times.len() / 2]
 }
 
 fn words<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     values.into_iter().map(f64::to_string).collect::<Vec<String>>().join(" ")
 }
 
-/// Lower and upper bounds; the number of constraints and for each its limits and coefficients; flexcal's steps, cost and optimum.
-/// Then, for each line x, the whitened residuals with those of the priors, and the Jacobian row after row.
+/// Lower and upper bounds; the number of constraints and for each its limits and coefficients; flexcal's steps, cost, time and optimum,
+/// with the time of residuals and Jacobian once, both on one thread [s]. Then, for each line x, the whitened residuals with those of the priors, and the Jacobian row after row.
 fn serve(own: &Bounded) {
     let residuals = own.residuals();
     let fit = own.fit(&residuals);
-    let found = minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
+    let solve = || minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
+    let found = solve();
+    let (fitted, linearised) =
+        common::pool(1).install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&found.x))));
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}\n{}\n{}", words(own.bounds.lower()), words(own.bounds.upper()), own.rows.len()).unwrap();
     for i in 0..own.rows.len() {
         let (lower, upper) = (own.rows.lower()[i], own.rows.upper()[i]);
         writeln!(out, "{lower} {upper} {}", words(&own.rows.matrix().row(i).clone_owned())).unwrap();
     }
-    writeln!(out, "{} {} {}", found.iterations, found.cost, words(&found.x)).unwrap();
+    let (steps, cost) = (found.iterations, found.cost);
+    writeln!(out, "{steps} {cost} {fitted} {linearised} {}", words(&found.x)).unwrap();
     let priors = own.priors();
     for line in std::io::stdin().lines() {
         let line = line.unwrap();

@@ -2,7 +2,7 @@
 
 use flexcal::identify::Placement;
 use flexcal::least_squares::solver::Bounds;
-use flexcal::least_squares::{LeastSquares, LinearRows};
+use flexcal::least_squares::{LeastSquares as _, LinearRows, Loss};
 use flexcal::measurement::Dataset;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
@@ -22,15 +22,27 @@ const ERRORS: f64 = 0.3;
 const FAR: f64 = 5.0;
 const FAR_STARTS: usize = 3;
 
-/// Bounds that bind a little, much, and against the truth.
-const WITHIN: [&str; 3] = ["stiffness", "tight-geometry", "against-the-truth"];
+/// Limits of `tests/cases/bounded` that bind a little, much, and against the truth.
+const WITHIN: [&str; 5] =
+    ["stiffness", "tight-geometry", "mild-constraints", "against-the-truth", "constraints-against-the-truth"];
+/// Losses with what `[robust]` calls them.
+const LOSSES: [(&str, Loss); 2] = [
+    ("huber", Loss::Huber { threshold: Loss::HUBER_POSITION }),
+    ("l1", Loss::L1 { slope: Loss::L1_POSITION, smoothing: Loss::L1_SMOOTHING }),
+];
 
 /// Every arm with its poses.
 pub struct Arms {
     ur10: [Ur10; 3],
+    /// To be fitted within bounds.
+    boxed: [Ur10; 2],
+    /// With gross errors.
+    gross: [Ur10; 3],
     pub lunar: [Lunar; 2],
-    /// `tests/cases/bounded` with their names.
-    within: [(&'static str, Bounded); 3],
+    /// Arms within limits, with their names.
+    within: Vec<(String, Bounded)>,
+    /// One with gross errors.
+    spoilt: Bounded,
 }
 
 /// The lunar sampler with errors drawn as wide as a part of its priors, as it would be measured.
@@ -49,7 +61,14 @@ impl Arms {
         Self {
             ur10: [100, 1000, 10_000].map(Ur10::new),
             lunar: [28, 200].map(Lunar::new),
-            within: WITHIN.map(|name| (name, Bounded::read(name))),
+            boxed: [28, 200].map(Ur10::new),
+            gross: [28, 200, 1000].map(|poses| Ur10::new(poses).with_gross_errors()),
+            within: WITHIN
+                .map(|name| (format!("lunar sampler, {name}"), Bounded::read(name)))
+                .into_iter()
+                .chain([("service arm".to_owned(), Bounded::of(Problem::read(&file("problems/service-arm")).unwrap()))])
+                .collect(),
+            spoilt: Bounded::read("stiffness").spoilt(),
         }
     }
 
@@ -57,30 +76,25 @@ impl Arms {
         let mut cases = Vec::new();
         for ur10 in &self.ur10 {
             for (class, unknowns) in [(Class::Identifiable, &ur10.identifiable), (Class::Redundant, &ur10.geometric)] {
-                let residuals = ur10.residuals(unknowns);
-                cases.push(Case {
-                    class,
-                    name: format!("UR10, {} parameters, {} poses", unknowns.len(), ur10.configurations.len()),
-                    start: DVector::zeros(residuals.parameters()),
-                    data: Box::new(residuals),
-                    priors: None,
-                    bounds: None,
-                    minima: Vec::new(),
-                    accuracy: 0.0,
-                });
+                cases.push(of_ur10(ur10, class, unknowns, ""));
             }
         }
+        for ur10 in &self.boxed {
+            let bounds = Some(ur10.bounds(&ur10.identifiable));
+            cases.push(Case { bounds, ..of_ur10(ur10, Class::Bounded, &ur10.identifiable, "") });
+        }
         for (name, own) in &self.within {
-            cases.push(Case {
-                class: Class::Bounded,
-                name: format!("lunar sampler, {name}"),
-                start: own.nominal(),
-                data: Box::new(own.residuals()),
-                priors: Some(own.priors()),
-                bounds: Some(own.bounds.clone()),
-                minima: Vec::new(),
-                accuracy: 0.0,
-            });
+            let rows = (!own.rows.is_empty()).then(|| own.rows.clone());
+            let case = Case::new(Class::Bounded, name.clone(), own.residuals(), own.nominal());
+            cases.push(Case { priors: Some(own.priors()), bounds: Some(own.bounds.clone()), rows, ..case });
+        }
+        for (word, loss) in LOSSES {
+            for ur10 in &self.gross {
+                cases.push(Case { loss, ..of_ur10(ur10, Class::Robust, &ur10.identifiable, &format!(", {word}")) });
+            }
+            let (name, own) = (format!("lunar sampler, 28 poses, {word}"), &self.spoilt);
+            let case = Case::new(Class::Robust, name, own.residuals(), own.nominal());
+            cases.push(Case { loss, priors: Some(own.priors()), ..case });
         }
         for lunar in &self.lunar {
             let nominal = DVector::zeros(lunar.truth.len());
@@ -140,15 +154,16 @@ impl Lunar {
     pub fn case(&self, class: Class, start_name: &str, start: DVector<f64>, bounds: Option<Bounds>) -> Case<'_> {
         let n = self.truth.len();
         let matrix = DMatrix::from_diagonal(&self.sigmas().map(f64::recip));
-        Case {
-            class,
-            name: format!("{}, {start_name}", self.name()),
-            data: Box::new(self.residuals()),
-            priors: Some(LinearRows { matrix, constant: DVector::zeros(n) }),
-            start,
-            bounds,
-            minima: Vec::new(),
-            accuracy: 0.0,
-        }
+        let priors = Some(LinearRows { matrix, constant: DVector::zeros(n) });
+        let case = Case::new(class, format!("{}, {start_name}", self.name()), self.residuals(), start);
+        Case { priors, bounds, ..case }
     }
+}
+
+/// A UR10 from nominal values.
+fn of_ur10<'a>(ur10: &'a Ur10, class: Class, unknowns: &[usize], more: &str) -> Case<'a> {
+    let residuals = ur10.residuals(unknowns);
+    let name = format!("UR10, {} parameters, {} poses{more}", unknowns.len(), ur10.configurations.len());
+    let start = DVector::zeros(residuals.parameters());
+    Case::new(class, name, residuals, start)
 }

@@ -1,6 +1,6 @@
 //! Every solver on every class of problem, side by side: which reach the optimum, at what price.
 //!
-//!     cargo bench --bench solvers               all of it, written to benches/RESULTS.md
+//!     cargo bench --bench solvers               all of it, written to benches/RESULTS.md and docs/solvers.svg
 //!     cargo bench --bench solvers -- WORD ...   classes and problems whose names hold one of the words; only printed
 #![allow(
     clippy::unwrap_used,
@@ -23,6 +23,7 @@ mod common;
 #[expect(dead_code, reason = "only some of it is needed here")]
 mod made;
 mod method;
+mod profile;
 mod row;
 mod smooth;
 mod table;
@@ -53,6 +54,7 @@ fn main() {
     rows.sort_by_key(|row| row.class);
     if words.is_empty() {
         std::fs::write(common::file("benches/RESULTS.md"), table::page(&rows)).unwrap();
+        std::fs::write(common::file("docs/solvers.svg"), profile::picture(&rows)).unwrap();
     } else {
         println!("{}", table::tables(&rows));
     }

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use argmin::core::observers::Observe;
 use flexcal::identify::SolverChoice;
-use flexcal::least_squares::LeastSquares as _;
 use flexcal::least_squares::solver::{
     Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State, Within, minimise,
     minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
 };
+use flexcal::least_squares::{LeastSquares as _, Loss};
 use nalgebra::DVector;
 
 use crate::case::Case;
@@ -27,6 +27,7 @@ pub enum Method {
     TrustRegion,
     Lbfgs,
     Minpack,
+    MinpackClamped,
 }
 
 struct Silent;
@@ -35,7 +36,7 @@ impl Observe<State> for Silent {}
 
 /// What a solver left behind.
 pub struct Run {
-    /// ½‖r‖² by the problem itself; infinite outside the bounds.
+    /// ½‖r‖² by the problem itself; infinite outside its limits.
     pub cost: f64,
     /// Steps tried.
     pub iterations: u64,
@@ -61,7 +62,7 @@ impl From<Solution> for End {
 }
 
 impl Method {
-    pub const EACH: [Self; 10] = [
+    pub const EACH: [Self; 11] = [
         Self::LevenbergMarquardt,
         Self::Bounded(Within::ActiveSet),
         Self::Bounded(Within::InteriorPoint),
@@ -72,6 +73,7 @@ impl Method {
         Self::TrustRegion,
         Self::Lbfgs,
         Self::Minpack,
+        Self::MinpackClamped,
     ];
 
     pub fn name(self) -> &'static str {
@@ -86,6 +88,19 @@ impl Method {
             Self::TrustRegion => "argmin trust region",
             Self::Lbfgs => "argmin L-BFGS",
             Self::Minpack => "MINPACK port",
+            Self::MinpackClamped => "MINPACK port, clamped",
+        }
+    }
+
+    /// Whether its row tells something of this problem. Without bounds those that keep them all do the same: one is enough.
+    pub fn tells(self, case: &Case) -> bool {
+        let (bounded, boxed) = (case.bounds.is_some(), case.rows.is_none());
+        match self {
+            Self::Bounded(Within::ActiveSet) => true,
+            Self::Bounded(Within::Reflective | Within::Clamped) | Self::MinpackClamped => bounded && boxed,
+            Self::Bounded(_) => bounded,
+            Self::Minpack => case.loss == Loss::Squares,
+            _ => true,
         }
     }
 
@@ -110,7 +125,7 @@ impl Method {
             Self::LevenbergMarquardt => minimise(fit, start, &settings).into(),
             Self::Bounded(within) => {
                 let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
-                let rows = Inequalities::none(data.parameters());
+                let rows = case.rows.clone().unwrap_or_else(|| Inequalities::none(data.parameters()));
                 minimise_within(within, fit, start, (&bounds, &rows), &settings, None::<Silent>).into()
             }
             Self::GaussNewton => {
@@ -129,8 +144,10 @@ impl Method {
             }
             Self::TrustRegion => trust_region(fit, &start, &settings),
             Self::Lbfgs => lbfgs(fit, &start, &settings),
-            Self::Minpack => {
-                let (x, report) = Minpack::new(data, start).with_rows(case.priors.as_ref()).solve(&settings);
+            Self::Minpack | Self::MinpackClamped => {
+                let problem = Minpack::new(data, start).with_rows(case.priors.as_ref());
+                let bounds = case.bounds.as_ref().filter(|_| self == Self::MinpackClamped);
+                let (x, report) = problem.clamped(bounds).solve(&settings);
                 let complaint = (!report.termination.was_successful()).then(|| format!("{:?}", report.termination));
                 End { x, iterations: report.number_of_evaluations.saturating_sub(1) as u64, complaint }
             }

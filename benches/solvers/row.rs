@@ -39,10 +39,7 @@ pub struct Row {
 
 /// Every solver on `case`, repeated in turn.
 pub fn measure(case: &Case) -> Vec<Row> {
-    // Without bounds those that keep them all do the same; one is enough.
-    let bounded = case.bounds.is_some();
-    let tells = |method: &Method| bounded || !matches!(method, Method::Bounded(within) if *within != Within::ActiveSet);
-    let methods: Vec<Method> = Method::EACH.into_iter().filter(tells).collect();
+    let methods: Vec<Method> = Method::EACH.into_iter().filter(|method| method.tells(case)).collect();
     let (runs, seconds) = repeated(methods.len(), |k| methods[k].run(case), |run| run.seconds);
     let found = || runs.iter().map(|run| run.cost);
     let best = |listed: f64| {
@@ -75,7 +72,7 @@ fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
     let best = optima.iter().copied().fold(f64::INFINITY, f64::min);
     let start = case.cost(&case.start);
     Err(if run.cost.is_infinite() && case.bounds.is_some() {
-        "outside the bounds".to_owned()
+        "outside the limits".to_owned()
     } else if !run.cost.is_finite() {
         "outside the domain".to_owned()
     } else if run.cost >= start {

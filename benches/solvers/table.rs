@@ -14,7 +14,8 @@ Written by `cargo bench --bench solvers`; do not edit. What the table means for 
   are bounds also `interior-point`, `reflective` and `clamped`,
   `gauss-newton` (argmin's, undamped), `pseudo-inverse` (the paper's iteration, undamped). Beside them argmin's trust region
   (Steihaug, Gauss–Newton Hessian) and L-BFGS on ½‖r‖², unknowns scaled by the columns of the first Jacobian, and the MINPACK
-  port of the crate `levenberg-marquardt`. All see the same residuals and derivatives.
+  port of the crate `levenberg-marquardt`, where there are bounds also with every point that it asks for moved into them (`clamped`). All
+  see the same residuals and derivatives, evaluated by the same code.
 - optimum: yes where ½‖r‖² is within 1e-8 of the best known, with what the solver complains of although it is there; or why not.
 - steps: steps tried. r, J: evaluations of the residual alone, and of residual and Jacobian.
 - time: median of up to 201 runs in 0.3 s, taken in turn with those of the other solvers, on one thread. A run is ended after 20 s
@@ -35,6 +36,7 @@ pub fn tables(rows: &[Row]) -> String {
     for class in Class::EACH {
         summarise(&mut out, class, rows);
     }
+    price(&mut out, rows);
     for class in Class::EACH {
         let mut of_class = rows.iter().filter(|row| row.class == class).peekable();
         if of_class.peek().is_none() {
@@ -64,6 +66,24 @@ fn verdict(row: &Row) -> String {
         (Ok(()), Some(complaint)) => format!("yes ({complaint})"),
         (Err(why), None) => format!("no: {why}"),
         (Err(why), Some(complaint)) => format!("no: {complaint}; {why}"),
+    }
+}
+
+/// What limits cost: the solver that keeps them beside the one that does not, which ends outside.
+fn price(out: &mut String, rows: &[Row]) {
+    let of = |solver: &'static str| rows.iter().filter(move |row| row.class == Class::Bounded && row.solver == solver);
+    let free = |row: &Row| of("levenberg-marquardt").find(|free| free.problem == row.problem);
+    let mut pairs = of("bounded").filter_map(|row| Some((row, free(row)?))).peekable();
+    if pairs.peek().is_none() {
+        return;
+    }
+    let head = "| limits | steps of `bounded` | of the unbounded fit | time [ms] | of the unbounded fit | ratio |";
+    write!(out, "\n{head}\n|---|---|---|---|---|---|\n").unwrap();
+    for (row, free) in pairs {
+        let [time, other] = [row, free].map(|row| milliseconds(row.seconds));
+        let (problem, ratio) = (&row.problem, row.seconds / free.seconds);
+        writeln!(out, "| {problem} | {} | {} | {time} | {other} | {ratio:.2} |", row.iterations, free.iterations)
+            .unwrap();
     }
 }
 

@@ -25,9 +25,15 @@ pub struct Bounded {
     placement: Placement,
 }
 
+/// Every so many-th row is off by so much along x in what [`Bounded::spoilt`] makes [m].
+const SPOILT: (usize, f64) = (7, 5e-3);
+
 impl Bounded {
     pub fn read(name: &str) -> Self {
-        let problem = Problem::read(&Path::new(FOLDER).join(format!("{name}.toml"))).unwrap();
+        Self::of(Problem::read(&Path::new(FOLDER).join(format!("{name}.toml"))).unwrap())
+    }
+
+    pub fn of(problem: Problem) -> Self {
         let (data, _) = Dataset::read(&problem).unwrap();
         let placement = Placement::of(&data.measurements);
         let model = Model::new(&problem, &placement.bases, &placement.targets).unwrap();
@@ -41,6 +47,12 @@ impl Bounded {
         let side = |of: fn(&LinearConstraint) -> f64| DVector::from_iterator(m, model.constraints.iter().map(of));
         let rows = Inequalities::new(matrix, side(|own| own.lower), side(|own| own.upper)).unwrap();
         Self { problem, data, model, bounds, rows, placement }
+    }
+
+    /// The same with gross errors among its measurements.
+    pub fn spoilt(mut self) -> Self {
+        self.data.measurements.positions.iter_mut().step_by(SPOILT.0).for_each(|position| position.x += SPOILT.1);
+        self
     }
 
     pub fn nominal(&self) -> DVector<f64> {

@@ -1,4 +1,5 @@
-// The fit of benches/fit.rs by Ceres with automatic differentiation: a rigid UR10, its 25 identifiable parameters or all 33.
+// The fit of benches/fit.rs by Ceres with automatic differentiation: a rigid UR10, its 25 identifiable parameters or all 33, within the
+// bounds and under the loss that the file names.
 //
 //   fit <csv> <qr|cholesky> <repeats>
 //
@@ -28,6 +29,8 @@ struct Arm {
   std::array<double, kScalars> nominal;
   std::array<int, kScalars> unknown;  // index of the unknown, or -1
   double sigma;
+  std::vector<double> bounds;  // lower, then upper; or none
+  std::string loss;
 };
 
 // One pose: (measured - predicted) / sigma. The point is carried from the last frame inwards, the cheapest way to a
@@ -79,21 +82,40 @@ std::vector<double> Numbers(const std::string& line) {
   return out;
 }
 
+// The loss on the length of a pose's residual. flexcal's l1 of slope c and smoothing e is c/e times Ceres' soft L1 at e.
+ceres::LossFunction* Loss(const std::string& words) {
+  std::stringstream stream(words);
+  std::string name, first, second;
+  std::getline(stream, name, ',');
+  std::getline(stream, first, ',');
+  std::getline(stream, second, ',');
+  if (name == "huber") return new ceres::HuberLoss(std::stod(first));
+  if (name != "l1") return nullptr;
+  const double slope = std::stod(first), smoothing = std::stod(second);
+  return new ceres::ScaledLoss(new ceres::SoftLOneLoss(smoothing), slope / smoothing, ceres::TAKE_OWNERSHIP);
+}
+
 // Fits `arm` to the poses that the rest of the file holds.
 template <int kUnknowns>
 int Fit(const Arm& arm, std::ifstream& file, const std::string& linear_solver, int repeats) {
   double x[kUnknowns] = {};
   ceres::Problem problem;
+  ceres::LossFunction* loss = Loss(arm.loss);
   for (std::string line; std::getline(file, line);) {
     const auto row = Numbers(line);
     auto* residual = new Residual{arm, {}, {}};
     std::copy_n(row.begin(), kJoints, residual->q.begin());
     std::copy_n(row.begin() + kJoints, 3, residual->measured.begin());
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residual, 3, kUnknowns>(residual), nullptr, x);
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residual, 3, kUnknowns>(residual), loss, x);
+  }
+  for (size_t k = 0; k < arm.bounds.size() / 2; ++k) {
+    problem.SetParameterLowerBound(x, static_cast<int>(k), arm.bounds[k]);
+    problem.SetParameterUpperBound(x, static_cast<int>(k), arm.bounds[k + arm.bounds.size() / 2]);
   }
 
   ceres::Solver::Options options;
   options.linear_solver_type = linear_solver == "qr" ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = 1000;
   options.num_threads = 1;
   options.function_tolerance = 1e-12;
   options.parameter_tolerance = 1e-10;
@@ -133,6 +155,9 @@ int main(int argc, char** argv) {
   arm.unknown.fill(-1);
   int next = 0;
   for (double k : Numbers(line)) arm.unknown[static_cast<int>(k)] = next++;
+  std::getline(file, line);
+  arm.bounds = Numbers(line);
+  std::getline(file, arm.loss);
   if (nominal.size() == kScalars && next == 25) return Fit<25>(arm, file, argv[2], std::atoi(argv[3]));
   if (nominal.size() == kScalars && next == 33) return Fit<33>(arm, file, argv[2], std::atoi(argv[3]));
   std::fprintf(stderr, "%s: not the arm that this program is built for\n", argv[1]);

@@ -13,6 +13,10 @@ class Arm:
             self.sigma = float(file.readline())
             self.nominal = np.array([float(cell) for cell in file.readline().split(",")])
             self.unknowns = np.array([int(cell) for cell in file.readline().split(",")])
+            bounds = [float(cell) for cell in file.readline().split(",") if cell.strip()]
+            self.bounds = np.array(bounds).reshape(2, -1) if bounds else None
+            loss, *numbers = file.readline().strip().split(",")
+            self.loss, self.numbers = loss, [float(number) for number in numbers]
             poses = np.loadtxt(file, delimiter=",", ndmin=2)
         self.q, self.measured = poses[:, :JOINTS], poses[:, JOINTS:]
 
@@ -33,6 +37,17 @@ class Arm:
             sin, cos = np.sin(alpha), np.cos(alpha)
             py, pz = py * cos - pz * sin, py * sin + pz * cos
         return ((self.measured - np.stack([px, py, pz], axis=1)) / self.sigma).ravel()
+
+    def cost(self, x):
+        """Half the sum of the loss on the length of each pose's residual, as flexcal counts."""
+        lengths = np.linalg.norm(self.residuals(x).reshape(-1, 3), axis=1)
+        if self.loss == "huber":
+            (k,) = self.numbers
+            return 0.5 * np.sum(np.where(lengths <= k, lengths**2, k * (2 * lengths - k)))
+        if self.loss == "l1":
+            slope, smoothing = self.numbers
+            return slope * np.sum(np.hypot(lengths, smoothing) - smoothing)
+        return 0.5 * np.sum(lengths**2)
 
     def jacobian(self, x):
         """Derivatives of `residuals` by hand, shape=(3 poses, unknowns): axis × lever of each turn, axis of each shift."""
