@@ -4,12 +4,16 @@
 
 mod common;
 
+#[path = "observations/arms.rs"]
+mod arms;
 #[path = "observations/bad.rs"]
 mod bad;
 #[path = "observations/bench.rs"]
 mod bench;
 #[path = "observations/derivatives.rs"]
 mod derivatives;
+#[path = "observations/named.rs"]
+mod named;
 #[path = "observations/recovery.rs"]
 mod recovery;
 #[path = "observations/results.rs"]

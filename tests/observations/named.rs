@@ -1,0 +1,288 @@
+//! Effects that arms of several kinds lack, named from rows of every kind without a tracker; the same poses measured with one are the
+//! control.
+//!
+//! A case is *distinguishable* from its rows where one who knows the effect sees it: declared, it lowers the squares of the fit, priors among
+//! them, by more than 30, and no other effect of the catalogue comes within 6 of that, each in a fit of its own.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use flexcal::diagnose::{ClosedLoop, Part, close};
+use flexcal::identify::{Identification, Options, identify};
+use flexcal::measurement::Dataset;
+use flexcal::problem::{Effect, Problem};
+use flexcal::simulate::{Cause, Simulation, Truth, simulate, simulate_poses};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::arms::{ARMS, Kind, Measured, WITHOUT_TRACKER};
+use crate::bench::read;
+use crate::common::made::model_of;
+
+/// Squares that an effect takes off where it is seen.
+const SEEN: f64 = 30.0;
+/// Squares by which every other one must fall short of it.
+const APART: f64 = 6.0;
+/// Probability of a law from which on it is named.
+const STATED: f64 = 0.9;
+
+/// What the loop made of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Outcome {
+    /// The right law at the right place, at 0.9 or more.
+    Named,
+    /// Below that, or among the alternatives.
+    Listed,
+    /// Its place alone.
+    Located,
+    /// Another law at 0.9 or more.
+    Wrong,
+    /// Something else below 0.9 or elsewhere.
+    Elsewhere,
+    Nothing,
+}
+
+/// A set through the loop.
+struct Judged {
+    outcome: Outcome,
+    /// Laws at 0.9 or more that are not true.
+    ghosts: usize,
+    said: String,
+}
+
+/// One effect of one arm, seen by one kind of rows and by a tracker.
+struct Case {
+    arm: &'static str,
+    how: Measured,
+    is_distinguishable: bool,
+    is_distinguishable_to_tracker: bool,
+    contacts: Judged,
+    tracker: Judged,
+}
+
+fn sets(otherwise: u64) -> u64 {
+    std::env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
+}
+
+/// Σ r²/σ² of the rows and priors.
+fn squares(found: &Identification, problem: &Problem, data: &Dataset) -> f64 {
+    let model = model_of(problem, &data.measurements);
+    let pull = |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
+    let freedom = found.coordinates as f64 - found.estimates.iter().map(|own| own.identified).sum::<f64>();
+    found.reduced_chi2.unwrap() * freedom + found.x.iter().enumerate().map(pull).sum::<f64>()
+}
+
+/// Whether an effect is seen and no other of the ranking comes near it, and by how much.
+fn distinguishable(problem: &Problem, data: &Dataset, truth: &Effect, closed: &ClosedLoop) -> (f64, f64) {
+    let plain = &closed.before.fit;
+    let start: Vec<(String, f64)> = plain.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+    let with = |effect: &Effect| {
+        let problem = problem.with_effect(effect.clone());
+        let found = identify(&problem, data, &Options::default().with_start(start.clone()).with_max_steps(10)).ok()?;
+        Some(squares(&found, &problem, data))
+    };
+    let without = squares(plain, problem, data);
+    let own = with(truth).unwrap();
+    let others = closed.before.ranking.iter().map(|ranked| &ranked.effect).filter(|other| !is_the_same(other, truth));
+    let others: Vec<Effect> = others.cloned().collect();
+    let nearest = others.par_iter().filter_map(with).reduce(|| f64::INFINITY, f64::min);
+    (without - own, nearest - own)
+}
+
+/// Family and place, the true orders among those of a harmonic.
+fn is_the_same(named: &Effect, truth: &Effect) -> bool {
+    match (named, truth) {
+        (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
+            joint == own && wanted.iter().all(|order| orders.contains(order))
+        }
+        _ => named == truth,
+    }
+}
+
+fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Judged {
+    let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.slot));
+    let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
+    let at_place = |at: Option<Part>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
+    let (named, such): (Vec<_>, Vec<_>) = closed.effects.iter().partition(|found| found.is_named(STATED));
+    let wrong = named.iter().filter(|found| !is_true(&found.effect)).count();
+    let listed = closed.effects.iter().any(|found| found.alternatives.iter().chain([&found.effect]).any(is_true));
+    let structure = || closed.unexplained.iter().filter(|left| left.claims.is_some());
+    let outcome = match () {
+        () if named.iter().any(|found| is_true(&found.effect)) => Outcome::Named,
+        () if wrong > 0 => Outcome::Wrong,
+        () if listed => Outcome::Listed,
+        () if structure().any(|left| at_place(left.part)) || such.iter().any(|own| at_place(part(&own.effect))) => {
+            Outcome::Located
+        }
+        () if structure().next().is_some() || !such.is_empty() => Outcome::Elsewhere,
+        () => Outcome::Nothing,
+    };
+    let place = |effect: &Effect| match effect {
+        Effect::JointHarmonic { orders, .. } => format!("{}{orders:?}", effect.name_and_place()),
+        _ => effect.name_and_place(),
+    };
+    let mut said: Vec<String> = Vec::new();
+    for found in &closed.effects {
+        let law = found.claims.as_ref().map_or(-1.0, |claims| claims.law.1);
+        said.push(format!("{} {law:.2}", place(&found.effect)));
+        said.extend(found.alternatives.iter().map(|other| format!("or {}", place(other))));
+    }
+    for left in structure() {
+        let claims = left.claims.as_ref().unwrap();
+        let of: Vec<String> = left.depends_on.iter().map(ToString::to_string).collect();
+        said.push(format!("{} of {} {:.2} {:?}", claims.place.0, of.join(" "), claims.law.1, claims.law.0.law));
+    }
+    let chi2 = |found: &Identification| found.reduced_chi2.unwrap_or(f64::NAN);
+    let said = format!("{} (χ² {:.2} → {:.2})", said.join(", "), chi2(&closed.before.fit), chi2(&closed.after));
+    Judged { outcome, ghosts: wrong, said }
+}
+
+/// The rows of a simulation in a problem.
+fn rows(problem: &Problem, simulated: &Simulation) -> Dataset {
+    read(problem, &simulated.csv())
+}
+
+/// The effect with its strengths as TRUTH.toml writes it, of a size from a quarter of the listed one to twice it.
+fn written(effect: Option<&(&str, &[(&str, f64)])>, seed: u64) -> (String, f64) {
+    let factor = 2.0_f64.powf(ChaCha8Rng::seed_from_u64(seed ^ 0x517e).random_range(-2.0..1.0));
+    let line = |&(key, value): &(&str, f64)| format!("{key} = {}\n", value * factor);
+    let text = effect.map(|(effect, values)| {
+        format!("[[effect]]\n{effect}\n{}", values.iter().map(line).collect::<String>())
+    });
+    (text.unwrap_or_default(), factor)
+}
+
+fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&(&str, &[(&str, f64)])>, seed: u64) -> Case {
+    let (text, factor) = written(effect, seed);
+    let around = arm.around(how, seed);
+    let nothing = arm.around(Measured::Positions, seed);
+    let (problem, bare) = (arm.problem(how, &around), arm.problem(Measured::Positions, &nothing));
+    let truth_of = |how, around, problem| {
+        Truth::parse(&arm.truth(how, around, &text), Path::new("truth.toml"), problem).unwrap()
+    };
+    let truth = truth_of(how, &around, &problem);
+    let name = format!("{} {how:?} {} ×{factor:.2} seed {seed}", arm.name, effect.map_or("nothing", |own| own.0));
+    let contacts = simulate(&problem, &truth, count, seed).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let poses = contacts.rows.iter().map(|row| row.conditions.clone()).collect();
+    let tracker = simulate_poses(&bare, &truth_of(Measured::Positions, &nothing, &bare), poses, seed).unwrap();
+    let lacking = truth.effects.first().map(|own| match own.cause() {
+        Cause::Catalogued(effect) => effect.clone(),
+        other => panic!("{other:?} is in no catalogue"),
+    });
+    let all = [(&problem, &contacts), (&bare, &tracker)].map(|(problem, simulated)| {
+        let data = rows(problem, simulated);
+        let closed = close(problem, &data, &Options::default()).unwrap();
+        let apart = lacking.as_ref().map(|truth| distinguishable(problem, &data, truth, &closed));
+        (judged(problem, &closed, lacking.as_ref()), apart)
+    });
+    let [(contacts, by_contacts), (tracker, by_tracker)] = all;
+    let shown = |apart: Option<(f64, f64)>| apart.is_some_and(|(seen, apart)| seen > SEEN && apart > APART);
+    let figures = |apart: Option<(f64, f64)>| apart.map_or(String::new(), |(a, b)| format!("{a:.0}, {b:.0}"));
+    println!(
+        "{name}\n    contacts [{}] {:?}: {}\n    tracker  [{}] {:?}: {}",
+        figures(by_contacts),
+        contacts.outcome,
+        contacts.said,
+        figures(by_tracker),
+        tracker.outcome,
+        tracker.said
+    );
+    Case {
+        arm: arm.name,
+        how,
+        is_distinguishable: shown(by_contacts),
+        is_distinguishable_to_tracker: shown(by_tracker),
+        contacts,
+        tracker,
+    }
+}
+
+/// Figures of some sets: how many, how many are distinguishable, and of these named, listed, located, wrong, elsewhere, nothing.
+#[derive(Default, Clone)]
+struct Row {
+    sets: usize,
+    shown: usize,
+    of_shown: BTreeMap<Outcome, usize>,
+    /// The same of those that are not.
+    of_others: BTreeMap<Outcome, usize>,
+    ghosts: usize,
+}
+
+impl Row {
+    fn add(&mut self, is_shown: bool, judged: &Judged) {
+        self.sets += 1;
+        self.shown += usize::from(is_shown);
+        let outcomes = if is_shown { &mut self.of_shown } else { &mut self.of_others };
+        *outcomes.entry(judged.outcome).or_default() += 1;
+        self.ghosts += usize::from(judged.ghosts > 0);
+    }
+
+    fn count(&self, outcome: Outcome) -> usize {
+        self.of_shown.get(&outcome).copied().unwrap_or(0)
+    }
+
+    fn line(&self) -> String {
+        use Outcome::{Elsewhere, Listed, Located, Named, Nothing, Wrong};
+        let own = [Named, Listed, Located, Elsewhere, Nothing, Wrong].map(|outcome| self.count(outcome).to_string());
+        format!("{} | {} | {} | {}", self.sets, self.shown, own.join(" | "), self.ghosts)
+    }
+}
+
+/// All sets of those arms, kinds and seeds whose name holds `FLEXCAL_ONLY`, in a table.
+fn run(seeds: std::ops::Range<u64>) -> (Row, Row) {
+    let only = std::env::var("FLEXCAL_ONLY").unwrap_or_default();
+    let mut work = Vec::new();
+    for (a, arm) in ARMS.iter().enumerate() {
+        for (k, measured) in WITHOUT_TRACKER.iter().enumerate() {
+            for (e, effect) in arm.effects.iter().map(Some).chain([None]).enumerate() {
+                for seed in seeds.clone() {
+                    let name = format!("{} {:?} {}", arm.name, measured.0, effect.map_or("nothing", |own| own.0));
+                    if only.split(',').all(|word| name.contains(word)) {
+                        let seed = 10_000 * seed + 1000 * a as u64 + 100 * k as u64 + e as u64;
+                        work.push((arm, *measured, effect, seed));
+                    }
+                }
+            }
+        }
+    }
+    let all: Vec<(Case, bool)> = work
+        .into_par_iter()
+        .map(|(arm, measured, effect, seed)| (one(arm, measured, effect, seed), effect.is_some()))
+        .collect();
+    let (mut rows, mut quiet): (BTreeMap<String, [Row; 2]>, [Row; 2]) = (BTreeMap::new(), Default::default());
+    let mut total: [Row; 2] = Default::default();
+    for (case, has_effect) in &all {
+        let both = [(case.is_distinguishable, &case.contacts), (case.is_distinguishable_to_tracker, &case.tracker)];
+        for (k, (shown, judged)) in both.into_iter().enumerate() {
+            if *has_effect {
+                for key in [format!("arm {}", case.arm), format!("rows {:?}", case.how)] {
+                    rows.entry(key).or_default()[k].add(shown, judged);
+                }
+                total[k].add(shown, judged);
+            } else {
+                quiet[k].add(true, judged);
+            }
+        }
+    }
+    println!("which | sets | distinguishable | named | listed | located | elsewhere | nothing | wrong law | with a ghost");
+    for (key, [contacts, tracker]) in &rows {
+        println!("{key} | {}\n    tracker | {}", contacts.line(), tracker.line());
+    }
+    println!("all | {}\n    tracker | {}", total[0].line(), total[1].line());
+    println!("no effect | {}\n    tracker | {}", quiet[0].line(), quiet[1].line());
+    let [contacts, _] = total;
+    let [quiet, _] = quiet;
+    (contacts, quiet)
+}
+
+/// `cargo test --release --test observations -- --ignored --nocapture effects_are_named`
+#[test]
+#[ignore = "a study of an hour"]
+fn effects_are_named_without_a_tracker() {
+    let (lacking, quiet) = run(0..sets(1));
+    let named = lacking.count(Outcome::Named);
+    assert!(10 * named >= 9 * lacking.shown, "{named} of {}", lacking.shown);
+    assert!(lacking.ghosts * 100 <= 2 * lacking.sets, "{} of {}", lacking.ghosts, lacking.sets);
+    assert!(quiet.ghosts * 50 <= quiet.sets, "{} of {}", quiet.ghosts, quiet.sets);
+}
