@@ -70,6 +70,8 @@ pub struct PlanProgress {
 pub struct Plan {
     /// The poses; rows of the table of candidates in its order, if there is one.
     pub poses: Measurements,
+    /// Rows that are measured in any case, known distances between points left out.
+    pub given: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
     /// ln of the criterion that each start ended with, before the best of them were refined.
@@ -103,12 +105,14 @@ pub fn plan(
         return Err(DesignError::NoPoses);
     }
     let draw = |ranges: &PoseRanges, count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
+    let given = with_known_distances(given, candidates);
+    let given = given.as_ref();
     let (usual, ends) = match candidates {
         Candidates::Within(ranges) => {
             let ends = draw(ranges, DRAWN[1].max(2 * poses), Extremes::Often, AT_ENDS);
             (draw(ranges, DRAWN[0].max(2 * poses), Extremes::No, EVENLY), Some(ends))
         }
-        Candidates::Rows(rows) => (rows.as_ref().clone(), None),
+        Candidates::Rows(rows) => (rows.as_ref().clone().of_the_arm(), None),
     };
     let mut tables = vec![&usual];
     tables.extend(given);
@@ -121,7 +125,8 @@ pub fn plan(
         None => (table, told),
     };
     let parameters = &site.model.parameters;
-    let measured = given.map_or(0, |given| different(&given.pose_numbers(problem), 0..given.len()));
+    let of_arm = given.map(|given| given.clone().of_the_arm());
+    let measured = of_arm.as_ref().map_or(0, |own| different(&own.pose_numbers(problem), 0..own.len()));
     let given = given.map(|given| site.at_rest(given).1);
     let (mut table, usual) = admitted(site.at_rest(&usual));
     let mut all = usual.clone();
@@ -174,7 +179,22 @@ pub fn plan(
     let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
     let suffices = planned.open <= attainable && all.coordinates * apart >= without_prior;
-    Ok(Plan { poses: chosen, candidates: tried, starts, value, planned, random, suffices })
+    let given = of_arm.map_or(0, |own| own.len());
+    Ok(Plan { poses: chosen, given, candidates: tried, starts, value, planned, random, suffices })
+}
+
+/// What is measured in any case, with the known distances between points that only the candidates touch.
+fn with_known_distances(given: Option<&Measurements>, candidates: &Candidates) -> Option<Measurements> {
+    let Candidates::Rows(rows) = candidates else { return given.cloned() };
+    let is_told =
+        |observation| given.is_some_and(|given| (0..given.len()).any(|row| given.observation(row) == observation));
+    let known: Vec<usize> =
+        (0..rows.len()).filter(|&row| !rows.observation(row).is_of_arm() && !is_told(rows.observation(row))).collect();
+    match given {
+        _ if known.is_empty() => given.cloned(),
+        Some(given) => Some(given.and(&rows.select(&known))),
+        None => Some(rows.select(&known)),
+    }
 }
 
 impl PlanOptions<'_> {

@@ -9,7 +9,7 @@ use super::columns::Columns;
 use super::role::Role;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind};
-use crate::problem::fixture::unknown;
+use crate::problem::fixture::{frame, unknown};
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
 /// Something that a row measures, and its numbers \[m\]; those of a position are in its own columns.
@@ -104,19 +104,7 @@ pub(super) fn of_row(
 /// The frame that a cell names: `base`, a joint by its name, or `joint3`; that of the tool without a word.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
-    let word = table.name(place)?;
-    let named = || problem.joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
-    let numbered =
-        || word.strip_prefix("joint")?.parse().ok().filter(|number| (1..=problem.joints.len()).contains(number));
-    match word {
-        "base" => Ok(0),
-        "tool" => Ok(problem.tool.joint + 1),
-        _ => named().or_else(numbered).ok_or_else(|| {
-            let joints = problem.joints.iter().map(|joint| joint.name.clone());
-            let known = std::iter::once("base".to_owned()).chain(joints).chain(["tool".to_owned()]).collect();
-            table.cell_error(place, InputErrorKind::UnknownFixture { what: "frame", name: word.to_owned(), known })
-        }),
-    }
+    frame(table.name(place)?, &problem.joints, problem.tool.joint).map_err(|kind| table.cell_error(place, kind))
 }
 
 /// The fixture that a cell names.

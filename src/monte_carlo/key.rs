@@ -43,6 +43,8 @@ fn canonical(truth: &Truth) -> String {
         segments,
         contact_sigmas: _,
         positions: _,
+        tilts: _,
+        tilt_sigma: _,
     } = truth;
     let optional = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:e}"));
     let range = |(from, to): (f64, f64)| format!("{from:e} {to:e}");

@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
+use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -175,6 +176,25 @@ impl Observation {
     /// Whether the arm takes part in it.
     pub fn is_of_arm(self) -> bool {
         !matches!(self, Self::Between(..))
+    }
+}
+
+/// The frame of an arm that a word names: `base`, a joint by its name, or `joint3`; `tool` is that of the joint that holds
+/// the tool, number `tool` counted from 0.
+///
+/// # Errors
+/// It names none.
+pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, InputErrorKind> {
+    let named = || joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
+    let numbered = || word.strip_prefix("joint")?.parse().ok().filter(|number| (1..=joints.len()).contains(number));
+    match word {
+        "base" => Ok(0),
+        "tool" => Ok(tool + 1),
+        _ => named().or_else(numbered).ok_or_else(|| {
+            let joints = joints.iter().map(|joint| joint.name.clone());
+            let known = std::iter::once("base".to_owned()).chain(joints).chain(["tool".to_owned()]).collect();
+            InputErrorKind::UnknownFixture { what: "frame", name: word.to_owned(), known }
+        }),
     }
 }
 

@@ -24,7 +24,7 @@ object! {
         /// Planned.
         poses: usize = plan.poses.len(),
         /// Measured in any case.
-        given: usize = plan.planned.poses - plan.poses.len(),
+        given: usize = plan.given,
         candidates: usize = plan.candidates,
         sufficient: bool = plan.suffices,
         /// ln of the criterion: of each start, and what was reached.
@@ -68,7 +68,7 @@ pub fn plan_json(
 /// A plan in words; `separated` where it tells two effects apart; ending in a line break.
 pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separated: Option<&Separated>) -> String {
     let planned = &plan.planned;
-    let (poses, given) = (plan.poses.len(), planned.poses - plan.poses.len());
+    let (poses, given) = (plan.poses.len(), plan.given);
     let besides = if given > 0 { format!(" besides {given} that are measured") } else { String::new() };
     let rows = planned.expected.iter().enumerate().map(|(k, expected)| {
         let random = plan.random_error(k);

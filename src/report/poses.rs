@@ -4,7 +4,7 @@ use super::quantity::fixed;
 use super::table::{commands, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
-use crate::problem::{HeldOut, Problem};
+use crate::problem::{HeldOut, Observation, Problem};
 
 /// Poses as CSV: the columns of measurements but for the positions; ready to be measured and completed.
 ///
@@ -21,6 +21,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let words = |labels| (0..poses.len()).map(|row| word(labels, row)).collect::<Vec<String>>();
     let mut columns = vec![("pose".to_owned(), (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>())];
     columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
+    columns.extend(surroundings(problem, poses));
     columns.extend(joints.iter().map(|(joint, name, factor)| {
         (name.clone(), (0..poses.len()).map(|row| plain(poses.configuration(row)[*joint] * factor)).collect())
     }));
@@ -31,7 +32,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         ("hoist_N", values(&poses.hoist, 1.0)),
         ("temperature_C", values(&poses.temperature, 1.0)),
         ("time_s", poses.time_measured.then(|| poses.time.iter().map(|&time| plain(time)).collect())),
-        ("sigma_mm", values(&poses.sigma, 1e3)),
+        ("sigma_mm", sigmas(poses)),
     ];
     columns.extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
     let known = poses.covariates.len() == problem.data.covariates.len() * poses.len();
@@ -47,6 +48,31 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     }
     let lines = (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
     csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
+}
+
+/// 1 σ of each row \[mm\], none of tilts: the one that is declared.
+fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
+    let cell = |(row, sigma): (usize, &f64)| match poses.observation(row).is_angle() {
+        true => String::new(),
+        false => plain(sigma * 1e3),
+    };
+    poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
+}
+
+/// The columns that say against what each row is to be measured: `point`, `anchor`, `surface`, `frame`, those that there are.
+fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
+    let word = |row: usize| match poses.observation(row) {
+        Observation::Tilt(0) => Some(("frame", "base".to_owned())),
+        Observation::Tilt(frame) => Some(("frame", format!("joint{frame}"))),
+        own => own.fixture().and_then(|own| problem.fixtures.get(own)).map(|own| (own.kind.word(), own.name.clone())),
+    };
+    let words: Vec<_> = (0..poses.len()).map(word).collect();
+    let column = |kind: &str| -> Vec<String> {
+        let cell = |own: &Option<(&str, String)>| own.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1;
+        words.iter().map(cell).collect()
+    };
+    let all = ["point", "anchor", "surface", "frame"].map(|kind| (kind.to_owned(), column(kind)));
+    all.into_iter().filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect()
 }
 
 /// Six decimals, without zeros at the end.

@@ -63,7 +63,7 @@ impl Rig {
     }
 
     /// Gravity, base frame [m/s²].
-    fn gravity(&self) -> Vector3<f64> {
+    pub(super) fn gravity(&self) -> Vector3<f64> {
         let turn = |gravity, part: Part<'_>| match part {
             (Effect::GravityDirection, &[x, y]) => rotate(&Vector3::new(x, y, 0.0), &gravity),
             _ => gravity,

@@ -1,13 +1,17 @@
 //! Rows that measure against the surroundings: which, in which configuration, and what is read.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand_chacha::ChaCha8Rng;
 
+use super::chain::Place;
 use super::draw::{Row, between, rounded_command};
+use super::equilibrium::AtRest;
 use super::truth::Truth;
 use super::{NoRest, Rig};
 use crate::problem::{FixtureKind, Joint, JointKind, Observation, PoseConditions};
-use crate::spatial::plane_normal;
+use crate::spatial::{Frame, plane_normal};
 
 /// Configurations from which a contact is sought before it is given up.
 const TRIES: usize = 200;
@@ -37,13 +41,31 @@ impl Rig {
         }
     }
 
+    /// How far the x and the y axis of a frame of the arm at rest lie above the horizontal \[rad\].
+    ///
+    /// A plumb line shows how the frame leans: the axis is off the vertical by the angle ½π − τ between it and the line.
+    fn tilts(&self, conditions: &PoseConditions, frame: usize) -> Result<Vector3<f64>, NoRest> {
+        let (chain, frames) = self.chain(conditions);
+        let mounting = Place { piece: Some(0), frame: Frame::identity() };
+        let place = frame.checked_sub(1).map_or(Some(&mounting), |joint| frames.get(joint)).ok_or(NoRest)?;
+        let frame = AtRest::find(&chain).ok_or(NoRest)?.frame(place);
+        let down = self.gravity().try_normalize(0.0).unwrap_or(-Vector3::z());
+        let above = |axis: &Vector3<f64>| axis.angle(&down) - FRAC_PI_2;
+        Ok(Vector3::new(above(&frame.axes[0]), above(&frame.axes[1]), 0.0))
+    }
+
     /// Moves the joints of a row until the target is at its point or surface, as far off as the row's noise says, and reads the row.
     ///
     /// `None` where no configuration within the ranges was found.
     pub(super) fn measure(&self, row: &mut Row, truth: &Truth, random: &mut ChaCha8Rng) -> Result<Option<()>, NoRest> {
         let noise = row.position;
         let (fixture, target) = match row.observation {
-            Observation::Position | Observation::Tilt(_) | Observation::Between(..) => {
+            Observation::Tilt(frame) => {
+                row.position = self.tilts(&row.conditions, frame)? + Vector3::new(noise.x, noise.y, 0.0);
+                row.orientation = None;
+                return Ok(Some(()));
+            }
+            Observation::Position | Observation::Between(..) => {
                 let (position, orientation) = self.pose_of(&row.target, &row.conditions)?;
                 row.position += position;
                 row.orientation = row.orientation.map(|noise| noise * orientation);

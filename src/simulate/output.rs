@@ -7,7 +7,7 @@ use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
 use crate::files::csv;
-use crate::problem::{Joint, JointKind};
+use crate::problem::{Joint, JointKind, Observation};
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -62,6 +62,9 @@ impl Simulation {
             (there("anchor"), "anchor"),
             (there("anchor"), "distance_mm"),
             (there("surface"), "surface"),
+            (there("frame"), "frame"),
+            (there("frame"), "tilt_x_deg"),
+            (there("frame"), "tilt_y_deg"),
             (self.truth.orientation_sigma.is_some(), "rx_deg"),
             (self.truth.orientation_sigma.is_some(), "ry_deg"),
             (self.truth.orientation_sigma.is_some(), "rz_deg"),
@@ -106,6 +109,9 @@ impl Simulation {
 
     /// The word of what a row measures against, none of a position.
     fn word(&self, row: &Row) -> &'static str {
+        if row.observation.is_angle() {
+            return "frame";
+        }
         row.observation.fixture().and_then(|own| self.fixtures.get(own)).map_or("", |own| own.kind.word())
     }
 
@@ -123,6 +129,11 @@ impl Simulation {
             if word == "anchor" {
                 cells.push(cell(word, format!("{:.6}", row.position.x * 1e3)));
             }
+        }
+        if there("frame") {
+            cells.push(if let Observation::Tilt(frame) = row.observation { frame_word(frame) } else { String::new() });
+            let angle = |angle: f64| cell("frame", format!("{:.7}", angle.to_degrees()));
+            cells.extend([angle(row.position.x), angle(row.position.y)]);
         }
     }
 
@@ -181,4 +192,9 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
         entry.insert("values".to_owned(), Value::Object(values));
     }
     entry
+}
+
+/// The word of a frame in tables.
+fn frame_word(frame: usize) -> String {
+    if frame == 0 { "base".to_owned() } else { format!("joint{frame}") }
 }

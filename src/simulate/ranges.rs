@@ -2,6 +2,7 @@
 
 use super::truth::HeldOutRows;
 use crate::error::{InputError, InputErrorKind};
+use crate::problem::fixture::frame;
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{JointKind, PoseRanges, Problem};
@@ -12,11 +13,20 @@ const HELD_OUT: f64 = 0.3;
 /// Seconds between poses where the file says nothing.
 const TIME_STEP: f64 = 60.0;
 
-/// Ranges, the time from one pose to the next \[s\], which rows are held out, and how many measure positions.
-pub(super) fn read(
-    mut section: Section<'_, '_>,
-    problem: &Problem,
-) -> Result<(PoseRanges, (f64, f64), HeldOutRows, usize), InputError> {
+/// `[poses]`.
+pub(super) struct Poses {
+    pub ranges: PoseRanges,
+    /// Time from one pose to the next \[s\].
+    pub time_step: (f64, f64),
+    pub held_out: HeldOutRows,
+    /// How many rows measure positions before the others.
+    pub positions: usize,
+    /// Frames whose tilts are measured.
+    pub tilts: Vec<usize>,
+}
+
+/// The section.
+pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
     let joints = problem.joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.commanded()));
     let joints = joints.collect::<Result<_, _>>()?;
@@ -28,9 +38,10 @@ pub(super) fn read(
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
     let positions = section.get("positions").map_or(Ok(0), |item| item.small().map(usize::from))?;
+    let tilts = tilts(&mut section, problem)?;
     section.finish()?;
     let ranges = PoseRanges { joints, payloads, hoist, temperature, approach, covariates };
-    Ok((ranges, time_step, held_out, positions))
+    Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
 fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {
@@ -95,6 +106,19 @@ fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
     let Some((item, _)) = section.quantity("time_step", Unit::Time)? else { return Ok((TIME_STEP, TIME_STEP)) };
     let (from, to) = item.number().map(|step| (step, step)).or_else(|_| pair(&item))?;
     if from < 0.0 { Err(item.error(InputErrorKind::Negative { value: from })) } else { Ok((from, to)) }
+}
+
+/// The words of frames whose tilts are measured; the problem must read tilts.
+fn tilts(section: &mut Section<'_, '_>, problem: &Problem) -> Result<Vec<usize>, InputError> {
+    let Some(item) = section.get("tilts") else { return Ok(Vec::new()) };
+    if problem.data.tilt_sigma.is_none() {
+        return Err(problem.data.location.clone().with_key("tilt_sigma_deg".to_owned()).error(
+            InputErrorKind::MissingKey { write: "tilt_sigma_deg = …, for tilts are measured".to_owned(), near: None },
+        ));
+    }
+    let named =
+        |item: &Item<'_, '_>| frame(item.text()?, &problem.joints, problem.tool.joint).map_err(|kind| item.error(kind));
+    item.list("a list of frames")?.iter().map(named).collect()
 }
 
 fn held_out(section: &mut Section<'_, '_>) -> Result<HeldOutRows, InputError> {

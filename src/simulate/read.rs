@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::SEGMENTS;
 use super::parameters::{self, TrueParameter};
+use super::ranges::{self, Poses};
+use super::strengths;
 use super::truth::{Deviation, RandomRule, Truth};
-use super::{ranges, strengths};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::{Document, Item};
 use crate::problem::pattern::matches;
@@ -41,7 +42,7 @@ impl Truth {
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
-    let Noise { position: noise_sigma, contacts: contact_sigmas, turn } =
+    let Noise { position: noise_sigma, contacts: contact_sigmas, turn, tilt } =
         root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;
@@ -50,7 +51,8 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
     }
     let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
-    Ok(Truth { noise_sigma, contact_sigmas, orientation_sigma, ..truth })
+    let tilt_sigma = tilt.or(problem.data.tilt_sigma).unwrap_or(0.0);
+    Ok(Truth { noise_sigma, contact_sigmas, orientation_sigma, tilt_sigma, ..truth })
 }
 
 /// The sections that say what is true, without noise.
@@ -67,7 +69,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     check_places(root, problem, &parameters, &random)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section = root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
-    let (poses, time_step, held_out, positions) = ranges::read(section, problem)?;
+    let Poses { ranges: poses, time_step, held_out, positions, tilts } = ranges::read(section, problem)?;
     let effects = strengths::read(root, problem, &poses)?;
     Ok(Truth {
         parameters,
@@ -76,6 +78,8 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
         noise_sigma: 0.0,
         contact_sigmas: [0.0; 3],
         positions,
+        tilts,
+        tilt_sigma: 0.0,
         orientation_sigma: None,
         poses,
         time_step,
@@ -124,6 +128,8 @@ struct Noise {
     contacts: [f64; 3],
     /// 1 σ of an orientation \[rad\], if it is given.
     turn: Option<f64>,
+    /// 1 σ of a tilt \[rad\], if it is given.
+    tilt: Option<f64>,
 }
 
 /// The section; contacts scatter as positions do where it says nothing else.
@@ -136,10 +142,11 @@ fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
         contact(&mut section, "surface_sigma")?,
     ];
     let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
+    let tilt = section.not_negative("tilt_sigma", Unit::Angle)?;
     section.finish()?;
     let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
     let position = sigma.ok_or_else(missing)?;
-    Ok(Noise { position, contacts: contacts.map(|own| own.unwrap_or(position)), turn })
+    Ok(Noise { position, contacts: contacts.map(|own| own.unwrap_or(position)), turn, tilt })
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {

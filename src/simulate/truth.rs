@@ -19,6 +19,10 @@ pub struct Truth {
     pub contact_sigmas: [f64; 3],
     /// How many rows measure positions, the first ones, where there are points, anchors or surfaces to measure against.
     pub positions: usize,
+    /// Frames whose tilts are measured, one after the other behind the fixtures: 0 is the arm's base, i that of joint i.
+    pub tilts: Vec<usize>,
+    /// 1 σ of a measured tilt \[rad\].
+    pub tilt_sigma: f64,
     /// 1 σ of a measured orientation about each axis, where orientations are measured \[rad\].
     pub orientation_sigma: Option<f64>,
     /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
@@ -64,28 +68,30 @@ pub enum HeldOutRows {
 }
 
 impl Truth {
-    /// What rows measure: first the positions, then one fixture after the other; positions alone where there are no fixtures.
+    /// What rows measure: first the positions, then one fixture or tilted frame after the other; positions alone where there are none.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
         let of = |(index, kind): (usize, FixtureKind)| match kind {
             FixtureKind::Point => Observation::Point(index),
             FixtureKind::Anchor => Observation::Distance(index),
             FixtureKind::Plane | FixtureKind::Sphere => Observation::Surface(index),
         };
-        let fixtures: Vec<Observation> = fixtures.iter().map(|own| own.kind).enumerate().map(of).collect();
+        let fixtures = fixtures.iter().map(|own| own.kind).enumerate().map(of);
+        let all: Vec<Observation> = fixtures.chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame))).collect();
         let of_row = |row: usize| match row.checked_sub(self.positions) {
-            Some(place) if !fixtures.is_empty() => fixtures[place % fixtures.len()],
+            Some(place) if !all.is_empty() => all[place % all.len()],
             _ => Observation::Position,
         };
         (0..rows).map(of_row).collect()
     }
 
-    /// 1 σ of what a row measures \[m\].
+    /// 1 σ of what a row measures \[m\], of a tilt \[rad\].
     pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
         let [point, distance, surface] = self.contact_sigmas;
         match observation {
             Observation::Point(_) => point,
             Observation::Distance(_) => distance,
             Observation::Surface(_) => surface,
+            Observation::Tilt(_) => self.tilt_sigma,
             _ => self.noise_sigma,
         }
     }

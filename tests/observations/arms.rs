@@ -234,16 +234,19 @@ pub enum Measured {
     Bars,
     /// A table top, a wall and a ball are touched.
     Touches,
+    /// Three sockets, and an inclinometer on the third frame and the last.
+    Tilts,
     /// Ten positions, then sockets and touches.
     Mixed,
 }
 
 /// Those without a tracker, and how many rows each has.
-pub const WITHOUT_TRACKER: [(Measured, usize); 5] = [
+pub const WITHOUT_TRACKER: [(Measured, usize); 6] = [
     (Measured::Sockets, 120),
     (Measured::Wires, 200),
     (Measured::Bars, 200),
     (Measured::Touches, 200),
+    (Measured::Tilts, 150),
     (Measured::Mixed, 130),
 ];
 
@@ -260,8 +263,9 @@ impl Kind {
         let beta = if self.name == "elbow" { "\"joint*.beta\" = { fixed = true }\n" } else { "" };
         let data = "position_sigma_mm = 0.05\npoint_sigma_mm = 0.05\ndistance_sigma_mm = 0.05\nsurface_sigma_mm = 0.05\n\
                     held_out = { column = \"split\" }\nreference_temperature_C = 20\n";
+        let tilts = if how == Measured::Tilts { "tilt_sigma_deg = 0.002\n" } else { "" };
         let rules = format!("{}{base}{beta}", self.text);
-        Problem::parse(&format!("{rules}{}[data]\n{data}", around.declared), Path::new("problem.toml")).unwrap()
+        Problem::parse(&format!("{rules}{}[data]\n{data}{tilts}", around.declared), Path::new("problem.toml")).unwrap()
     }
 
     /// Where it truly stands, and the poses: text of TRUTH.toml.
@@ -271,11 +275,15 @@ impl Kind {
         let still = |line: &str| line.replace("fixed = true", "sigma_deg = 0, sigma_mm = 0");
         // What the data cannot tell is true as declared.
         let random: String = geometry.lines().filter(random).fold(String::new(), |all, line| all + &still(line) + "\n");
-        let positions = if how == Measured::Mixed { "positions = 10\n" } else { "" };
+        let more = match how {
+            Measured::Mixed => "positions = 10\n",
+            Measured::Tilts => "tilts = [\"joint3\", \"tool\"]\n",
+            _ => "",
+        };
         let beta = if self.name == "elbow" { "\"joint*.beta\" = { sigma_deg = 0 }\n" } else { "" };
         format!(
             "[parameters]\n{}[random]\n{random}{beta}[noise]\nposition_sigma_mm = 0.05\n[poses]\n{}\ntemperature_C = [15, 30]\n\
-             payload_kg = [0, 1, 2]\n{positions}{effect}",
+             payload_kg = [0, 1, 2]\n{more}{effect}",
             around.truth,
             self.ranges.join("\n"),
         )
@@ -307,6 +315,7 @@ impl Kind {
         match how {
             Measured::Positions => {}
             Measured::Sockets => around.sockets(&places),
+            Measured::Tilts => around.sockets(&places[..3]),
             Measured::Wires => {
                 let corners = [[1.5, 0.5, 0.9], [-1.3, 1.2, 0.2], [0.3, -1.6, 1.2], [-0.9, -1.0, -0.8]];
                 for (k, corner) in corners.into_iter().enumerate() {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::functions::{Known, basis, goes_with, products_of, times};
+use super::functions::{Known, basis, goes_with, merged, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
@@ -13,7 +13,7 @@ use crate::diagnose::rules::SelectionRules;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, JointField, Slot};
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, JointKind, Observation, Problem};
 
 /// A hypothesis with its columns and the logarithm of its prior probability.
 pub(super) struct Candidate {
@@ -57,6 +57,9 @@ fn acts_along_axes(terms: &[Term]) -> bool {
 
 /// Largest displacement, in units of σ, by a parameter that moves nothing: above zero, for sizes have a reciprocal.
 const NOTHING: f64 = 1e-9;
+
+/// Commands in contact that differ by what moves the target by no more than this, in σ, may differ by noise alone.
+const NOISE_ALONE: f64 = 3.0;
 
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
@@ -199,8 +202,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
         let moving = self.problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         for (joint, _) in moving.clone() {
-            let q = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
-            all.push((Covariate::Command(joint), q));
+            all.push((Covariate::Command(joint), self.command(joint)));
         }
         for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
             let of = |pose: &Pose| match covariate {
@@ -221,6 +223,29 @@ impl<'a, 'l> Columns<'a, 'l> {
             all.extend(sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)));
         }
         all.into_iter().filter_map(|(covariate, values)| Known::of(covariate, values, self.weighed)).collect()
+    }
+
+    /// The command of a joint in every pose, as what depends on it sees it.
+    ///
+    /// In contact the noise is in the command, not in what is measured: a joint without which the target cannot come to its point has, beside
+    /// each point, values that noise alone sets apart, and a function of those is one of the noise. They are taken for one value.
+    fn command(&self, joint: usize) -> Vec<f64> {
+        let poses = self.linearised.poses();
+        let values: Vec<f64> = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
+        let is_contact = |pose: &Pose| matches!(pose.observation, Observation::Point(_) | Observation::Surface(_));
+        let contacts: Vec<usize> = (0..poses.len()).filter(|&k| is_contact(&poses[k])).collect();
+        let coordinate = match self.problem.joints[joint].kind {
+            JointKind::Prismatic => JointField::D,
+            _ => JointField::Theta,
+        };
+        let Some(at) = self.linearised.place(Slot::Joint { joint, field: coordinate }) else { return values };
+        let squares: f64 = contacts.iter().map(|&k| at.rows(3 * k, 3).norm_squared()).sum();
+        if squares == 0.0 {
+            return values;
+        }
+        // The column is in σ per rad or m.
+        let lever = (squares / contacts.len() as f64).sqrt();
+        merged(&values, NOISE_ALONE / lever)
     }
 
     /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a compliance there would do, over
@@ -300,8 +325,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         if self.problem.joints[joint].commanded() != JointKind::Revolute {
             return;
         }
-        let q: Vec<f64> = self.linearised.poses().iter().map(|pose| pose.setup.configuration[joint]).collect();
-        let Some(known) = Known::of(Covariate::Command(joint), q, self.weighed) else { return };
+        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed) else { return };
         let slow = basis(&known.scaled, self.rules.slow_length);
         for order in 1..=self.rules.near_orders {
             let k = slow.ncols();

@@ -81,6 +81,18 @@ impl Known {
     }
 }
 
+/// The same values with those that lie in a row, each no further than `apart` from the next, brought to their mean.
+pub(super) fn merged(values: &[f64], apart: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut merged = values.to_vec();
+    for together in order.chunk_by(|&a, &b| values[b] - values[a] <= apart) {
+        let mean = together.iter().map(|&k| values[k]).sum::<f64>() / together.len() as f64;
+        together.iter().for_each(|&k| merged[k] = mean);
+    }
+    merged
+}
+
 /// Whether a function of these two is looked for.
 pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
@@ -130,4 +142,17 @@ pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
 pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
     let k = functions.ncols();
     DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| at[j / k][row] * functions[(row / 3, j % k)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_in_a_row_are_one_and_others_stay() {
+        let values = [3.0, 1.0, 1.2, 1.4, 2.0];
+        let merged = merged(&values, 0.25);
+        let expected = [3.0, 1.2, 1.2, 1.2, 2.0];
+        assert!(merged.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 1e-12), "{merged:?}");
+    }
 }
