@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace};
 use crate::measurement::{Measurements, different};
+use crate::model::parameter::{Parameter, Slot};
 use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
@@ -146,6 +147,7 @@ pub fn plan(
     if identifiability.rank == 0 {
         return Err(DesignError::NothingSeen);
     }
+    let attainable = attainable.saturating_sub(untouched(parameters, &[Some(&all)]));
     let exchange =
         Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
     let (ends, starts) = starts(&exchange, options);
@@ -178,7 +180,8 @@ pub fn plan(
     let planned = forecast(&told);
     let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let suffices = planned.open <= attainable && all.coordinates * apart >= without_prior;
+    let open = planned.open.saturating_sub(untouched(parameters, &[Some(&told), given.as_ref()]));
+    let suffices = open <= attainable && all.coordinates * apart >= without_prior;
     let given = of_arm.map_or(0, |own| own.len());
     Ok(Plan { poses: chosen, given, candidates: tried, starts, value, planned, random, suffices })
 }
@@ -195,6 +198,13 @@ fn with_known_distances(given: Option<&Measurements>, candidates: &Candidates) -
         Some(given) => Some(given.and(&rows.select(&known))),
         None => Some(rows.select(&known)),
     }
+}
+
+/// Numbers without a prior of points, anchors and surfaces that none of these rows touches: what is left out need not be found.
+fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
+    let is_seen = |k: usize| rows.iter().flatten().any(|own| own.rows.row(k).iter().any(|slope| *slope != 0.0));
+    let is_free = |own: &Parameter| matches!(own.slot, Slot::Fixture { .. }) && own.sigma.is_none();
+    (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_seen(k)).count()
 }
 
 impl PlanOptions<'_> {

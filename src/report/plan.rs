@@ -106,7 +106,7 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
     blocks.extend(gain);
     blocks.push(conditioning(&planned.identifiability, names.len(), 3 * planned.poses));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
-    blocks.extend(assumptions(problem, &planned.expected, Some(planned.poses)));
+    blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
     text(&blocks)
 }

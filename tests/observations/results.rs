@@ -193,3 +193,29 @@ fn bad_references_end_with_status_2_and_write_nothing() {
         }
     }
 }
+
+/// A plan from contacts says what to touch, with the known distance beside all of them.
+#[test]
+fn a_plan_of_contacts_says_what_to_touch() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n")).unwrap();
+    let (arm, _) = true_arm(&problem(AROUND), 3);
+    let table = Bench::new(arm, 5).table(&["point", "distance", "plane", "tilt"], 40);
+    fs::write(folder.join("rows.csv"), &table).unwrap();
+    let text = run(folder, "plan", "plan", &["--candidates", "rows.csv", "--poses", "60"]);
+    assert!(text.contains("60 poses, from 160 candidates;"), "{text}");
+    assert_eq!(json(folder, "plan/plan.json")["given"], 0);
+    let mut plan = csv::Reader::from_path(folder.join("plan/plan.csv")).unwrap();
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    for row in plan.deserialize::<BTreeMap<String, String>>() {
+        let row = row.unwrap();
+        let told: Vec<&str> =
+            ["point", "anchor", "surface", "frame"].into_iter().filter(|kind| !row[*kind].is_empty()).collect();
+        assert_eq!(told.len(), 1, "{row:?}");
+        assert_eq!(row["sigma_mm"].is_empty(), told == ["frame"], "{row:?}");
+        *kinds.entry(told[0]).or_default() += 1;
+    }
+    assert!(kinds["point"] >= 2 && kinds.values().sum::<usize>() == 60, "{kinds:?}");
+    run(folder, "check", "checked", &["--candidates", "plan/plan.csv"]);
+}
