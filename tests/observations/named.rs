@@ -170,7 +170,7 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&(&str, &[(&s
             Some((problem, contacts))
         })
         .unwrap_or_else(|| panic!("{name}: out of reach"));
-    let poses = contacts.rows.iter().map(|row| row.conditions.clone()).collect();
+    let poses = contacts.rows.iter().map(|row| (row.conditions.clone(), row.target.clone())).collect();
     let tracker = simulate_poses(&bare, &truth_of(Measured::Positions, &nothing, &bare), poses, seed).unwrap();
     let lacking = contacts.truth.effects.first().map(|own| match own.cause() {
         Cause::Catalogued(effect) => effect.clone(),
