@@ -198,6 +198,13 @@ pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, 
     }
 }
 
+/// A word that names a frame of an arm: the joint's own, unless that names another.
+pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String {
+    let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else { return "base".to_owned() };
+    let is_it = frame(&joint.name, joints, tool).is_ok_and(|named| named == place);
+    if is_it { joint.name.clone() } else { format!("joint{place}") }
+}
+
 /// Every fixture, in the order point, anchor, surface, and the known distances.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
     let mut fixtures: Vec<Fixture> = Vec::new();

@@ -4,6 +4,7 @@ use super::quantity::fixed;
 use super::table::{commands, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
+use crate::problem::fixture::frame_word;
 use crate::problem::{HeldOut, Observation, Problem};
 
 /// Poses as CSV: the columns of measurements but for the positions; ready to be measured and completed.
@@ -62,8 +63,7 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
 /// The columns that say against what each row is to be measured: `point`, `anchor`, `surface`, `frame`, those that there are.
 fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let word = |row: usize| match poses.observation(row) {
-        Observation::Tilt(0) => Some(("frame", "base".to_owned())),
-        Observation::Tilt(frame) => Some(("frame", format!("joint{frame}"))),
+        Observation::Tilt(frame) => Some(("frame", frame_word(frame, &problem.joints, problem.tool.joint))),
         own => own.fixture().and_then(|own| problem.fixtures.get(own)).map(|own| (own.kind.word(), own.name.clone())),
     };
     let words: Vec<_> = (0..poses.len()).map(word).collect();

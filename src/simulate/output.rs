@@ -7,6 +7,7 @@ use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
 use crate::files::csv;
+use crate::problem::fixture::frame_word;
 use crate::problem::{Joint, JointKind, Observation};
 
 #[derive(Serialize)]
@@ -131,7 +132,9 @@ impl Simulation {
             }
         }
         if there("frame") {
-            cells.push(if let Observation::Tilt(frame) = row.observation { frame_word(frame) } else { String::new() });
+            let tool = self.rig.arm.tool.joint;
+            let word = |frame| frame_word(frame, &self.joints, tool);
+            cells.push(if let Observation::Tilt(frame) = row.observation { word(frame) } else { String::new() });
             let angle = |angle: f64| cell("frame", format!("{:.7}", angle.to_degrees()));
             cells.extend([angle(row.position.x), angle(row.position.y)]);
         }
@@ -192,9 +195,4 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
         entry.insert("values".to_owned(), Value::Object(values));
     }
     entry
-}
-
-/// The word of a frame in tables.
-fn frame_word(frame: usize) -> String {
-    if frame == 0 { "base".to_owned() } else { format!("joint{frame}") }
 }
