@@ -53,9 +53,8 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
 
 /// 1 σ of each row \[mm\], none of tilts: the one that is declared.
 fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
-    let cell = |(row, sigma): (usize, &f64)| match poses.observation(row).is_angle() {
-        true => String::new(),
-        false => plain(sigma * 1e3),
+    let cell = |(row, sigma): (usize, &f64)| {
+        if poses.observation(row).is_angle() { String::new() } else { plain(sigma * 1e3) }
     };
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }

@@ -52,7 +52,7 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     }
     let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
     let tilt_sigma = tilt.or(problem.data.tilt_sigma).unwrap_or(0.0);
-    Ok(Truth { noise_sigma, contact_sigmas, orientation_sigma, tilt_sigma, ..truth })
+    Ok(Truth { noise_sigma, contact_sigmas, tilt_sigma, orientation_sigma, ..truth })
 }
 
 /// The sections that say what is true, without noise.

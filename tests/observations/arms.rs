@@ -9,6 +9,11 @@ use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+/// A key of `[[effect]]` and its value.
+pub type Strength = (&'static str, f64);
+/// An effect as TRUTH.toml declares it, and its strengths.
+pub type Lacking = (&'static str, &'static [Strength]);
+
 /// An arm, where its joints go, and effects as TRUTH.toml writes them at a size that nobody overlooks.
 pub struct Kind {
     pub name: &'static str,
@@ -17,7 +22,7 @@ pub struct Kind {
     /// Range of each joint as `[poses]` writes it.
     pub ranges: &'static [&'static str],
     /// Effect, and its strengths by key.
-    pub effects: &'static [(&'static str, &'static [(&'static str, f64)])],
+    pub effects: &'static [Lacking],
 }
 
 /// Seven joints and no masses, as a URDF without inertias gives them.
@@ -324,7 +329,7 @@ impl Kind {
             }
             Measured::Bars => {
                 for (k, at) in places.iter().take(3).enumerate() {
-                    around.sphere(k, *at, 0.6 * reach, true);
+                    around.sphere(k, *at, 0.6 * reach);
                 }
             }
             Measured::Touches => around.touches(&places, &middle, reach),
@@ -362,13 +367,9 @@ impl Around {
         self.at(&format!("anchor[a{k}]"), &at);
     }
 
-    fn sphere(&mut self, k: usize, at: Vector3<f64>, radius: f64, is_known: bool) {
-        let known = if is_known { format!("radius_m = {radius:.6}\n") } else { String::new() };
-        let _ = writeln!(self.declared, "[[surface]]\nname = \"s{k}\"\nkind = \"sphere\"\n{known}");
+    fn sphere(&mut self, k: usize, at: Vector3<f64>, radius: f64) {
+        let _ = writeln!(self.declared, "[[surface]]\nname = \"s{k}\"\nkind = \"sphere\"\nradius_m = {radius:.6}");
         self.at(&format!("surface[s{k}]"), &at);
-        if !is_known {
-            let _ = writeln!(self.truth, "\"surface[s{k}].radius\" = {{ mm = {:.6} }}", radius * 1e3);
-        }
     }
 
     fn plane(&mut self, name: &str, turned: [f64; 2], through: &Vector3<f64>) {
@@ -383,6 +384,6 @@ impl Around {
     fn touches(&mut self, places: &[Vector3<f64>], middle: &Vector3<f64>, reach: f64) {
         self.plane("table", [0.03, -0.02], &(middle - Vector3::z() * 0.2 * reach));
         self.plane("wall", [0.1, 1.4], middle);
-        self.sphere(9, places[places.len() - 1], 0.4 * reach, true);
+        self.sphere(9, places[places.len() - 1], 0.4 * reach);
     }
 }

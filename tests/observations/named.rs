@@ -17,7 +17,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::arms::{ARMS, Around, Kind, Measured, WITHOUT_TRACKER};
+use crate::arms::{ARMS, Around, Kind, Lacking, Measured, Strength, WITHOUT_TRACKER};
 use crate::bench::read;
 use crate::common::made::model_of;
 
@@ -145,15 +145,15 @@ fn rows(problem: &Problem, simulated: &Simulation) -> Dataset {
 }
 
 /// The effect with its strengths as TRUTH.toml writes it, of a size from a quarter of the listed one to twice it.
-fn written(effect: Option<&(&str, &[(&str, f64)])>, seed: u64) -> (String, f64) {
+fn written(effect: Option<&Lacking>, seed: u64) -> (String, f64) {
     let factor = 2.0_f64.powf(ChaCha8Rng::seed_from_u64(seed ^ 0x517e).random_range(-2.0..1.0));
-    let line = |&(key, value): &(&str, f64)| format!("{key} = {}\n", value * factor);
+    let line = |&(key, value): &Strength| format!("{key} = {}\n", value * factor);
     let text =
         effect.map(|(effect, values)| format!("[[effect]]\n{effect}\n{}", values.iter().map(line).collect::<String>()));
     (text.unwrap_or_default(), factor)
 }
 
-fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&(&str, &[(&str, f64)])>, seed: u64) -> Case {
+fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, seed: u64) -> Case {
     let (text, factor) = written(effect, seed);
     let nothing = arm.around(Measured::Positions, seed);
     let bare = arm.problem(Measured::Positions, &nothing);
@@ -210,17 +210,16 @@ struct Row {
     sets: usize,
     shown: usize,
     of_shown: BTreeMap<Outcome, usize>,
-    /// The same of those that are not.
-    of_others: BTreeMap<Outcome, usize>,
     ghosts: usize,
 }
 
 impl Row {
     fn add(&mut self, is_shown: bool, judged: &Judged) {
         self.sets += 1;
-        self.shown += usize::from(is_shown);
-        let outcomes = if is_shown { &mut self.of_shown } else { &mut self.of_others };
-        *outcomes.entry(judged.outcome).or_default() += 1;
+        if is_shown {
+            self.shown += 1;
+            *self.of_shown.entry(judged.outcome).or_default() += 1;
+        }
         self.ghosts += usize::from(judged.ghosts > 0);
     }
 
@@ -243,7 +242,7 @@ fn run(seeds: Range<u64>) -> (Row, Row) {
         for (a, arm) in (0..).zip(&ARMS) {
             for (e, effect) in (0..).zip(arm.effects.iter().map(Some).chain([None])) {
                 // With each seed the next way of measuring, so that six have all of them.
-                let measured = WITHOUT_TRACKER[(a + e + seed) as usize % WITHOUT_TRACKER.len()];
+                let measured = WITHOUT_TRACKER[usize::try_from(a + e + seed).unwrap() % WITHOUT_TRACKER.len()];
                 let name = format!("{} {:?} {}", arm.name, measured.0, effect.map_or("nothing", |own| own.0));
                 if only.split(',').all(|word| name.contains(word)) {
                     work.push((arm, measured, effect, 10_000 * seed + 1000 * a + e));

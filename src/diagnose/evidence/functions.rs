@@ -88,7 +88,9 @@ pub(super) fn merged(values: &[f64], apart: f64) -> Vec<f64> {
     let mut merged = values.to_vec();
     for together in order.chunk_by(|&a, &b| values[b] - values[a] <= apart) {
         let mean = together.iter().map(|&k| values[k]).sum::<f64>() / together.len() as f64;
-        together.iter().for_each(|&k| merged[k] = mean);
+        for &k in together {
+            merged[k] = mean;
+        }
     }
     merged
 }
