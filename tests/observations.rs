@@ -1,6 +1,7 @@
 //! Rows that measure something else than positions: contacts with points and surfaces, distances to anchors.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
 mod common;
 
