@@ -105,7 +105,7 @@ pub enum InputErrorKind {
     )]
     NotInStandardForm,
     #[error(
-        "{what} takes one chain of joints, with the tool behind the last of them; this arm is a tree, or measured elsewhere"
+        "{what} takes one chain of joints with one tool behind the last of them; this arm is a tree or has several targets"
     )]
     NotAChain { what: &'static str },
     #[error("joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on")]

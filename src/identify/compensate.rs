@@ -8,7 +8,7 @@ use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
 use crate::model::{CommandResiduals, Model, Pose};
-use crate::problem::{JointKind, PoseView, Problem};
+use crate::problem::{JointKind, Mimic, PoseView, Problem};
 use crate::spatial::Frame;
 
 use super::stage::StageError;
@@ -152,10 +152,12 @@ pub fn compensate(
         let n = moving.len();
         let carrier = model.carrier(pose.target);
         let leads = |joint: usize| tree.leads_through(joint, carrier);
-        let led_by = |joint: usize| {
-            (0..).zip(&problem.joints).filter(move |(_, own)| own.mimic.is_some_and(|own| own.joint == joint))
+        let serves = |joint: usize| {
+            let moved = |(own, follows): (usize, Option<Mimic>)| {
+                leads(own) && (own == joint || follows.is_some_and(|own| own.joint == joint))
+            };
+            problem.joints.iter().map(|own| own.mimic).enumerate().any(moved)
         };
-        let serves = |joint: usize| leads(joint) || led_by(joint).any(|(follower, _)| leads(follower));
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
             let turn = pose.orientation.map(|_| arm.orientation_residuals(vec![pose], &DVector::zeros(n))[0]);

@@ -91,27 +91,26 @@ impl Problem {
         Tree::of(&self.joints)
     }
 
-    /// Whether the joints are one chain, which carries the tool and every target behind its last joint.
+    /// Whether the joints are one chain, which carries tool and targets behind its last joint.
     pub fn is_chain(&self) -> bool {
         let last = self.joints.len().saturating_sub(1);
         let mut carriers = self.targets.iter().map(|own| own.joint).chain([self.tool.joint]);
         self.tree().is_chain() && carriers.all(|joint| joint == last)
     }
 
-    /// Refuses an arm that is no chain, for the sake of `what`.
+    /// Refuses a tree of joints, for the sake of `what`.
     ///
     /// # Errors
-    /// It is none: at the first joint that stands elsewhere than on the one before, or else at the tool.
+    /// A joint stands elsewhere than on the one before.
     pub fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
-        if self.is_chain() {
-            return Ok(());
-        }
         let mut joints = self.joints.iter().enumerate();
-        let elsewhere = joints.find(|(index, own)| own.parent != index.checked_sub(1));
-        let file = || Location::file(&self.data.location.file).with_key("tool.joint");
-        let location = elsewhere
-            .map_or_else(file, |(index, own)| own.location.clone().with_key(format!("joint[{}].parent", index + 1)));
-        Err(location.error(InputErrorKind::NotAChain { what }))
+        match joints.find(|(index, own)| own.parent != index.checked_sub(1)) {
+            Some((index, own)) => {
+                let location = own.location.clone().with_key(format!("joint[{}].parent", index + 1));
+                Err(location.error(InputErrorKind::NotAChain { what }))
+            }
+            None => Ok(()),
+        }
     }
 
     /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where none is declared.

@@ -114,7 +114,7 @@ fn words((angle, distance): (f64, f64)) -> String {
 /// # Errors
 /// Problem and chain are not of one arm, or no origin is left behind the last joint that could hold what was identified there.
 pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export, InputError> {
-    problem.require_chain("a URDF of one arm")?;
+    problem.require_chain("export to a URDF")?;
     check_names(chain, problem)?;
     let gauges = Steps::of(&Arm::nominal(problem)).gauges(chain)?;
     let steps = Steps::of(arm);

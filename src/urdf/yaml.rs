@@ -39,7 +39,7 @@ pub struct JointOrigin {
 /// # Errors
 /// For Universal Robots: the arm is not of that form.
 pub fn joint_origins(problem: &Problem, arm: &Arm<f64>, form: Yaml) -> Result<Vec<JointOrigin>, InputError> {
-    problem.require_chain("a list of origins")?;
+    problem.require_chain("export to YAML")?;
     let steps = Steps::of(arm);
     let origin =
         |(name, frame): (String, Frame<f64>)| JointOrigin { name, xyz: frame.origin, rpy: frame.roll_pitch_yaw() };

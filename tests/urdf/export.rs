@@ -107,4 +107,7 @@ fn universal_robots_get_their_six_links() {
     let other = problem_of(&Chain::new(&odd, None, Some("tool")).unwrap());
     let error = joint_origins(&other, &Arm::nominal(&other), Yaml::UniversalRobots).unwrap_err().to_string();
     assert!(error.contains("not an arm of Universal Robots' form: it has 5 moving joints, not 6"), "{error}");
+    let tree = Problem::read(&path("problems/two-arms")).unwrap();
+    let error = joint_origins(&tree, &Arm::nominal(&tree), Yaml::Ros).unwrap_err().to_string();
+    assert!(error.contains(":53: joint[7].parent: export to YAML takes one chain of joints"), "{error}");
 }

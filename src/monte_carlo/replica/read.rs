@@ -18,7 +18,9 @@ impl MisprintStudy {
         let title = root.text("title")?.unwrap_or(&name).to_owned();
         let asked = root.require("problem", "problem = \"…\", a problem.toml")?;
         let (problem, _, problem_file) = problem_of(&asked, folder)?;
-        problem.require_chain("a study of misprints")?;
+        if !problem.is_chain() || !problem.targets.is_empty() {
+            return Err(asked.error(InputErrorKind::NotAChain { what: "a study of misprints" }));
+        }
         let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
         let specimens = count(&root.require("specimens", "specimens = …, arms of each case")?)?;
         let identification = count(&root.require("identification_poses", "identification_poses = 28")?)?;
