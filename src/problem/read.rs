@@ -16,7 +16,7 @@ use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
 /// Most elements of a beam: eight are as good as any number, and the time of a pose grows with their square.
-const MOST_ELEMENTS: usize = 64;
+const MOST_ELEMENTS: usize = 32;
 
 impl Problem {
     /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
