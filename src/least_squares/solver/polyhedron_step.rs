@@ -9,7 +9,9 @@ use super::{AtBound, Factor};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 pub(super) const NEAR: f64 = 1e-6;
-/// Corrections of the active set allowed to a polish.
+/// Corrections of the active set allowed to a guess: each costs a factorisation, the interior point some twenty.
+const GUESSES: usize = 10;
+/// Corrections allowed to the faces near the interior point.
 const CORRECTIONS: usize = 30;
 /// Rounding allowed in the optimality conditions.
 const ROUNDING: f64 = 1e-12;
@@ -35,7 +37,7 @@ impl<'a> PolyhedronProblem<'a> {
 
     /// The minimiser for damping λ, exact on its faces.
     pub(super) fn solve(&mut self, lambda: f64) -> PolyhedronSolution {
-        let solution = self.polish(self.guess.clone(), lambda, 2).unwrap_or_else(|| {
+        let solution = self.polish(self.guess.clone(), lambda, GUESSES).unwrap_or_else(|| {
             let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None).map(|(q, _)| q);
             let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, NEAR);
             let polished = interior.as_ref().and_then(|q| self.polish(near(q), lambda, CORRECTIONS));
