@@ -48,7 +48,7 @@ impl Arm<f64> {
             beam_elements: problem.statics.beam_elements,
             joints: problem.joints.iter().map(Joint::nominal).collect(),
             tree: problem.tree(),
-            payload_on: Some(problem.tool.joint),
+            payload_on: Some(problem.tool.joint).filter(|joint| joint + 1 < problem.joints.len()),
             payload_at: problem.tool.payload_at,
             payload_mass: problem.tool.payload_mass,
             payload_error: 0.0,
