@@ -38,8 +38,9 @@ impl Terminal {
     /// `script` gives it the terminal and passes on what it shows, after the number of its process.
     fn run(folder: &Path, arguments: &str) -> Self {
         let command = format!("echo pid=$$.; exec '{}' {arguments}", cargo_bin!("flexcal").display());
-        let mut script = Command::new("script")
-            .args(["-qefc", &command, "/dev/null"])
+        // Where tests run in the background interrupts are ignored, and what they start would inherit that.
+        let mut script = Command::new("env")
+            .args(["--default-signal=INT", "script", "-qefc", &command, "/dev/null"])
             .current_dir(folder)
             .env("TERM", "xterm")
             .stdin(Stdio::null())
