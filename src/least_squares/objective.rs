@@ -1,6 +1,7 @@
 //! A problem over many items as a solver sees it: a value and a triangular linearisation.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,7 +20,7 @@ const BEND_STEP: f64 = 0.1;
 /// absorbing half as many rows as there are unknowns.
 const ROWS_PER_UNKNOWN: usize = 4;
 
-/// Chunks whose factors exist at the same time.
+/// Chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
 
 /// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
@@ -56,8 +57,8 @@ pub enum RowsError {
 /// A data problem with optional linear rows, ready for a solver.
 ///
 /// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns are many, is reduced to its own
-/// [`Triangle`], and these are merged in order, so that the result is the same to the bit for any number of threads. One chunk
-/// alone never leaves its thread.
+/// [`Triangle`], and these are merged two by two, always the same ones, so that the result is the same to the bit for any number of
+/// threads. One chunk alone never leaves its thread.
 #[derive(Debug, Clone)]
 pub struct Fit<'a, P> {
     problem: &'a P,
@@ -136,10 +137,9 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// The factor of a run of chunks.
-    fn run_triangle(&self, x: &DVector<f64>, run: usize, block: &mut Block) -> Triangle {
+    fn run_triangle(&self, x: &DVector<f64>, run: Range<usize>, block: &mut Block) -> Triangle {
         let mut triangle = Triangle::new(self.problem.parameters());
-        let first = run * self.run_length();
-        for index in first..(first + self.run_length()).min(self.chunks()) {
+        for index in run {
             let items = self.chunk(index);
             block.reshape(items.len() * self.problem.rows_per_item());
             self.problem.linearise(x, items, block);
@@ -155,14 +155,24 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
 
     /// The factor of all data at x.
     fn reduce(&self, x: &DVector<f64>) -> Triangle {
-        let mut total: Option<Triangle> = None;
-        let map = |run, block: &mut Block| self.run_triangle(x, run, block);
-        let take = |triangle: Triangle| match &mut total {
-            Some(total) => total.merge(&triangle),
-            None => total = Some(triangle),
-        };
-        in_order(self.chunks().div_ceil(self.run_length()), || self.empty_block(), map, take);
-        total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
+        self.halves(x, 0..self.chunks(), &Mutex::default())
+    }
+
+    /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare` are blocks to use again.
+    fn halves(&self, x: &DVector<f64>, chunks: Range<usize>, spare: &Mutex<Vec<Block>>) -> Triangle {
+        if chunks.len() <= self.run_length() {
+            let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+            let kept = spare().pop();
+            let mut block = kept.unwrap_or_else(|| self.empty_block());
+            let triangle = self.run_triangle(x, chunks, &mut block);
+            spare().push(block);
+            return triangle;
+        }
+        let middle = chunks.start + chunks.len() / 2;
+        let half = |chunks| move || self.halves(x, chunks, spare);
+        let (mut first, second) = rayon::join(half(chunks.start..middle), half(middle..chunks.end));
+        first.merge(&second);
+        first
     }
 
     /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
@@ -226,7 +236,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
             None => self.reduce(x),
         };
         for rows in &self.rows {
-            total.absorb(&mut linear_block(rows, x));
+            total.absorb_rows(&mut linear_block(rows, x));
         }
         let mut linearisation = total.into_linearisation();
         linearisation.cost = half_if_finite(2.0 * linearisation.cost);

@@ -68,6 +68,18 @@ impl Triangle {
         self.reduce(block, |_| usize::MAX);
     }
 
+    /// The same of rows sorted by the first column in which they have an entry, as priors are: few are touched by the first reflectors.
+    pub(super) fn absorb_rows(&mut self, block: &mut Block) {
+        let n = block.parameters;
+        let first = |row: usize| (0..n).find(|&j| block.values[j * block.rows + row] != 0.0).unwrap_or(n);
+        let firsts: Vec<usize> = (0..block.rows).map(first).collect();
+        if !firsts.is_sorted() {
+            return self.absorb(block);
+        }
+        self.squares += sum_of_squares(block.column(n));
+        self.reduce(block, |columns| firsts.partition_point(|&first| first < columns));
+    }
+
     /// Takes in all rows that `other` has absorbed.
     pub fn merge(&mut self, other: &Triangle) {
         let n = other.parameters;
@@ -300,6 +312,30 @@ mod tests {
     fn merging_equals_absorbing() {
         for (n, rows) in [(11, 40), (170, 40), (170, 400)] {
             merges(n, rows);
+        }
+    }
+
+    #[test]
+    fn rows_of_priors_are_absorbed_as_any() {
+        for n in [5, 170] {
+            // Unknowns 0, 2, 3, 5, … have a prior; every row reaches two columns on.
+            let rows: Vec<usize> = (0..n).filter(|j| j % 3 != 1).collect();
+            let mut priors = Block::zeros(rows.len(), n);
+            for (i, &j) in rows.iter().enumerate() {
+                for column in [j, (j + 2).min(n)] {
+                    priors.column_mut(column)[i] = wave(7 * i + column);
+                }
+            }
+            for data in [0, 3, 400] {
+                let mut triangle = Triangle::new(n);
+                triangle.absorb(&mut block(data, n, 0, 1.0));
+                let mut other = triangle.clone();
+                triangle.absorb(&mut priors.clone());
+                other.absorb_rows(&mut priors.clone());
+                let [all, few] = [triangle, other].map(Triangle::into_linearisation);
+                assert!((all.cost / few.cost - 1.0).abs() < 1e-14);
+                assert!((all.triangle - few.triangle).amax() < 1e-13 && (all.projected - few.projected).amax() < 1e-13);
+            }
         }
     }
 

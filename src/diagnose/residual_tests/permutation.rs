@@ -13,8 +13,10 @@ use super::statistic::{Sample, Statistic};
 
 /// Number of draws.
 const DRAWS: usize = 1999;
-/// Draws that are fitted together.
-const TOGETHER: usize = 16;
+/// Draws that are fitted together, fewer where they have more than so many numbers: Q is gone through once for all of them.
+const TOGETHER: usize = 96;
+const FEWEST_TOGETHER: usize = 16;
+const NUMBERS: usize = 1 << 21;
 
 /// What each statistic does by chance; `None` where it cannot vary.
 ///
@@ -35,11 +37,12 @@ pub(super) fn chances(
     if statistics.is_empty() {
         return Vec::new();
     }
-    let starts: Vec<usize> = (0..DRAWS).step_by(TOGETHER).collect();
+    let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
+    let starts: Vec<usize> = (0..DRAWS).step_by(together).collect();
     let drawn: Vec<Vec<f64>> = starts
         .into_par_iter()
         .flat_map_iter(|start| {
-            let residuals = draw(leverage, studentised, start..(start + TOGETHER).min(DRAWS), seed);
+            let residuals = draw(leverage, studentised, start..(start + together).min(DRAWS), seed);
             let values = |residual: &[f64]| -> Vec<f64> {
                 let sample = Sample::of(leverage.studentise(residual));
                 statistics.iter().map(|statistic| statistic.of(&sample)).collect()

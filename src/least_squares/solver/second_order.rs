@@ -127,8 +127,8 @@ impl SecondOrder {
         scale: &DVector<f64>,
         pressed: impl FnOnce() -> DMatrix<f64>,
     ) -> Option<Convex> {
-        let n = scale.len();
-        let mut hessian = found.triangle.tr_mul(&found.triangle) + self.matrix.as_ref()?;
+        let (n, second) = (scale.len(), self.matrix.as_ref()?);
+        let mut hessian = found.triangle.tr_mul(&found.triangle) + second;
         for j in 0..n {
             for i in 0..n {
                 hessian[(i, j)] /= scale[i] * scale[j];
