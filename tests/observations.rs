@@ -15,6 +15,8 @@ mod bench;
 mod derivatives;
 #[path = "observations/named.rs"]
 mod named;
+#[path = "observations/overstated.rs"]
+mod overstated;
 #[path = "observations/recovery.rs"]
 mod recovery;
 #[path = "observations/results.rs"]

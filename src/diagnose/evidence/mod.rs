@@ -215,12 +215,14 @@ impl Evidence {
 
 /// ln of the marginal likelihood and prior of a fit's own explanation: the effects `added` by the search, and functions without a law.
 ///
-/// The fit is linear about its own optimum: sets whose effects are strong are compared by this, each at a fit of its own.
+/// The fit is linear about its own optimum: sets whose effects are strong are compared by this, each at a fit of its own. A fit divides
+/// its residual by a σ of its own; the density is that of the residual over the common `sigma` \[m\], of ν degrees of freedom:
+/// ln p(r/σ') = ln p(r/σ) − ν ln (σ/σ').
 pub(super) fn ln_posterior(
     fitted: &Fitted,
     data: &Data,
     added: &[Effect],
-    functions: &[(Hypothesis, usize)],
+    (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
     let rows = data.weighed();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
@@ -230,7 +232,7 @@ pub(super) fn ln_posterior(
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
     let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &[])?;
-    search::ln_posterior(&blocks, &target, data.rules)
+    Some(search::ln_posterior(&blocks, &target, data.rules)? - target.noise.freedom * (fitted.sigma / sigma).ln())
 }
 
 /// The most probable form of a function without a law, beside what the fit holds, and 1 σ of the coefficients of its columns: one of

@@ -230,6 +230,8 @@ fn tried(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>), Id
 fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     rounds.is_new(&first);
     let mut fitted = first;
+    // What led to the fit at hand, if that were odds of fits of their own.
+    let mut led: Option<Evidence> = None;
     while rounds.done.len() < rounds.data.rules.rounds {
         rounds.tell(0, 0);
         let added = rounds.added(&fitted);
@@ -239,15 +241,21 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
         if !is_held(best, &added) {
             rounds.tell(1, 1);
             next = Some(rounds.fit(&fitted, &best.effects())?).filter(|next| rounds.is_new(next));
+            // Back to what did less well at a fit of its own: that is known better than what the fit at hand says of it from afar.
+            if let (None, Some(led)) = (&next, led) {
+                return Ok((fitted, Some(led)));
+            }
         }
         // Where the model holds what is sure: is there a better one at a fit of its own?
         let next = if let Some(next) = next {
+            led = None;
             next
         } else {
             let (evidence, better) = refitted(rounds, &fitted, evidence)?;
             let Some(better) = better.filter(|better| rounds.is_new(better)) else {
                 return Ok((fitted, Some(evidence)));
             };
+            led = Some(evidence);
             better
         };
         rounds.note(&next);
@@ -272,7 +280,7 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     let held = evidence.sure(rules.sure).filter(|best| !added.is_empty() && is_held(best, &added));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let functions = best.without_law();
-    let Some(own) = ln_posterior(fitted, data, &added, &functions) else { return Ok((evidence, None)) };
+    let Some(own) = ln_posterior(fitted, data, &added, (&functions, fitted.sigma)) else { return Ok((evidence, None)) };
     let rivals = evidence.exchanged(&best, rules.rivals);
     let mut odds: Vec<(Explanation, f64)> = Vec::new();
     let mut better: Option<(f64, Fitted)> = None;
@@ -280,7 +288,7 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     for (k, rival) in rivals.into_iter().enumerate() {
         rounds.tell(k + 1, count);
         let next = rounds.fit(fitted, &rival.effects())?;
-        let Some(other) = ln_posterior(&next, data, &rounds.added(&next), &functions) else { continue };
+        let Some(other) = ln_posterior(&next, data, &rounds.added(&next), (&functions, fitted.sigma)) else { continue };
         odds.push((rival, other - own));
         if other > own && better.as_ref().is_none_or(|(most, _)| other > *most) {
             better = Some((other, next));
