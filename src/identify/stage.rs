@@ -19,10 +19,11 @@ use crate::least_squares::{
 };
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::problem::PoseView;
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
 /// metres measured in units of their noise, and far below what any estimate's error would show.
-const COST_TOLERANCE: f64 = 1e-11;
+pub const COST_TOLERANCE: f64 = 1e-11;
 
 /// A stage that cannot be set up.
 #[derive(Debug, thiserror::Error)]
@@ -139,13 +140,17 @@ impl<'a> Stage<'a> {
         let mut put = |value: f64| digest.write_u64(value.to_bits());
         others.iter().copied().for_each(&mut put);
         for pose in &self.poses {
-            pose.setup.configuration.iter().chain(&pose.measured).copied().for_each(&mut put);
-            put(pose.setup.time);
-            put(pose.sigma);
+            let PoseView { configuration, payload, hoist, temperature, time, elapsed, approach, covariates } =
+                &pose.setup;
+            let columns = configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
+            columns.chain(&pose.measured).copied().for_each(&mut put);
+            [*payload, *hoist, *temperature].map(|own| own.unwrap_or(f64::NAN)).into_iter().for_each(&mut put);
+            [*time, *elapsed, pose.sigma].into_iter().for_each(&mut put);
             put(pose.orientation.map_or(0.0, |own| own.sigma));
             put(pose.base as f64);
             put(pose.target as f64);
         }
+        self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
         digest.finish()
     }
 

@@ -149,7 +149,8 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return None;
     }
     let first = triangle.view((0, 0), (rank, rank)).into_owned();
-    let inverse = regular_inverse(&first, CERTAIN)?;
+    // The largest singular value is √n at most: that of all columns, which R₁ has only a part of.
+    let inverse = regular_inverse(&first, CERTAIN * (n as f64 / rank as f64).sqrt())?;
     let mut null = DMatrix::zeros(n, n - rank);
     null.rows_mut(0, rank).copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
     null.rows_mut(rank, n - rank).fill_with_identity();

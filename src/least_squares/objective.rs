@@ -57,8 +57,8 @@ pub enum RowsError {
 /// A data problem with optional linear rows, ready for a solver.
 ///
 /// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns are many, is reduced to its own
-/// [`Triangle`], and these are merged two by two, always the same ones, so that the result is the same to the bit for any number of
-/// threads. One chunk alone never leaves its thread.
+/// [`Triangle`], and these are merged in order, or two by two where that is work, always the same ones, so that the result is the same
+/// to the bit for any number of threads. One chunk alone never leaves its thread.
 #[derive(Debug, Clone)]
 pub struct Fit<'a, P> {
     problem: &'a P,
@@ -153,9 +153,19 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         triangle
     }
 
-    /// The factor of all data at x.
+    /// The factor of all data at x: of few unknowns, whose factors are merged in no time, chunk by chunk in order.
     fn reduce(&self, x: &DVector<f64>) -> Triangle {
-        self.halves(x, 0..self.chunks(), &Mutex::default())
+        if self.run_length() > 1 {
+            return self.halves(x, 0..self.chunks(), &Mutex::default());
+        }
+        let mut total: Option<Triangle> = None;
+        let map = |index, block: &mut Block| self.run_triangle(x, index..index + 1, block);
+        let take = |triangle: Triangle| match &mut total {
+            Some(total) => total.merge(&triangle),
+            None => total = Some(triangle),
+        };
+        in_order(self.chunks(), || self.empty_block(), map, take);
+        total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
     }
 
     /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare` are blocks to use again.

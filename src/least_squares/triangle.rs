@@ -68,9 +68,13 @@ impl Triangle {
         self.reduce(block, |_| usize::MAX);
     }
 
-    /// The same of rows sorted by the first column in which they have an entry, as priors are: few are touched by the first reflectors.
+    /// The same of rows sorted by the first column in which they have an entry, as priors are: of many unknowns, few are touched by the
+    /// first reflectors.
     pub(super) fn absorb_rows(&mut self, block: &mut Block) {
         let n = block.parameters;
+        if WIDE.iter().all(|(_, least)| n < *least) {
+            return self.absorb(block);
+        }
         let first = |row: usize| (0..n).find(|&j| block.values[j * block.rows + row] != 0.0).unwrap_or(n);
         let firsts: Vec<usize> = (0..block.rows).map(first).collect();
         if !firsts.is_sorted() {

@@ -188,8 +188,8 @@ impl<S: Subproblem> TrustRegion<S> {
     /// Hands the subproblem the model that steps come from.
     fn prepare(&mut self, x: &DVector<f64>) {
         let Some(linearisation) = &self.linearisation else { return };
-        let gradient = linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
-        let pressed = || self.subproblem.pressed(x, &self.scale, &gradient);
+        let gradient = || linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
+        let pressed = || self.subproblem.pressed(x, &self.scale, &gradient());
         self.convex = self.second_order.model(linearisation, &self.scale, pressed);
         let model = self.convex.as_ref().map_or(linearisation, |convex| &convex.linearisation);
         self.subproblem.prepare(x, model, &self.scale, &self.settings);
