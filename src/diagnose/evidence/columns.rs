@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::functions::{Known, basis, goes_with, merged, products_of, times};
+use super::functions::{Known, basis, goes_with, merge, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
@@ -60,6 +60,8 @@ const NOTHING: f64 = 1e-9;
 
 /// Commands in contact that differ by what moves the target by no more than this, in σ, may differ by noise alone.
 const NOISE_ALONE: f64 = 3.0;
+/// A contact that decides a command no better than by this \[rad or m\] decides none.
+const DECIDES: f64 = 0.02;
 
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
@@ -231,21 +233,21 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// each point, values that noise alone sets apart, and a function of those is one of the noise. They are taken for one value.
     fn command(&self, joint: usize) -> Vec<f64> {
         let poses = self.linearised.poses();
-        let values: Vec<f64> = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
-        let is_contact = |pose: &Pose| matches!(pose.observation, Observation::Point(_) | Observation::Surface(_));
-        let contacts: Vec<usize> = (0..poses.len()).filter(|&k| is_contact(&poses[k])).collect();
+        let mut values: Vec<f64> = poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
         let coordinate = match self.problem.joints[joint].kind {
             JointKind::Prismatic => JointField::D,
             _ => JointField::Theta,
         };
         let Some(at) = self.linearised.place(Slot::Joint { joint, field: coordinate }) else { return values };
-        let squares: f64 = contacts.iter().map(|&k| at.rows(3 * k, 3).norm_squared()).sum();
-        if squares == 0.0 {
-            return values;
-        }
         // The column is in σ per rad or m.
-        let lever = (squares / contacts.len() as f64).sqrt();
-        merged(&values, NOISE_ALONE / lever)
+        let square = |pose: usize| at.rows(3 * pose, 3).norm_squared();
+        let is_contact = |pose: &Pose| matches!(pose.observation, Observation::Point(_) | Observation::Surface(_));
+        let contacts: Vec<usize> = (0..poses.len()).filter(|&k| is_contact(&poses[k]) && square(k) > 0.0).collect();
+        let lever = (contacts.iter().map(|&k| square(k)).sum::<f64>() / contacts.len().max(1) as f64).sqrt();
+        if NOISE_ALONE < DECIDES * lever {
+            merge(&mut values, contacts, NOISE_ALONE / lever);
+        }
+        values
     }
 
     /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a compliance there would do, over

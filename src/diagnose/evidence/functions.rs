@@ -11,6 +11,9 @@ const MARGIN: f64 = 0.25;
 /// Variance of a basis function, of that of the first, below which it is left out.
 const NEGLIGIBLE: f64 = 1e-3;
 
+/// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
+const WIDEST: f64 = 4.0;
+
 /// Centres of single bumps and steps along the range.
 const CENTRES: u32 = 16;
 /// Their widths as parts of the range.
@@ -81,18 +84,20 @@ impl Known {
     }
 }
 
-/// The same values with those that lie in a row, each no further than `apart` from the next, brought to their mean.
-pub(super) fn merged(values: &[f64], apart: f64) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    let mut merged = values.to_vec();
-    for together in order.chunk_by(|&a, &b| values[b] - values[a] <= apart) {
-        let mean = together.iter().map(|&k| values[k]).sum::<f64>() / together.len() as f64;
-        for &k in together {
-            merged[k] = mean;
+/// Brings those of some values that lie in a row, each no further than `apart` from the next, to their mean: where the row is wider than
+/// noise alone makes one, its values differ.
+pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
+    some.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let rows: Vec<Vec<usize>> = some.chunk_by(|&a, &b| values[b] - values[a] <= apart).map(<[usize]>::to_vec).collect();
+    for row in rows {
+        let (first, last) = (values[row[0]], values[row[row.len() - 1]]);
+        if last - first <= WIDEST * apart {
+            let mean = row.iter().map(|&k| values[k]).sum::<f64>() / row.len() as f64;
+            for k in row {
+                values[k] = mean;
+            }
         }
     }
-    merged
 }
 
 /// Whether a function of these two is looked for.
@@ -151,10 +156,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_in_a_row_are_one_and_others_stay() {
-        let values = [3.0, 1.0, 1.2, 1.4, 2.0];
-        let merged = merged(&values, 0.25);
-        let expected = [3.0, 1.2, 1.2, 1.2, 2.0];
-        assert!(merged.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 1e-12), "{merged:?}");
+    fn values_in_a_short_row_are_one_and_others_stay() {
+        // The last is none of those that may be merged; neither are many in a long row.
+        let mut values: Vec<f64> =
+            [3.0, 1.0, 1.2, 1.4, 2.0].into_iter().chain((0..20).map(|k| 5.0 + 0.2 * f64::from(k))).collect();
+        let long = values[5..].to_vec();
+        values.push(1.1);
+        let all = 0..values.len() - 1;
+        merge(&mut values, all.collect(), 0.25);
+        let expected: Vec<f64> = [3.0, 1.2, 1.2, 1.2, 2.0].into_iter().chain(long).chain([1.1]).collect();
+        assert!(values.iter().zip(&expected).all(|(own, expected)| (own - expected).abs() < 1e-12), "{values:?}");
     }
 }
