@@ -2,10 +2,8 @@
 
 use std::fmt;
 
-use flexcal::identify::Progress;
+use flexcal::identify::{COST_TOLERANCE, Progress};
 
-/// Relative gain of a step at which fits end.
-const SETTLED: f64 = 1e-11;
 /// Steps beyond which nothing is said of the time that is left.
 const FORESEEN: f64 = 200.0;
 
@@ -82,7 +80,7 @@ impl Step {
     fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
         let gain = self.cost - cost;
         let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;
-        let steps = |before: f64| ((SETTLED * cost / gain).ln() / (gain / before).ln()).max(0.0);
+        let steps = |before: f64| ((COST_TOLERANCE * cost / gain).ln() / (gain / before).ln()).max(0.0);
         let left = self.gain.filter(|before| gain > 0.0 && gain < *before).map(steps);
         let left = left.filter(|steps| *steps < FORESEEN).map(|steps| steps * each);
         Self { iteration, cost, gain: if gain > 0.0 { Some(gain) } else { self.gain }, left, ..self }

@@ -64,8 +64,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_solver(arguments.solver)
         .with_stop(stop)
         .with_progress(line.as_ref().map(Line::sink));
-    let result = identify::identify(&problem, &data, &options)
-        .and_then(|found| Ok((identify::joint_sources(&problem, &data, &options, &found)?, found)));
+    let result = identify::identify(&problem, &data, &options).and_then(|found| {
+        // The fit that was asked for is there: an interrupt ends no more than what is told beside it.
+        match identify::joint_sources(&problem, &data, &options, &found) {
+            Err(error) if error.is_interrupted() => Ok((None, found)),
+            sources => Ok((sources?, found)),
+        }
+    });
     if let Some(line) = line {
         line.clear();
     }

@@ -1,6 +1,6 @@
 //! Progress of long work, on standard error and only on a terminal.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
 use flexcal::identify::{Progress, ProgressSink, Stop};
@@ -18,6 +18,7 @@ pub struct Line {
     bar: ProgressBar,
     begun: Instant,
     course: Mutex<Course>,
+    ticking: Once,
     stop: Option<Stop>,
 }
 
@@ -32,7 +33,7 @@ impl Line {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
         bar.set_style(shown.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        Arc::new(Self { bar, begun: Instant::now(), course: Mutex::default(), stop: stop.into() })
+        Arc::new(Self { bar, begun: Instant::now(), course: Mutex::default(), ticking: Once::new(), stop: stop.into() })
     }
 
     /// What the library reports to.
@@ -54,7 +55,7 @@ impl Line {
     /// Shows a message, once it is time to show anything.
     pub fn say(&self, message: impl FnOnce() -> String) {
         if self.begun.elapsed() > PATIENCE && !self.bar.is_hidden() {
-            self.bar.enable_steady_tick(TICK);
+            self.ticking.call_once(|| self.bar.enable_steady_tick(TICK));
             self.bar.set_message(message());
             self.bar.tick();
         }

@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::covariate::Covariate;
 use super::residual_tests::CovariateValues;
 use super::rules::SelectionRules;
+use crate::identify::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::DataCoverage;
 use crate::problem::{Effect, JointKind, Problem};
@@ -27,6 +28,8 @@ pub(super) struct Data<'a> {
     pub block: Vec<usize>,
     /// Effects that are looked for besides those of the catalogue.
     pub candidates: &'a [Effect],
+    /// The wish that the search end early.
+    pub stop: Option<Stop>,
 }
 
 impl<'a> Data<'a> {
@@ -43,12 +46,22 @@ impl<'a> Data<'a> {
             block_of[configuration] = place % rules.blocks.min(count.max(1));
         }
         let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
-        Self { dataset, measurements, split, rules, setup, block, candidates: &[] }
+        Self { dataset, measurements, split, rules, setup, block, candidates: &[], stop: None }
     }
 
     /// The same with more effects to look for.
     pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
         Self { candidates, ..self }
+    }
+
+    /// The same, whose hypotheses are weighed until `stop` asks for the end.
+    pub fn with_stop(self, stop: Option<Stop>) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// Whether the end was asked for.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(Stop::is_requested)
     }
 
     /// The identification rows.

@@ -167,6 +167,11 @@ pub enum IdentifyError {
 }
 
 impl IdentifyError {
+    /// The work was stopped from outside.
+    pub(crate) fn interrupted() -> Self {
+        Self::Stage(StageError::Interrupted)
+    }
+
     /// Whether the work was stopped from outside.
     pub fn is_interrupted(&self) -> bool {
         matches!(self, Self::Stage(StageError::Interrupted))

@@ -65,6 +65,6 @@ pub use saved::{SavedEstimate, SavedEstimateError};
 pub use shadow_price::ShadowPrice;
 pub use solver_choice::SolverChoice;
 pub use spread::PointSpread;
-pub use stage::StageError;
+pub use stage::{COST_TOLERANCE, StageError};
 pub use strategy::Strategy;
 pub(crate) use surroundings::locate;

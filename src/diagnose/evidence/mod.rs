@@ -310,7 +310,7 @@ pub(super) fn stability(
 }
 
 /// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
-/// a finite number.
+/// a finite number, or the end was asked for.
 fn blocks(
     fitted: &Fitted,
     data: &Data,
@@ -333,7 +333,8 @@ fn blocks(
         }
         Block::new(design, &neighbourhood, candidate.ln_prior, coefficients)
     };
-    let blocks: Vec<Block> = own.par_iter().map(of_candidate).collect();
+    let unless_stopped = |candidate: &&Candidate| (!data.is_stopped()).then(|| of_candidate(candidate));
+    let blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();
@@ -344,12 +345,12 @@ fn blocks(
         trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
         least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
     };
-    Some((blocks, Target { fit: neighbourhood, noise }))
+    Some((blocks, Target { fit: neighbourhood, noise, stop: data.stop.clone() }))
 }
 
 /// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.
 ///
-/// `None` where the residual is not a finite number, as that of a pose without equilibrium.
+/// `None` where the residual is not a finite number, as that of a pose without equilibrium, or the end was asked for.
 pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let rows = data.weighed();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
@@ -359,6 +360,9 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| of(k).effect().is_some_and(is_added)).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
     let weighted = search(&blocks, &target, data.rules, &present);
+    if data.is_stopped() {
+        return None;
+    }
     for Weighted { members, sizes, probability } in weighted.into_iter().filter(|set| set.probability > NEGLIGIBLE) {
         let own: Vec<&Hypothesis> = members.iter().map(|&member| of(member)).collect();
         // Functions of one covariate that change over other lengths are one hypothesis.

@@ -9,12 +9,21 @@ use super::super::neighbourhood::LinearNeighbourhood;
 use super::super::rules::SelectionRules;
 use super::block::Block;
 use super::marginal::{Noise, over_noise};
+use crate::identify::Stop;
 
 /// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
+    /// The wish that the search end early.
+    pub stop: Option<Stop>,
+}
+
+impl Target {
+    fn is_stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(Stop::is_requested)
+    }
 }
 
 /// A set of hypotheses, and its probability among all sets looked at.
@@ -88,7 +97,7 @@ impl Conditioned {
 /// All sets that were looked at, most probable first; the empty set stands for "nothing".
 ///
 /// The search starts from nothing and from the set `present`, whole and without one of its members: what was found before is
-/// judged again beside everything else.
+/// judged again beside everything else. Stopped, it has looked at some sets only.
 pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, present: &[usize]) -> Vec<Weighted> {
     let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
@@ -112,7 +121,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             let tried: Vec<usize> = promising.as_ref().filter(|_| place > 0).map_or_else(all, Vec::clone);
             let gains: Vec<(usize, (f64, f64))> = tried
                 .into_par_iter()
-                .filter(|block| !set.members.contains(block))
+                .filter(|block| !set.members.contains(block) && !target.is_stopped())
                 .map(|block| (block, conditioned.gain(&blocks[block], target, rules)))
                 .collect();
             for (block, gain) in gains {

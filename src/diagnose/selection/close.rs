@@ -123,20 +123,24 @@ pub fn close_by(
     rules: &SelectionRules,
 ) -> Result<ClosedLoop, IdentifyError> {
     rules.check()?;
+    // What was found is finished in any case: the search alone is stopped.
     let data = Data::new(data, rules).with_candidates(&options.candidates);
+    let (hurried, unhurried) = (data.clone().with_stop(options.stop.clone()), options.clone().with_stop(None));
     // Evidence is of positions: so are the fits.
     let first = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&first, &data);
     let errors_before = first.errors(&data, &data.split.held_out);
-    let mut rounds = Rounds::new(&data, options, &first);
+    let mut rounds = Rounds::new(&hurried, options, &first);
     let declared = first.clone();
-    // What was found is finished in any case.
-    let unhurried = options.clone().with_stop(None);
     let result = chosen(&mut rounds, first);
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
     options.tell(|| Progress::Finishing);
-    let (fitted, harmonic_sigma, evidence) =
-        if interrupted { (rounds.taken.clone().settled(&data, &unhurried)?, None, None) } else { result? };
+    rounds.data = &data;
+    let (fitted, harmonic_sigma, evidence) = if interrupted {
+        (rounds.taken.clone().settled(&data, &unhurried)?, None, rounds.known.take())
+    } else {
+        result?
+    };
     // What was missing at first may have driven a parameter to where no step leads back from: such a fit begins anew.
     let anew =
         if fitted.found.is_trusted() { None } else { Some(Fitted::new(fitted.problem.clone(), &data, &unhurried)?) };
@@ -152,7 +156,9 @@ pub fn close_by(
     // Of very many effects none is taken out again: what is left beside all of them is weighed.
     let crowded = added.iter().flat_map(Effect::parts).count() > rules.crowd;
     let taken_out: &[Effect] = if crowded { &[] } else { &added };
-    let evidence = evidence.or_else(|| weigh(&fitted, &data, taken_out).filter(|_| trusted));
+    // Where nothing was found before it was stopped, nothing is weighed to say so.
+    let is_wanted = trusted && !(interrupted && added.is_empty());
+    let evidence = evidence.or_else(|| if is_wanted { weigh(&fitted, &data, taken_out) } else { None });
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
     let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
@@ -235,7 +241,7 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
     while rounds.done.len() < rounds.data.rules.rounds {
         rounds.tell(0, 0);
         let added = rounds.added(&fitted);
-        let Some(evidence) = weigh(&fitted, rounds.data, &added) else { return Ok((fitted, None)) };
+        let Some(evidence) = rounds.weigh(&fitted)? else { return Ok((fitted, None)) };
         let Some(best) = evidence.sure(rounds.data.rules.sure) else { return Ok((fitted, Some(evidence))) };
         let mut next = None;
         if !is_held(best, &added) {
@@ -261,7 +267,7 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
         rounds.note(&next);
         fitted = next;
     }
-    let evidence = weigh(&fitted, rounds.data, &rounds.added(&fitted));
+    let evidence = rounds.weigh(&fitted)?;
     Ok((fitted, evidence))
 }
 

@@ -4,6 +4,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::super::candidates::{Candidates, joined};
 use super::super::data::Data;
+use super::super::evidence::{Evidence, weigh};
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{Scan, tries};
 use super::pick::{Pick, pick};
@@ -38,6 +39,8 @@ pub(super) struct Rounds<'a> {
     pub done: Vec<Round>,
     /// The fit of the last of them; of the problem as declared before the first.
     pub taken: Fitted,
+    /// The evidence about it, once that was weighed.
+    pub known: Option<Evidence>,
     /// Sets of effects that were fitted.
     seen: Vec<Vec<Effect>>,
 }
@@ -45,7 +48,8 @@ pub(super) struct Rounds<'a> {
 impl<'a> Rounds<'a> {
     /// None yet, from the fit of the problem as declared.
     pub fn new(data: &'a Data<'a>, options: &'a Options, first: &Fitted) -> Self {
-        Self { data, options, declared: first.effects(), done: Vec::new(), taken: first.clone(), seen: Vec::new() }
+        let (done, seen) = (Vec::new(), Vec::new());
+        Self { data, options, declared: first.effects(), done, taken: first.clone(), known: None, seen }
     }
 
     /// Tells that the round at hand begins the `fit`-th of so many fits; the 0th while it weighs candidates.
@@ -60,6 +64,16 @@ impl<'a> Rounds<'a> {
         let own =
             fitted.effects().iter().flat_map(Effect::parts).filter(|part| !declared.contains(part)).collect::<Vec<_>>();
         own.iter().fold(Vec::new(), |all, part| joined(&all, part))
+    }
+
+    /// Weighs what may explain the residual of the fit that was taken last; `None` where it is not a finite number.
+    pub fn weigh(&mut self, fitted: &Fitted) -> Result<Option<Evidence>, IdentifyError> {
+        let evidence = weigh(fitted, self.data, &self.added(fitted));
+        if self.data.is_stopped() {
+            return Err(IdentifyError::interrupted());
+        }
+        self.known.clone_from(&evidence);
+        Ok(evidence)
     }
 
     /// Adds effects until none stands out.
@@ -119,6 +133,7 @@ impl<'a> Rounds<'a> {
         let effects = self.added(fitted);
         self.done.push(Round { effects, identification: errors.identification, held_out: errors.held_out });
         self.taken = fitted.clone();
+        self.known = None;
     }
 
     /// Whether these effects were not fitted together before.
