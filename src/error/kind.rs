@@ -104,10 +104,10 @@ pub enum InputErrorKind {
         "a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")"
     )]
     NotInStandardForm,
-    #[error(
-        "{what} takes one chain of joints with one tool behind the last of them; this arm is a tree or has several targets"
-    )]
+    #[error("{what} takes one chain of joints; this arm is a tree")]
     NotAChain { what: &'static str },
+    #[error("{what} takes one tool behind the last joint; this arm has a [[target]], or its tool on another joint")]
+    NotOneTool { what: &'static str },
     #[error("joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on")]
     StandsOnLater { joint: usize, parent: u64 },
     #[error("the branch of joint {parent} has ended; list everything that stands on a joint right behind it")]
@@ -301,6 +301,10 @@ pub enum InputErrorKind {
     NoDataFiles,
     #[error("{} is named twice; its rows would count twice", path.display())]
     RepeatedFile { path: PathBuf },
+    #[error("several joints are called \"{name}\"; write {}", write.join(" and "))]
+    SharedJointName { name: String, write: Vec<String> },
+    #[error("named twice on the command line; its rows would count twice")]
+    GivenFileRepeated,
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
     EmptyTable,
     #[error("no rows below the header")]

@@ -54,8 +54,8 @@ impl Command {
 }
 
 /// Where targets without positions are: where the nominal arm would have been with the commands of the rows, on the bases and with
-/// the tools of the full parameter vector `x`, measuring frame. With their orientations where six moving joints and more lead to them;
-/// with fewer they could not have both.
+/// the tools of the full parameter vector `x`, measuring frame. With its orientation each to which six moving joints and more lead;
+/// with fewer it could not have both.
 ///
 /// # Errors
 /// The nominal arm has no equilibrium in one of the rows.
@@ -79,12 +79,13 @@ pub fn waypoints(
         let leads = problem.joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, carrier));
         leads.filter(|(_, joint)| joint.commanded() != JointKind::Fixed).count()
     };
-    if (0..rows.len()).all(|row| commanded(row) >= POSE) {
-        let turns = model.orientations(&poses, nominal.as_slice());
-        targets.orientations = Some(turns.into_iter().map(UnitQuaternion::from_scaled_axis).collect());
-    } else {
-        targets.orientations = None;
-    }
+    let oriented: Vec<bool> = all.iter().map(|&row| commanded(row) >= POSE).collect();
+    targets.orientations = oriented.contains(&true).then(|| {
+        let none = Vector3::from_element(f64::NAN);
+        let turns = model.orientations(&poses, nominal.as_slice()).into_iter().zip(&oriented);
+        let all = turns.map(|(turn, is_kept)| if *is_kept { turn } else { none });
+        all.map(UnitQuaternion::from_scaled_axis).collect()
+    });
     targets.positions = model.predict(poses, &nominal);
     targets.position_measured = true;
     match targets.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
@@ -177,7 +178,7 @@ pub fn compensate(
             let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
             let fit = Fit::new(&residuals).with_rows(near)?;
             let step = solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default()).x;
-            for (&joint, step) in moving.iter().zip(step.iter()) {
+            for (&joint, step) in moving.iter().zip(step.iter()).filter(|(joint, _)| serves(**joint)) {
                 let (min, max) = problem.joints[joint].limits;
                 configuration[joint] = (configuration[joint] + step).clamp(min, max);
             }

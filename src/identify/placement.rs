@@ -77,9 +77,10 @@ impl Placement {
         (sigma, turn): (f64, Option<f64>),
     ) -> Vec<Pose<'a>> {
         let mut poses = self.poses(measurements, rows, sigma);
-        if let (Some(sigma), Some(all)) = (turn, &measurements.orientations) {
+        if let Some(sigma) = turn {
             for (pose, &row) in poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position()) {
-                pose.orientation = Some(SeenOrientation { axes: Some(axes_of(&all[row])), sigma });
+                let seen = |orientation| SeenOrientation { axes: Some(axes_of(&orientation)), sigma };
+                pose.orientation = measurements.orientation(row).map(seen);
             }
         }
         poses

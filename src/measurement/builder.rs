@@ -258,6 +258,7 @@ impl DatasetBuilder {
             configurations: flat("configurations", &self.configurations)?,
             positions: self.positions,
             position_measured: self.measured,
+            position_unit: None,
             orientations: self.orientations,
             sigma: within("sigma", self.sigma, "not above 0", |sigma| *sigma <= 0.0)?,
             payload: within("payload", self.payload, "below 0", |payload| *payload < 0.0)?,

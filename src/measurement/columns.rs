@@ -155,7 +155,17 @@ impl Columns {
                 && !self.has(source(index))
             {
                 let number = format!("q{}{suffix}", numbering.number(index));
-                let named = Some(joint.name.as_str()).filter(|name| suffix.is_empty() && !name.contains(' '));
+                let namesakes = || problem.joints.iter().enumerate().filter(|(_, own)| own.name == joint.name);
+                let is_shared = namesakes().nth(1).is_some();
+                let of_it = |name: &&&str| name.strip_prefix(&joint.name).is_some_and(|rest| rest.starts_with('_'));
+                if let Some(column) = unknown.iter().find(of_it).filter(|_| is_shared) {
+                    let write =
+                        namesakes().map(|(own, _)| unit.spelled(&format!("q{}{suffix}", numbering.number(own))));
+                    let (name, write) = (joint.name.clone(), write.collect());
+                    return Err(table.column(column).error(InputErrorKind::SharedJointName { name, write }));
+                }
+                let usable = |name: &&str| suffix.is_empty() && !name.contains(' ') && !is_shared;
+                let named = Some(joint.name.as_str()).filter(usable);
                 return missing(&[&[number.as_str()], named.as_slice()].concat(), unit);
             }
         }

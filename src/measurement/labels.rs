@@ -1,8 +1,10 @@
 //! Words of a column as they come.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use super::Labels;
+use crate::error::one_line;
 
 /// Words of rows, each kept once.
 #[derive(Default)]
@@ -62,4 +64,15 @@ impl PoseNames {
             Self::Lost => (None, None),
         }
     }
+}
+
+/// The names of files without their endings; of those that share one with their folders.
+pub(super) fn stems(files: &[PathBuf]) -> Vec<String> {
+    let stem = |file: &PathBuf| file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()));
+    let all: Vec<String> = files.iter().map(stem).collect();
+    let named = |(file, own): (&PathBuf, &String)| {
+        let shared = all.iter().filter(|other| *other == own).count() > 1;
+        if shared { one_line(&file.with_extension("").to_string_lossy()) } else { own.clone() }
+    };
+    files.iter().zip(&all).map(named).collect()
 }

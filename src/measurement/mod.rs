@@ -69,7 +69,9 @@ pub struct Measurements {
     pub positions: Vec<Vector3<f64>>,
     /// Whether they were measured; 0 otherwise, in poses that are still to be measured.
     pub position_measured: bool,
-    /// Measured orientations of the target in the measuring frame, where there are all of their columns.
+    /// Unit of the positions in the first file in SI: 1/1000 for millimetres; `None` where they came from no file.
+    pub position_unit: Option<f64>,
+    /// Measured orientations of the target in the measuring frame, where there are all of their columns; NaN in a row without one.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
     /// 1 σ of each coordinate from the column `sigma_mm`, or of the row's kind where there are several; NaN where it is not
     /// known \[m\].
@@ -189,6 +191,11 @@ impl Measurements {
         self.kinds().first().copied().unwrap_or_default()
     }
 
+    /// The orientation of a row that has one, measuring frame.
+    pub fn orientation(&self, row: usize) -> Option<UnitQuaternion<f64>> {
+        self.orientations.as_ref().map(|all| all[row]).filter(|own| !own.w.is_nan())
+    }
+
     /// 1 σ of a row that has one of its own \[m\].
     pub fn sigma_of(&self, row: usize) -> Option<f64> {
         self.sigma.as_ref().map(|all| all[row]).filter(|sigma| !sigma.is_nan())
@@ -283,6 +290,7 @@ impl Measurements {
             },
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
             position_measured: self.position_measured,
+            position_unit: self.position_unit,
             orientations: self.orientations.as_ref().map(|all| rows.iter().map(|&row| all[row]).collect()),
             sigma: self.sigma.as_deref().map(one),
             payload: self.payload.as_deref().map(one),

@@ -126,22 +126,33 @@ fn fixture(
     })
 }
 
-/// Refuses a table without a column of targets where the problem declares some.
+/// Refuses a table of positions without a column of targets where the problem declares some; where rows may measure something else
+/// each of them decides.
 pub(super) fn names_targets(table: &Table, columns: &Columns, problem: &Problem) -> Result<(), InputError> {
-    if problem.targets.is_empty() || columns.has(Role::Target) {
+    if problem.targets.is_empty() || columns.has(Role::Target) || columns.observes() {
         return Ok(());
     }
     Err(table.column("target").error(problem.unknown_target("")))
 }
 
 /// Refuses the row that the table is at, in a file with this `stem`, where it names a target that the problem does not declare
-/// among others.
-pub(super) fn known_target(table: &Table, columns: &Columns, stem: &str, problem: &Problem) -> Result<(), InputError> {
+/// among others, or names none and measures more than tilts.
+pub(super) fn known_target(
+    table: &Table,
+    columns: &Columns,
+    (stem, observed): (&str, &[Observed]),
+    problem: &Problem,
+) -> Result<(), InputError> {
     if problem.targets.is_empty() {
         return Ok(());
     }
     let place = columns.place(Role::Target);
-    let word = place.map_or(Ok(stem), |place| table.name(place))?;
+    let is_blank = place.map_or(Ok(true), |place| table.text(place).map(str::is_empty))?;
+    if is_blank && observed.iter().all(|own| own.observation.is_angle()) {
+        return Ok(());
+    }
+    let of_file = if columns.file == Some(Role::Target) { stem } else { "" };
+    let word = place.map_or(Ok(of_file), |place| table.name(place))?;
     if problem.targets.iter().any(|own| own.name == word) {
         return Ok(());
     }
@@ -156,6 +167,13 @@ pub(super) fn known_target(table: &Table, columns: &Columns, stem: &str, problem
 pub(super) fn complete(measurements: &mut Measurements, problem: &Problem) -> Result<(), InputError> {
     if measurements.observations.is_empty() || measurements.is_empty() {
         return Ok(());
+    }
+    if let (Some(of_rows), Some(declared)) = (&mut measurements.target, problem.targets.first()) {
+        // Tilts are of no target: their rows go with one that others measure.
+        let is_known = |word: &&String| problem.targets.iter().any(|own| own.name == **word);
+        let first = of_rows.names.iter().find(is_known).unwrap_or(&declared.name);
+        let words = of_rows.of_row.iter().map(|&word| of_rows.names.get(word).filter(is_known).unwrap_or(first));
+        *of_rows = words.collect();
     }
     let of_table = measurements.len();
     let touched = |&fixture: &usize, all: &[Observation]| {

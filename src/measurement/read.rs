@@ -6,14 +6,14 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::cells::{above_zero, direction, is_validation, not_negative};
 use super::columns::{Column, Columns};
-use super::labels::{LabelsBuilder, PoseNames};
+use super::labels::{LabelsBuilder, PoseNames, stems};
 use super::limits::Commands;
 use super::observed::{self, Observed};
 use super::orientation::Cells;
 use super::role::Role;
 use super::table::Table;
 use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading};
-use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, one_line};
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::files::same_file;
 use crate::problem::{JointSource, Missing, Problem, RotationKind};
 
@@ -55,9 +55,14 @@ impl Measurements {
         let mut tables = Tables::new(files, problem, measured);
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
-                return Err(named_by(file, problem).error(InputErrorKind::RepeatedFile { path: file.clone() }));
+                let again = InputErrorKind::RepeatedFile { path: file.clone() };
+                return Err(of_file((file, files), problem, [again, InputErrorKind::GivenFileRepeated]));
             }
-            tables.read(index, Table::open(file, &problem.data.dialect, || missing(file, problem))?)?;
+            let missing = || {
+                let named = InputErrorKind::DataFileMissing { path: file.clone() };
+                of_file((file, files), problem, [named, InputErrorKind::GivenFileMissing])
+            };
+            tables.read(index, Table::open(file, &problem.data.dialect, missing)?)?;
         }
         tables.finish()
     }
@@ -110,10 +115,11 @@ impl<'a> Tables<'a> {
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
-                observed::known_target(&table, &columns, rows.stem(index), self.problem)?;
                 let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
-                for observed in observed::of_row(&table, &columns, (self.problem, self.measured, lost), in_point)? {
-                    rows.push(index, &table, &columns, &observed)?;
+                let all = observed::of_row(&table, &columns, (self.problem, self.measured, lost), in_point)?;
+                observed::known_target(&table, &columns, (rows.stem(index), &all), self.problem)?;
+                for observed in &all {
+                    rows.push(index, &table, &columns, observed)?;
                 }
             }
             if !table.next_row()? {
@@ -215,22 +221,12 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     joints.collect()
 }
 
-/// The place that names a file: in the problem, or else the command line.
-fn named_by(file: &Path, problem: &Problem) -> Location {
-    if problem.data.files.iter().any(|known| known == file) {
-        problem.data.files_location.clone()
+/// The error of one of the files: `named` at the line of the problem that names it, or else `given` on the command line.
+fn of_file((file, files): (&Path, &[PathBuf]), problem: &Problem, [named, given]: [InputErrorKind; 2]) -> InputError {
+    if problem.data.files == files {
+        problem.data.files_location.clone().error(named)
     } else {
-        Location::file(file)
-    }
-}
-
-/// The error of a file that is not there: at the line that names it, if the problem does.
-fn missing(file: &Path, problem: &Problem) -> InputError {
-    if problem.data.files.iter().any(|known| known == file) {
-        let kind = InputErrorKind::DataFileMissing { path: file.to_owned() };
-        problem.data.files_location.clone().error(kind)
-    } else {
-        Location::file(file).error(InputErrorKind::GivenFileMissing)
+        Location::file(file).error(given)
     }
 }
 
@@ -244,6 +240,8 @@ struct Builder {
     uses: bool,
     /// Whether rows may measure something else than positions.
     mixed: bool,
+    /// Whether rows name one of several declared targets.
+    names_targets: bool,
     /// What rx, ry and rz are.
     rotation: RotationKind,
     /// What the files are called, where that stands for something.
@@ -255,6 +253,7 @@ struct Builder {
 impl Builder {
     fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
         let list = |role| columns.has(role).then(Vec::new);
+        let names_targets = !problem.targets.is_empty();
         let mixed = !problem.fixtures.is_empty() || problem.data.tilt_sigma.is_some();
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
@@ -267,6 +266,7 @@ impl Builder {
             observations: Vec::new(),
             positions: Vec::new(),
             position_measured: true,
+            position_unit: columns.read.iter().find(|own| own.role == Role::Position(0)).map(|own| (own.to_si)(1.0)),
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
             sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
             payload: list(Role::Payload),
@@ -279,7 +279,7 @@ impl Builder {
             pose: None,
             pose_names: None,
             session: Labels::default(),
-            target: columns.has(Role::Target).then(Labels::default),
+            target: (names_targets || columns.has(Role::Target)).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
             command_columns: columns.read.iter().filter_map(|column| command(column, table)).collect(),
             warnings: Vec::new(),
@@ -294,6 +294,7 @@ impl Builder {
             poses,
             uses: problem.data.joints == JointSource::Read,
             mixed,
+            names_targets,
             rotation: problem.data.dialect.rotation,
             stems: stems(files),
             columns,
@@ -310,15 +311,16 @@ impl Builder {
         self.stems.get(file).map_or("", String::as_str)
     }
 
-    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is measured where that may be
-    /// something else than positions.
+    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is measured, and of which target, where
+    /// that may be something else than positions.
     fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
             Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
         };
-        let comes_and_goes =
-            |role: Role| role == Role::Pose || (self.mixed && (role.is_observed() || role == Role::Sigma));
+        let of_observed =
+            |role: Role| role.is_observed() || role == Role::Sigma || (role == Role::Target && self.names_targets);
+        let comes_and_goes = |role: Role| role == Role::Pose || (self.mixed && of_observed(role));
         for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role)) {
             if !columns.has(column.role) {
                 return differ(name, true);
@@ -413,6 +415,10 @@ impl Builder {
                 Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
+                // Tilts need no target, and one that is named is known.
+                Role::Target if self.names_targets && observation.is_angle() => {
+                    self.target.push(table.text(column.place)?);
+                }
                 Role::Target => self.target.push(table.name(column.place)?),
                 // Rows of the arm name none, and what they measure is known already.
                 Role::Nest
@@ -430,6 +436,9 @@ impl Builder {
             Some(Role::Session) => self.session.push(self.stems.get(file).map_or("", String::as_str)),
             Some(Role::Target) => self.target.push(self.stems.get(file).map_or("", String::as_str)),
             _ => {}
+        }
+        if measurements.target.is_some() && self.target.labels.of_row.len() == row {
+            self.target.push("");
         }
         if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
             marked.push(is_validation(table, place)?);
@@ -463,17 +472,6 @@ impl Builder {
         measurements.target = measurements.target.map(|_| target.labels);
         (measurements, columns)
     }
-}
-
-/// The names of files without their endings; of those that share one with their folders.
-fn stems(files: &[PathBuf]) -> Vec<String> {
-    let stem = |file: &PathBuf| file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()));
-    let all: Vec<String> = files.iter().map(stem).collect();
-    let named = |(file, own): (&PathBuf, &String)| {
-        let shared = all.iter().filter(|other| *other == own).count() > 1;
-        if shared { one_line(&file.with_extension("").to_string_lossy()) } else { own.clone() }
-    };
-    files.iter().zip(&all).map(named).collect()
 }
 
 /// Gives a place of a list, which is there, its value.

@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
+use super::item::Item;
 use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
@@ -205,17 +206,23 @@ pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String 
     if is_it { joint.name.clone() } else { format!("joint{place}") }
 }
 
+/// The name of `what` is measured, or measured against: parameters go by it.
+pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String, InputError> {
+    let name = item.text()?.trim().to_owned();
+    let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
+    if name.is_empty() || name.contains(barred) {
+        return Err(item.error(InputErrorKind::NotAFixtureName { what, name }));
+    }
+    Ok(name)
+}
+
 /// Every fixture, in the order point, anchor, surface, and the known distances.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
     let mut fixtures: Vec<Fixture> = Vec::new();
     for table in ["point", "anchor", "surface"] {
         for mut section in root.sections(table)? {
             let item = section.require("name", "name = \"…\"")?;
-            let name = item.text()?.trim().to_owned();
-            let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
-            if name.is_empty() || name.contains(barred) {
-                return Err(item.error(InputErrorKind::NotAFixtureName { what: "a fixture", name }));
-            }
+            let name = name_of(&item, "a fixture")?;
             if let Some(first) = fixtures.iter().find(|own| own.kind.word() == table && own.name == name) {
                 let line = first.location.line.unwrap_or(0);
                 return Err(item.error(InputErrorKind::RepeatedFixture { what: table, name, line }));

@@ -218,7 +218,7 @@ fn integer_as_float(integer: &DeInteger<'_>) -> Option<f64> {
 }
 
 /// `path.key`, the key in quotes where it is not bare.
-pub(super) fn join(path: &str, key: &str) -> String {
+pub(crate) fn join(path: &str, key: &str) -> String {
     let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     let dot = if path.is_empty() { "" } else { "." };
     if bare { format!("{path}{dot}{key}") } else { format!("{path}{dot}\"{key}\"") }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Joint;
+use super::fixture::name_of;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -87,10 +88,7 @@ pub(super) fn targets(root: &mut Section<'_, '_>, tool: &Tool, carriers: &Carrie
     let mut targets: Vec<Target> = Vec::new();
     for mut section in root.sections("target")? {
         let item = section.require("name", "name = \"…\", a word of the column target")?;
-        let name = item.text()?.trim().to_owned();
-        if name.is_empty() || name.contains(|c: char| c.is_whitespace() || ".*[]\"".contains(c)) {
-            return Err(item.error(InputErrorKind::NotAFixtureName { what: "a target", name }));
-        }
+        let name = name_of(&item, "a target")?;
         if let Some(first) = targets.iter().find(|own| own.name == name) {
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedFixture { what: "target", name, line }));

@@ -88,6 +88,11 @@ fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64
     targets.command_columns.iter().map(|own| (own.joint, own.name.clone(), own.unit.recip())).collect()
 }
 
+/// The cell of an angle \[rad\] in degrees, empty where there is none.
+fn degrees(angle: Option<f64>) -> String {
+    angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
+}
+
 /// Commands as CSV: q of every moving joint (empty where the target is out of reach) with the names and units of the table of
 /// targets, the desired position and orientation with what was set, and how far from them the model expects the arm.
 pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
@@ -110,8 +115,9 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         let mut cells: Vec<String> =
             joints.iter().map(|&(j, _, factor)| show(fixed(command.configuration[j] * factor, DECIMALS))).collect();
         cells.extend(targets.positions[row].iter().map(|x| fixed(x * 1e3, 4)));
-        if let (true, Some(all)) = (turned, &targets.orientations) {
-            cells.extend(all[row].scaled_axis().iter().map(|angle| fixed(angle.to_degrees(), 6)));
+        if turned {
+            let desired = targets.orientation(row).map(|own| own.scaled_axis());
+            cells.extend((0..3).map(|axis| degrees(desired.map(|own| own[axis]))));
         }
         cells.extend([session, targets.target.as_ref()].into_iter().flatten().map(|labels| table::word(labels, row)));
         cells.extend([&targets.payload, &targets.hoist].into_iter().flatten().map(|values| fixed(values[row], 4)));
@@ -119,8 +125,8 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
             [command.miss.norm(), command.seed_miss]
                 .map(|miss| if miss.is_finite() { fixed(miss * 1e3, 4) } else { String::new() }),
         );
-        if let (true, Some(turn), Some(before)) = (turned, command.turn, command.seed_turn) {
-            cells.extend([turn.norm(), before].map(|angle| fixed(angle.to_degrees(), 6)));
+        if turned {
+            cells.extend([command.turn.map(|turn| turn.norm()), command.seed_turn].map(degrees));
         }
         cells.push(command.is_reached().to_string());
         cells

@@ -235,8 +235,10 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
     let ranges = &truth.poses;
     let mut rows: Vec<Row> = Vec::with_capacity(poses);
     let mut time = 0.0;
-    let mut targets = problem.target_words().into_iter().cycle();
-    for _ in 0..poses {
+    let (targets, round) = (problem.target_words(), truth.rows_per_target(&problem.fixtures));
+    for row in 0..poses {
+        // Positions before the first round are of one target after the other.
+        let turn = row.checked_sub(truth.positions).map_or(row, |place| place / round);
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
             let q = if joint.commanded() == JointKind::Fixed { 0.0 } else { between(&mut random, *range) };
@@ -260,7 +262,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         conditions.covariates = ranges.covariates.iter().map(|&range| between(&mut random, range)).collect();
         rows.push(Row {
             conditions,
-            target: targets.next().unwrap_or_default(),
+            target: targets.get(turn % targets.len()).cloned().unwrap_or_default(),
             observation: Observation::Position,
             position: Vector3::zeros(),
             orientation: None,

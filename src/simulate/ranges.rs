@@ -5,13 +5,16 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::fixture::frame;
 use crate::problem::item::Item;
 use crate::problem::section::Section;
-use crate::problem::{JointKind, PoseRanges, Problem};
+use crate::problem::{Joint, JointKind, PoseRanges, Problem};
 use crate::quantity::Unit;
 
 /// Part of the rows that is held out where the file says nothing.
 const HELD_OUT: f64 = 0.3;
 /// Seconds between poses where the file says nothing.
 const TIME_STEP: f64 = 60.0;
+
+/// Other quantities of the section: no joint goes by their names.
+const OTHERS: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
 
 /// `[poses]`.
 pub(super) struct Poses {
@@ -28,7 +31,7 @@ pub(super) struct Poses {
 /// The section.
 pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
     let joints = problem.joints.iter().enumerate();
-    let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint.commanded()));
+    let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint, problem));
     let joints = joints.collect::<Result<_, _>>()?;
     let payloads = payloads(&mut section)?;
     let hoist = range(&mut section, "hoist", Unit::Force)?;
@@ -44,17 +47,33 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
-fn joint_range(section: &mut Section<'_, '_>, number: usize, kind: JointKind) -> Result<(f64, f64), InputError> {
-    let (base, unit) = (
-        format!("q{number}"),
-        match kind {
-            JointKind::Revolute => Unit::Angle,
-            JointKind::Prismatic => Unit::Length,
-            JointKind::Fixed => return Ok((0.0, 0.0)),
-        },
-    );
-    let missing = |section: &Section<'_, '_>| section.missing(&base, format!("{} = [from, to]", unit.spelled(&base)));
-    range(section, &base, unit)?.ok_or_else(|| missing(section))
+/// `q1_deg = [from, to]`, or the joint's own name instead of `q1` where it alone has that name.
+fn joint_range(
+    section: &mut Section<'_, '_>,
+    number: usize,
+    joint: &Joint,
+    problem: &Problem,
+) -> Result<(f64, f64), InputError> {
+    let unit = match joint.commanded() {
+        JointKind::Revolute => Unit::Angle,
+        JointKind::Prismatic => Unit::Length,
+        JointKind::Fixed => return Ok((0.0, 0.0)),
+    };
+    let base = format!("q{number}");
+    let is_number =
+        |name: &str| name.strip_prefix('q').is_some_and(|rest| rest.bytes().all(|own| own.is_ascii_digit()));
+    let is_shared = |name: &str| problem.joints.iter().filter(|own| own.name == name).count() > 1;
+    let own = Some(joint.name.as_str()).filter(|own| !is_number(own) && !OTHERS.contains(own) && !is_shared(own));
+    let by_name = own.map(|name| section.quantity(name, unit)).transpose()?.flatten();
+    let (item, suffix) = match (section.quantity(&base, unit)?, by_name) {
+        (Some((_, first)), Some((item, _))) => {
+            return Err(item.error(InputErrorKind::GivenTwice { first: format!("{base}_{}", first.name) }));
+        }
+        (Some(found), None) | (None, Some(found)) => found,
+        (None, None) => return Err(section.missing(&base, format!("{} = [from, to]", unit.spelled(&base)))),
+    };
+    let (from, to) = pair(&item)?;
+    Ok(((suffix.to_si)(from), (suffix.to_si)(to)))
 }
 
 /// `name = [from, to]` of each of the problem's own covariates, in its unit.

@@ -9,7 +9,7 @@ use super::ranges::{self, Poses};
 use super::strengths;
 use super::truth::{Deviation, RandomRule, Truth};
 use crate::error::{InputError, InputErrorKind};
-use crate::problem::item::{Document, Item};
+use crate::problem::item::{Document, Item, join};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
 use crate::problem::{HeldOut, Joint, JointKind, Problem};
@@ -100,8 +100,9 @@ fn check_places(
             let name = format!("{}[{}].{field}", own.kind.word(), own.name);
             let is_said = parameters.iter().any(|own| own.name == name);
             if !is_said && !random.iter().any(|rule| matches(&rule.pattern, &name)) {
-                let key = format!("parameters.\"{name}\"");
-                return Err(root.missing(&key, format!("where it truly is: \"{name}\" in [parameters]")));
+                let write = format!("where it truly is: \"{name}\" in [parameters]");
+                let location = root.location().with_key(join("parameters", &name));
+                return Err(location.error(InputErrorKind::MissingKey { write, near: None }));
             }
         }
     }

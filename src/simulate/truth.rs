@@ -84,6 +84,12 @@ impl Truth {
         (0..rows).map(of_row).collect()
     }
 
+    /// How many rows measure one target before the next one has its turn: with fixtures all that there is to measure, so that each
+    /// target meets each of them, else one.
+    pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
+        if fixtures.is_empty() { 1 } else { fixtures.len() + self.tilts.len() }
+    }
+
     /// 1 σ of what a row measures \[m\], of a tilt \[rad\].
     pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
         let [point, distance, surface] = self.contact_sigmas;

@@ -4,7 +4,7 @@
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
 use flexcal::identify::{Caution, Identification, Misreading, Options, QualityFlag, identify};
-use flexcal::measurement::Dataset;
+use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
 use flexcal::report::estimate_text;
@@ -188,6 +188,31 @@ fn what_may_have_been_misread_is_said() {
         problem.tool.target *= 1e3;
     });
     assert_eq!(far, [Misreading::TargetInMillimetres]);
+    // Lengths of the arm in millimetres: that the angles leave less than they are explains it no better.
+    let long = |problem: &mut Problem, data: &mut Dataset, unit: f64| {
+        problem.joints[2].a *= 1e3;
+        let column = |joint| CommandColumn { joint, name: format!("q{}", joint + 1), unit };
+        data.measurements.command_columns = (0..5).map(column).collect();
+    };
+    for unit in [degree, 1.0] {
+        assert_eq!(with(&|problem, data| long(problem, data, unit)), [Misreading::ArmInMillimetres]);
+    }
+    let all = with(&|problem, _| {
+        let lengths = problem.joints.iter_mut().flat_map(|own| [&mut own.a, &mut own.d]);
+        lengths.chain(&mut problem.tool.target).for_each(|length| *length *= 1e3);
+    });
+    assert_eq!(all, [Misreading::ArmInMillimetres]);
+    // What the columns are declared as they were not misread for.
+    let impossible = with(&|problem, data| {
+        scaled(1.0 / degree)(problem, data);
+        long(&mut problem.clone(), data, degree);
+    });
+    assert!(!impossible.contains(&Misreading::Degrees), "{impossible:?}");
+    let metres = with(&|problem, data| {
+        sized(1e-3)(problem, data);
+        data.measurements.position_unit = Some(1.0);
+    });
+    assert!(!metres.contains(&Misreading::Metres), "{metres:?}");
     // What none of them explains.
     let shuffled = with(&|_, data| data.measurements.positions.rotate_left(1));
     assert_eq!(shuffled, []);

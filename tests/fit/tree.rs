@@ -1,11 +1,12 @@
 //! Two arms on one torso, measured on the virtual test rig: what a fit and the loop make of it.
 
 use flexcal::diagnose::{Verdict, close};
-use flexcal::identify::{Options, Placement, compensate, identify};
-use flexcal::measurement::{Dataset, Split};
+use flexcal::identify::{Options, Placement, compensate, identify, seen_in_base, waypoints};
+use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::Model;
 use flexcal::monte_carlo::table;
-use flexcal::problem::Problem;
+use flexcal::problem::{Observation, Problem};
+use flexcal::report::commands_csv;
 use flexcal::simulate::{Simulation, Truth, simulate};
 use std::path::Path;
 
@@ -80,16 +81,128 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let Placement { bases, targets, .. } = Placement::of(&data.measurements);
     let model = Model::new(&problem, &bases, &targets).unwrap();
-    let wanted = data.measurements.select(&(0..8).collect::<Vec<_>>());
+    let mut wanted = data.measurements.select(&(0..8).collect::<Vec<_>>());
+    // The right wrist beyond its limit of 100°, where the left hand is measured.
+    let left: Vec<usize> = (0..8).filter(|&row| simulation.rows[row].target == "left").collect();
+    left.iter().for_each(|row| wanted.configurations[row * 11 + 10] = 115_f64.to_radians());
     let commands = compensate(&problem, &model, &found.x, &wanted).unwrap();
     for command in commands {
         let (row, target) = (&simulation.rows[command.row], &simulation.rows[command.row].target);
         let mut set = row.conditions.clone();
         let others = if target == "left" { 6..11 } else { 2..6 };
-        assert_eq!(command.configuration[others.clone()], set.configuration[others]);
+        assert_eq!(command.configuration[others.clone()], wanted.configuration(command.row)[others]);
+        assert!(command.is_reached(), "{target}: {command:?}");
         set.configuration = command.configuration;
         let (reached, _) = simulation.rig.pose_of(target, &set).unwrap();
         let miss = (reached - wanted.positions[command.row]).norm() * 1e3;
         assert!(miss < 0.2, "{target}: {miss} mm");
     }
+}
+
+/// Six joints that move lead to the right hand, five to the left one.
+#[test]
+fn waypoints_keep_the_orientation_of_the_targets_that_can_have_one() {
+    let (mut problem, truth) = two_arms(("", ""), ("", ""));
+    problem.joints.iter_mut().for_each(|own| own.limits = (f64::NEG_INFINITY, f64::INFINITY));
+    let rows = table(&simulate(&problem, &truth, 6, 2).unwrap().rows);
+    let Placement { bases, targets, .. } = Placement::of(&rows);
+    let model = Model::new(&problem, &bases, &targets).unwrap();
+    let x = nalgebra::DVector::from_element(model.parameters.len(), 1e-3);
+    let wanted = waypoints(&problem, &model, &x, &rows).unwrap();
+    let shown = seen_in_base(&model, &x, &wanted);
+    let commands = compensate(&problem, &model, &x, &wanted).unwrap();
+    let csv = commands_csv(&problem, &shown, &commands);
+    let mut cells = csv::Reader::from_reader(csv.as_bytes());
+    for (command, cells) in commands.iter().zip(cells.deserialize::<std::collections::BTreeMap<String, String>>()) {
+        let (row, cells) = (command.row, cells.unwrap());
+        let is_right = cells["target"] == "right";
+        assert_eq!((wanted.orientation(row).is_some(), command.turn.is_some()), (is_right, is_right), "row {row}");
+        assert_eq!((cells["rx_deg"].is_empty(), cells["turn_deg"].is_empty()), (!is_right, !is_right), "{csv}");
+        assert!(command.is_reached() && !csv.contains("NaN"), "{command:?}");
+    }
+    let left: Vec<usize> = (0..rows.len()).filter(|&row| wanted.orientation(row).is_none()).collect();
+    assert_eq!(left.len(), 3);
+    let alone = waypoints(&problem, &model, &x, &rows.select(&left)).unwrap();
+    assert_eq!(alone.orientations, None);
+}
+
+/// Four nests with a draw wire each.
+#[test]
+fn each_target_of_a_tree_meets_everything_that_is_measured_against() {
+    let anchors = [[1.5, 1.2, 0.1], [0.2, -1.4, 1.3], [-0.9, 1.1, 0.4], [2.1, -0.3, -0.5]];
+    let of = |(k, at): (usize, &[f64; 3])| format!("[[anchor]]\nname = \"A{k}\"\nat_m = {at:?}\n");
+    let around: String = anchors.iter().enumerate().map(of).collect();
+    let declared = format!("{around}[data]\ndistance_sigma_mm = 0.03\ntilt_sigma_deg = 0.002\n");
+    let rig = |tilts: &str, rows: usize| {
+        let ranges = format!("held_out = 0.4\npositions = 60\n{tilts}");
+        let (problem, truth) = two_arms(("[data]\n", &declared), ("held_out = 0.4\n", &ranges));
+        let simulation = simulate(&problem, &truth, 60 + rows, 4).unwrap();
+        for fixture in 0..anchors.len() {
+            for target in ["left", "right"] {
+                let met = |row: &&flexcal::simulate::Row| {
+                    row.target == target && row.observation == Observation::Distance(fixture)
+                };
+                assert_eq!(simulation.rows.iter().filter(met).count(), 20, "{target} and anchor {fixture}");
+            }
+        }
+        let before = &simulation.rows[..60];
+        assert!(before.iter().zip(["left", "right"].iter().cycle()).all(|(row, target)| row.target == *target));
+        (problem, simulation)
+    };
+    rig("tilts = [\"tool\"]\n", 200);
+    let (problem, simulation) = rig("", 160);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rows.csv");
+    std::fs::write(&file, simulation.csv()).unwrap();
+    let data = Dataset::read_files(&[file], &problem).unwrap().0;
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let chi2 = found.reduced_chi2.unwrap();
+    assert!(found.is_trusted() && (chi2 - 1.0).abs() < 0.25, "{:?}, reduced χ² {chi2}", found.quality_flag);
+}
+
+#[test]
+fn rows_of_tilts_need_no_target() {
+    let declared = "[data]\ntilt_sigma_deg = 0.01\n";
+    let (problem, _) = two_arms(("[data]\n", declared), ("", ""));
+    let q = "q1_deg,q2_deg,q4_deg,q5_deg,q6_deg,q8_deg,q9_deg,q10_deg,q11_deg";
+    let here = "10,5,-60,30,20,-70,10,40,-30";
+    let (tilts, both) = ("frame,tilt_x_deg,tilt_y_deg", "x_mm,y_mm,z_mm,target,frame,tilt_x_deg,tilt_y_deg");
+    let read = |tables: &[String]| -> Result<Vec<String>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |(k, text): (usize, &String)| {
+            let file = folder.path().join(format!("{k}.csv"));
+            std::fs::write(&file, text).unwrap();
+            file
+        };
+        let files: Vec<_> = tables.iter().enumerate().map(name).collect();
+        let rows = Measurements::read(&files, &problem).map_err(|error| error.to_string())?.0;
+        let words = rows.target.unwrap();
+        Ok(words.of_row.iter().map(|&word| words.names[word].clone()).collect())
+    };
+    let alone = format!("{q},{tilts}\n{here},tool,1,2\n");
+    let mixed = format!("{q},{both}\n{here},,,,,tool,1,2\n{here},1,2,3,right,,,\n");
+    let positions = format!("{q},x_mm,y_mm,z_mm,target\n{here},1,2,3,right\n");
+    for (tables, words) in [
+        (vec![alone.clone()], vec!["left"]),
+        (vec![mixed.clone()], vec!["right", "right"]),
+        (vec![positions.clone(), alone.clone()], vec!["right", "right"]),
+        (vec![alone.clone(), positions], vec!["right", "right"]),
+    ] {
+        assert_eq!(
+            read(&tables).as_deref(),
+            Ok(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>()[..]),
+            "{tables:?}"
+        );
+    }
+    for (from, to, wrong) in [
+        ("3,right", "3,", "0.csv:3: column target: the cell is empty"),
+        ("3,right", "3,lft", "0.csv:3: column target: no target is called \"lft\""),
+        (",,,,tool", ",,,lft,tool", "0.csv:2: column target: no target is called \"lft\""),
+    ] {
+        let error = read(&[mixed.replace(from, to)]).unwrap_err();
+        assert!(error.contains(wrong), "{error}");
+    }
+    let unnamed = format!("{q},x_mm,y_mm,z_mm,{tilts}\n{here},1,2,3,,,\n");
+    let error = read(&[unnamed]).unwrap_err();
+    assert!(error.contains("0.csv:2: the rows name no target; each of them measures one of left, right"), "{error}");
 }

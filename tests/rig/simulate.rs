@@ -175,6 +175,28 @@ fn measurements_that_nothing_can_be_identified_from_say_so() {
 }
 
 #[test]
+fn ranges_go_by_the_names_of_joints_as_columns_do() {
+    let arm = "name = 'a'\n[[joint]]\nname = 'waist'\n[[joint]]\nname = 'left arm'\nkind = 'prismatic'\n               [[joint]]\nname = 'twin'\n[[joint]]\nname = 'twin'\n[[joint]]\nname = 'hoist'\n";
+    let problem = problem(arm);
+    let read = |text: &str| Truth::parse(&format!("[poses]\n{text}"), Path::new("TRUTH.toml"), &problem);
+    let others = "q3_deg = [0, 1]\nq4_deg = [0, 1]\nq5_deg = [0, 1]";
+    let named = read(&format!("waist_deg = [-10, 20]\n\"left arm_mm\" = [5, 6]\n{others}")).unwrap();
+    let numbered = read(&format!("q1_deg = [-10, 20]\nq2_m = [0.005, 0.006]\n{others}")).unwrap();
+    assert_eq!(named.poses.joints, numbered.poses.joints);
+    for (text, words) in [
+        ("waist_deg = [0, 1]\nq1_rad = [0, 1]", "poses.waist_deg: given already as q1_rad"),
+        ("waist = [0, 1]", "poses.waist: an angle needs a unit; write waist_deg or waist_rad"),
+        ("waist_mm = [0, 1]", "poses.waist_mm: an angle is not given in mm"),
+        ("wast_deg = [0, 1]", "poses.q1: missing; write q1_deg or q1_rad = [from, to]"),
+        ("q1_deg = [0, 1]\nq2_m = [0, 1]\ntwin_deg = [0, 1]", "poses.q3: missing"),
+        ("q1_deg = [0, 1]\nq2_m = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\nhoist_deg = [0, 1]", "poses.q5: missing"),
+    ] {
+        let error = read(text).expect_err(text).to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
 fn every_mistake_says_where_it_is() {
     let (problem, _) = cases();
     let poses = "[poses]\nq1_deg = [0, 1]\nq2_deg = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\n";

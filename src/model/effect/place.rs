@@ -29,7 +29,8 @@ pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 
-/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the arm beyond it [N·m].
+/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the arm beyond it, that of the longest
+/// branch [N·m].
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
@@ -37,8 +38,18 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let own = &problem.joints[joint - 1];
     let beyond = || problem.joints.iter().enumerate().skip(joint).filter(|(k, _)| tree.leads_through(joint - 1, *k));
     let mass = all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
-    let reach: f64 = beyond().map(|(_, joint)| joint.a.hypot(joint.d)).sum();
-    problem.gravity.norm() * (mass + problem.tool.payload_mass) * (reach + problem.tool.target.norm())
+    let payload = if tree.leads_through(joint - 1, problem.tool.joint) { problem.tool.payload_mass } else { 0.0 };
+    let carried = |joint: usize| {
+        let targets = problem.targets.iter().map(|own| (own.joint, own.at));
+        let all = targets.chain([(problem.tool.joint, problem.tool.target)]).filter(|(carrier, _)| *carrier == joint);
+        all.map(|(_, at)| at.norm()).fold(0.0, f64::max)
+    };
+    let reach = |tip: usize| {
+        let way = beyond().filter(|(k, _)| tree.leads_through(*k, tip));
+        way.map(|(_, joint)| joint.a.hypot(joint.d)).sum::<f64>() + carried(tip)
+    };
+    let tips = beyond().map(|(k, _)| k).chain([joint - 1]);
+    problem.gravity.norm() * (mass + payload) * tips.map(reach).fold(0.0, f64::max)
 }
 
 /// Index of the joint whose beam has that name.
@@ -54,4 +65,30 @@ pub(super) fn links(problem: &Problem) -> impl Iterator<Item = String> + '_ {
 /// Whether some rope hoists the arm.
 pub(super) fn is_hoisted(problem: &Problem) -> bool {
     problem.joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two arms on a trunk: joints 2 and 3 carry a target at 0.2 m, joints 4 and 5 the tool.
+    const ARM: &str = "name = 'arm'\njoint = [{ d_m = 0.5 }, { a_m = 0.3 }, { a_m = 0.4, body = [{ mass_kg = 2 }] }, { parent = 1, a_m = 0.6 }, { a_m = 0.1 }]\n\
+                       gravity_m_s2 = [0, 0, -10]\n[tool]\npayload_kg = 3\ntarget_m = [0, 0, 0.1]\n\
+                       [[target]]\nname = 'a'\njoint = 3\nat_m = [0, 0.2, 0]\n[[target]]\nname = 'b'\n";
+
+    #[test]
+    fn a_moment_is_of_what_a_joint_carries_at_the_longest_branch() {
+        let problem = Problem::parse(ARM, "problem.toml".as_ref()).unwrap();
+        let chain =
+            Problem::parse(&ARM.replace("parent = 1, ", "").replace("'a'\njoint = 3", "'a'"), "problem.toml".as_ref());
+        let tree: [f64; 5] = [10.0 * 5.0 * 0.9, 10.0 * 2.0 * 0.6, 10.0 * 2.0 * 0.2, 10.0 * 3.0 * 0.2, 10.0 * 3.0 * 0.1];
+        let serial: [f64; 5] =
+            [10.0 * 5.0 * 1.6, 10.0 * 5.0 * 1.3, 10.0 * 5.0 * 0.9, 10.0 * 3.0 * 0.3, 10.0 * 3.0 * 0.2];
+        for (problem, expected) in [(problem, tree), (chain.unwrap(), serial)] {
+            for (joint, moment) in (1..).zip(expected) {
+                let found = greatest_moment(&problem, joint);
+                assert!((found - moment).abs() < 1e-12, "joint {joint}: {found} N·m, not {moment}");
+            }
+        }
+    }
 }

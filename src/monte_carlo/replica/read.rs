@@ -18,8 +18,12 @@ impl MisprintStudy {
         let title = root.text("title")?.unwrap_or(&name).to_owned();
         let asked = root.require("problem", "problem = \"…\", a problem.toml")?;
         let (problem, _, problem_file) = problem_of(&asked, folder)?;
+        let what = "a study of misprints";
+        if !problem.tree().is_chain() {
+            return Err(asked.error(InputErrorKind::NotAChain { what }));
+        }
         if !problem.is_chain() || !problem.targets.is_empty() {
-            return Err(asked.error(InputErrorKind::NotAChain { what: "a study of misprints" }));
+            return Err(asked.error(InputErrorKind::NotOneTool { what }));
         }
         let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
         let specimens = count(&root.require("specimens", "specimens = …, arms of each case")?)?;

@@ -80,7 +80,7 @@ fn files_that_differ() {
     check(&read(",hoist_N", "").unwrap_err(), "fewer", &["2.csv:1: column hoist_N: ", "1.csv has it"]);
     assert!(read("", "").is_ok() && read(",pose", "").is_ok() && read(",note", "").is_ok());
     let twice = [files[0].clone(), files[0].clone()];
-    check(&Measurements::read(&twice, &problem).unwrap_err(), "twice", &["1.csv is named twice"]);
+    check(&Measurements::read(&twice, &problem).unwrap_err(), "twice", &["1.csv: named twice on the command line"]);
     let own = folder.path().join("problem.toml");
     fs::write(&own, format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n")).unwrap();
     let line = fs::read_to_string(&own).unwrap().lines().count();

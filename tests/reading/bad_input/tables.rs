@@ -42,6 +42,20 @@ fn headers() {
 }
 
 #[test]
+fn a_name_that_joints_share_is_no_column() {
+    let arm = "name = 'arm'\n[[joint]]\nname = 'wrist'\n[[joint]]\nname = 'wrist'\n[[joint]]\nname = 'hand'\n";
+    let both = "several joints are called \"wrist\"; write q1_deg or q1_rad and q2_deg or q2_rad";
+    for (header, words) in [
+        ("wrist_deg,q2_deg,q3_deg,x_m,y_m,z_m\n", format!("rows.csv:1: column wrist_deg: {both}")),
+        ("q1_deg,wrist_rad,hand_rad,x_m,y_m,z_m\n", format!("rows.csv:1: column wrist_rad: {both}")),
+        ("q2_deg,q3_deg,x_m,y_m,z_m\n", "column q1: missing; add q1_deg or q1_rad".to_owned()),
+        ("q1_deg,q2_deg,x_m,y_m,z_m\n", "column q3: missing; add q3_deg or q3_rad or hand_deg or hand_rad".to_owned()),
+    ] {
+        check(&table(arm, header.as_bytes()).expect_err(header), header, &[&words]);
+    }
+}
+
+#[test]
 fn rows() {
     let rows: [(&str, &[&str]); 20] = [
         ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
