@@ -22,7 +22,8 @@ pub enum WriteError {
     #[error("cannot write {}: {why}", path.display())]
     InTheWay { path: PathBuf, why: &'static str },
     #[error(
-        "{} is an input of this command; name another folder with --out, or replace it with --force", path.display()
+        "{} is an input of this command or belongs to its problem; name another folder with --out, or replace it with --force",
+        path.display()
     )]
     Input { path: PathBuf },
     #[error(
@@ -35,6 +36,8 @@ pub enum WriteError {
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
+    /// What the command may write, figures left out.
+    names: Vec<String>,
     /// Files that the command or its problem reads.
     inputs: Vec<PathBuf>,
     force: bool,
@@ -51,10 +54,11 @@ impl Results {
         names: &[&str],
         (force, quiet): (bool, bool),
     ) -> Result<Self, WriteError> {
-        let claimed = Self { folder, command, inputs, force, quiet };
+        let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+        let claimed = Self { folder, command, names, inputs, force, quiet };
         let record = claimed.record()?;
-        names.iter().try_for_each(|name| claimed.check(&record, name))?;
-        if names.contains(&REPORT[0]) {
+        claimed.names.iter().try_for_each(|name| claimed.check(&record, name))?;
+        if claimed.names.iter().any(|name| name == REPORT[0]) {
             claimed.figures().iter().try_for_each(|name| claimed.check(&record, name))?;
         }
         Ok(claimed)
@@ -92,13 +96,20 @@ impl Results {
     }
 
     /// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its
-    /// place. Files of the record of which `is_older` says so are removed.
+    /// place. Files of the record of which `is_older` says so are removed, and what the same command wrote before and has none of now:
+    /// it would stand beside results that it does not belong to.
     fn keep(&self, texts: &[(&str, &str)], is_older: impl Fn(&str) -> bool) -> Result<(), WriteError> {
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let others = self.others(&record, texts);
-        let older: Vec<String> = record.names().filter(|name| is_older(name)).map(str::to_owned).collect();
-        let older: Vec<_> = older.iter().filter(|name| record.writer(&self.folder, name).is_some()).collect();
+        let is_left = |name: &str| {
+            let claimed = self.names.iter().any(|own| own == name) && texts.iter().all(|(own, _)| *own != name);
+            claimed && record.writer(&self.folder, name) == Some(self.command)
+        };
+        let is_ours = |name: &&str| is_left(name) || (is_older(name) && record.writer(&self.folder, name).is_some());
+        let mut older: Vec<String> = record.names().filter(is_ours).map(str::to_owned).collect();
+        older.sort();
+        older.dedup();
         let mut ready = Vec::with_capacity(texts.len());
         for (name, text) in texts {
             let path = self.path(name);

@@ -153,7 +153,7 @@ impl<'a> Data<'a> {
             covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),
         };
-        let mut covariates: Vec<CovariateValues> = moving.map(joint).collect();
+        let mut covariates: Vec<CovariateValues> = moving.clone().map(joint).collect();
         let columns = [
             (Covariate::Temperature, &measurements.temperature),
             (Covariate::Payload, &measurements.payload),
@@ -170,7 +170,7 @@ impl<'a> Data<'a> {
         covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
         if let Some(approach) = &measurements.approach {
             let n = measurements.joints;
-            covariates.extend((0..n).map(|joint| CovariateValues {
+            covariates.extend(moving.map(|(joint, _)| CovariateValues {
                 covariate: Covariate::Approach(joint),
                 values: self.rows().iter().map(|&row| approach[row * n + joint]).collect(),
             }));

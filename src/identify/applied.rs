@@ -68,6 +68,12 @@ pub enum PredictError {
         /// The parameter.
         name: String,
     },
+    /// Without an estimate the rows leave open where base or tool is.
+    #[error("the rows do not determine {name}, and there is no estimate to take it from; measure more poses there")]
+    OpenWithoutEstimate {
+        /// The parameter.
+        name: String,
+    },
     /// Bases and tools of new sessions could not be placed.
     #[error(transparent)]
     Stage(#[from] StageError),
@@ -141,11 +147,14 @@ pub fn predict(
         if let Some(k) = too_few(&model, &poses, &missing) {
             let name = &model.parameters[k].name;
             return Err(match model.parameters[k].slot {
-                Slot::Fixture { .. } => PredictError::Open { name: name.clone() },
+                Slot::Fixture { .. } => open(estimate, name.clone()),
                 _ => lacking(estimate, name),
             });
         }
-        x = place(&model, &poses, &missing, x)?;
+        x = place(&model, &poses, &missing, x).map_err(|error| match error {
+            PredictError::Open { name } => open(estimate, name),
+            other => other,
+        })?;
     } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
         return Err(lacking(estimate, &model.parameters[k].name));
     }
@@ -174,10 +183,21 @@ pub fn predict(
     Ok(Prediction { positions, orientations, residuals, errors, spreads, placed })
 }
 
-/// The error of an estimate that lacks a parameter; without an estimate all have their nominal values.
+/// The error of an estimate that lacks a parameter, or of none.
 fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
-    let file = estimate.map(|estimate| estimate.file.clone()).unwrap_or_default();
-    SavedEstimateError::Missing { file, name: name.to_owned() }.into()
+    let name = name.to_owned();
+    match estimate {
+        Some(SavedEstimate { file, .. }) => SavedEstimateError::Missing { file: file.clone(), name }.into(),
+        None => PredictError::OpenWithoutEstimate { name },
+    }
+}
+
+/// The error of rows that leave a parameter open, which the estimate lacks or which none has.
+fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
+    match estimate {
+        Some(_) => PredictError::Open { name },
+        None => PredictError::OpenWithoutEstimate { name },
+    }
 }
 
 /// Whether a pose uses the base or tool that a parameter belongs to.

@@ -44,7 +44,8 @@ impl Baseline {
     pub(super) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
         let ignoring = rigid.map(|rigid| rigid.held_out.clone());
         let paper = Some((self.form, self.stage));
-        Procedure { paper, geometry: self.geometry.clone(), after: self.held_out.clone(), ignoring }
+        let geometry = (1..).zip(self.geometry.iter().copied()).collect();
+        Procedure { paper, geometry, after: self.held_out.clone(), ignoring }
     }
 }
 

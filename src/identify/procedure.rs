@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Identification, Strategy};
 use crate::paper::{Form, StiffnessStage};
-use crate::problem::Problem;
+use crate::problem::{Joint, Problem};
 
 /// A geometric parameter of table 2 \[m\] or \[rad\].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,8 +22,8 @@ pub struct TableEntry {
 pub struct Procedure {
     /// Which form of the paper's procedure; `None`: everything fitted at once, by the declared model.
     pub paper: Option<(Form, StiffnessStage)>,
-    /// Table 2: α, a, θ, d, β of each joint.
-    pub geometry: Vec<[TableEntry; 5]>,
+    /// Table 2: number and α, a, θ, d, β of each joint that has these, not a placement of its own.
+    pub geometry: Vec<(usize, [TableEntry; 5])>,
     /// Errors measured − predicted of the held-out poses after it, measuring frame \[m\].
     pub after: Vec<Vector3<f64>>,
     /// The same after the procedure with elasticity ignored; `None` where nothing is elastic.
@@ -43,12 +43,13 @@ impl Procedure {
             let identified = estimate.map_or(nominal, |estimate| estimate.estimate);
             TableEntry { nominal, identified, seen: estimate.map(|estimate| estimate.identified) }
         };
-        let row = |(index, joint): (usize, &crate::problem::Joint)| {
+        let row = |(index, joint): (usize, &Joint)| {
             let fields =
                 [("alpha", joint.alpha), ("a", joint.a), ("theta", joint.theta), ("d", joint.d), ("beta", joint.beta)];
-            fields.map(|(field, nominal)| entry(index, field, nominal))
+            (index + 1, fields.map(|(field, nominal)| entry(index, field, nominal)))
         };
-        let geometry = problem.joints.iter().enumerate().map(row).collect();
+        let joints = problem.joints.iter().enumerate().filter(|(_, joint)| joint.placement.is_none());
+        let geometry = joints.map(row).collect();
         Self { paper: None, geometry, after, ignoring }
     }
 

@@ -161,7 +161,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         Block::heading("What each part of the elasticity is worth"),
         Block::Figures(vec![Figure::Ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
-        Block::heading("Tables 2 and 3 and figure 13 of the paper, from each procedure"),
+        Block::heading("From each procedure, as in tables 2 and 3 and figure 13 of the paper"),
     ];
     for own in &comparison.procedures {
         blocks.push(Block::Text(format!("{}.", title(own))));

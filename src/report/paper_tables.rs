@@ -35,7 +35,8 @@ object! {
     /// Errors and parameters of one procedure in the paper's terms.
     Tables(comparison: &Comparison, own: &Procedure) {
         procedure: String = own.name(),
-        table_2: Vec<JointEntry> = own.geometry.iter().zip(1..).map(|(row, joint)| JointEntry::of(joint, row)).collect(),
+        /// Of joints that have such parameters.
+        table_2: Vec<JointEntry> = own.geometry.iter().map(|(joint, row)| JointEntry::of(*joint, row)).collect(),
         table_3: Errors = Errors::of(&comparison.before, own),
         figure_13: Poses = Poses::of(&comparison.before, own),
     }
@@ -110,7 +111,7 @@ pub(super) fn table_2(own: &Procedure) -> Table {
         Some(seen) if seen < SEEN => format!("({text})"),
         _ => text,
     };
-    let row = |(entries, joint): (&[TableEntry; 5], usize)| {
+    let row = |(joint, entries): &(usize, [TableEntry; 5])| {
         let fields = || entries.iter().enumerate();
         let nominal = fields().map(|(place, entry)| show(place, entry.nominal));
         let identified = fields().map(|(place, entry)| marked(entry, show(place, entry.identified)));
@@ -120,9 +121,9 @@ pub(super) fn table_2(own: &Procedure) -> Table {
         });
         std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
     };
-    let rows = own.geometry.iter().zip(1..).map(row).collect();
+    let rows = own.geometry.iter().map(row).collect();
     Table::new(&TABLE_2, rows, &[])
-        .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified"])
+        .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified, or fixed"])
 }
 
 /// Table 3: errors of the held-out poses before, with elasticity, ignoring it, and the reductions; for the paper's arm its

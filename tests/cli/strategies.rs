@@ -146,6 +146,11 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
     assert!(own["rows"].as_array().unwrap().iter().all(|row| row["strategy"] != "rigid"), "nothing to ignore");
     let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
     assert!(!page.contains("with elasticity") && !page.contains("paper:") && page.contains("identified"), "{page}");
+    for words in
+        ["## From each procedure, as in tables 2 and 3 and figure 13 of the paper", "–: not identified, or fixed"]
+    {
+        assert!(page.contains(words), "{words} missing in:\n{page}");
+    }
     let asked = json(&bench, &["compare", ".", "--paper", "--out", "asked"]);
     assert_eq!(procedures(&asked), ["joint", "paper-rigid"]);
     // A base that nobody knows has to be found first.
@@ -153,6 +158,14 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
     let placed = json(&bench, &["compare", ".", "--out", "out"]);
     assert_eq!(placed["procedures"][0]["table_3"]["before_registered"], true);
     assert!(placed["procedures"][0]["table_2"][0]["a_mm"]["seen"].is_null(), "fixed");
+    // A fixed joint has none of these parameters, and comes from no side.
+    bench.edit("problem.toml", "[tool]\n", "[[joint]]\nkind = \"fixed\"\nxyz_mm = [1, 0, 0]\n[tool]\n");
+    let held = json(&bench, &["compare", ".", "--out", "out"]);
+    let joints = held["procedures"][0]["table_2"].as_array().unwrap();
+    assert_eq!(joints.iter().map(|own| own["joint"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2]);
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let traced = flexcal.current_dir(bench.folder.path()).args(["trace", ".", "--out", "out"]).output().unwrap();
+    assert!(traced.status.success() && !text(&traced.stdout).contains("approach3"), "{}", text(&traced.stdout));
 }
 
 #[test]

@@ -177,10 +177,10 @@ fn bad_references_end_with_status_2_and_write_nothing() {
             // To predict, too few rows leave open where a point is.
             let words = match cells {
                 "top,,,,,," if command == "predict" => {
-                    "point[top].x is not in the estimate, and its rows do not determine it"
+                    "the rows do not determine point[top].x, and there is no estimate to take it from"
                 }
                 ",C,800,,,," if command == "predict" => {
-                    "anchor[C].x is not in the estimate, and its rows do not determine it"
+                    "the rows do not determine anchor[C].x, and there is no estimate to take it from"
                 }
                 _ => words,
             };

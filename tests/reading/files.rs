@@ -90,7 +90,11 @@ fn what_is_read_is_not_replaced() {
     let bench = Bench::new();
     let simulate = "simulate arm --truth arm/TRUTH.toml --poses 9 --seed 2 --out arm";
     let error = bench.refused(simulate, "arm");
-    assert!(error.contains("arm/measurements.csv is an input of this command") && error.contains("--force"), "{error}");
+    assert!(
+        error.contains("arm/measurements.csv is an input of this command or belongs to its problem")
+            && error.contains("--force"),
+        "{error}"
+    );
     // Under whatever name: a link to the folder, and one to the file.
     symlink(bench.path("arm"), bench.path("other")).unwrap();
     assert!(bench.refused(&simulate.replace("--out arm", "--out other"), "arm").contains("an input"));
@@ -133,6 +137,30 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     bench.flexcal("man --out pages").success();
     fs::write(bench.path("pages/flexcal.1"), "mine").unwrap();
     bench.refused("man --out pages", "pages");
+}
+
+#[test]
+fn results_of_an_earlier_table_do_not_stay_beside_those_of_another() {
+    let bench = Bench::new();
+    fs::write(bench.path("poses.csv"), "q1_deg,q2_deg\n10,20\n").unwrap();
+    let there = || {
+        let names = fs::read_dir(bench.path("out")).unwrap().map(|own| own.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+        names.sort();
+        names
+    };
+    let poses = "predict arm --data poses.csv --out out";
+    bench.flexcal("predict arm --out out").success();
+    assert_eq!(there(), ["errors.json", "predictions.csv", "residuals.csv"]);
+    bench.flexcal(poses).success();
+    assert_eq!(there(), ["predictions.csv"]);
+    // What another command wrote stays, and what was changed since.
+    bench.flexcal("predict arm --out out").success();
+    bench.flexcal("identify arm --out out").success();
+    fs::write(bench.path("out/errors.json"), "mine").unwrap();
+    bench.flexcal(&format!("{poses} --force")).success();
+    assert!(there().contains(&"residuals.csv".to_owned()), "{:?}", there());
+    assert_eq!(bench.read("out/errors.json"), "mine");
 }
 
 #[test]
@@ -236,8 +264,15 @@ fn the_same_rows_under_two_names_are_said() {
         let error = text(
             &bench.flexcal(&format!("identify arm --data arm/measurements.csv {name}")).code(2).get_output().stderr,
         );
-        assert!(error.contains("is named twice"), "{error}");
+        assert!(error.contains(&format!("error: {name}: named twice on the command line")), "{error}");
     }
+    // The problem names it too, and is not to blame.
+    let twice = "identify arm --data arm/measurements.csv arm/measurements.csv";
+    let error = text(&bench.flexcal(twice).code(2).get_output().stderr);
+    assert!(
+        error.contains("arm/measurements.csv: named twice on the command line") && !error.contains(".toml"),
+        "{error}"
+    );
     let said = |data: &str| text(&bench.flexcal(&format!("identify arm --data {data}")).get_output().stderr);
     let error = said("arm/measurements.csv copy.csv");
     assert!(
