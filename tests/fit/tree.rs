@@ -83,8 +83,9 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
     let model = Model::new(&problem, &bases, &targets).unwrap();
     let mut wanted = data.measurements.select(&(0..8).collect::<Vec<_>>());
     // The right wrist beyond its limit of 100°, where the left hand is measured.
-    let left: Vec<usize> = (0..8).filter(|&row| simulation.rows[row].target == "left").collect();
-    left.iter().for_each(|row| wanted.configurations[row * 11 + 10] = 115_f64.to_radians());
+    for row in (0..8).filter(|&row| simulation.rows[row].target == "left") {
+        wanted.configurations[row * 11 + 10] = 115_f64.to_radians();
+    }
     let commands = compensate(&problem, &model, &found.x, &wanted).unwrap();
     for command in commands {
         let (row, target) = (&simulation.rows[command.row], &simulation.rows[command.row].target);
