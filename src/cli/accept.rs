@@ -33,6 +33,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } = common.read("accept", &["acceptance.json", "acceptance.html"])?;
+    identify::held_out_positions(&problem, &data)?;
     let line = common.talks().then(Line::new);
     let options = Options::default()
         .with_strategy(Strategy::Joint)

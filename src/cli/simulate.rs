@@ -87,10 +87,15 @@ fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<(PoseConditi
 
 fn summary(simulation: &Simulation, table: &Path) -> String {
     let (poses, held_out) = (simulation.rows.len(), simulation.held_out());
-    let (identify, sigma) = (poses - held_out, simulation.truth.noise_sigma * 1e3);
+    let identify = poses - held_out;
+    let noise = if simulation.rows.iter().any(|row| row.observation.is_position()) {
+        format!("{} mm per axis, 1 σ", simulation.truth.noise_sigma * 1e3)
+    } else {
+        "as [noise] says of each kind of rows".to_owned()
+    };
     let table = table.display();
     format!(
-        "{poses} pose{s}: {identify} to identify, {held_out} held out; noise {sigma} mm per axis, 1 σ\n\
+        "{poses} pose{s}: {identify} to identify, {held_out} held out; noise {noise}\n\
          Effects: {effects}\n\n\
          Written to {table}, what is true to truth.json beside it\n",
         s = if poses == 1 { "" } else { "s" },

@@ -3,6 +3,7 @@
 //! Rank, unidentifiable combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
 //! drawn from the priors.
 
+use super::coordinates::{coordinates, first_of_each};
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Site};
 use crate::diagnose::{Detection, detectable};
@@ -62,8 +63,11 @@ pub struct Check {
     pub prediction: Prediction,
     /// Where that is.
     pub elsewhere: Elsewhere,
-    /// Root mean square length of the error of one measured position \[m\].
-    pub noise: f64,
+    /// Root mean square length of the error of one position measured with the σ of these poses \[m\]; `None` where they measure
+    /// tilts alone.
+    pub noise: Option<f64>,
+    /// What that σ is of: the first kind of what is measured that is a length ([`Observation::kind`]).
+    pub noise_of: &'static str,
     /// Of the first n of a series of such poses.
     pub growth: Growth,
     /// Which effects of the catalogue they would show, and from what size on.
@@ -128,7 +132,8 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
     // Predictions are of positions, whatever is measured.
     let workspace = Measurements { observations: Vec::new(), ..workspace };
     let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
-    let noise = noise(problem, &series);
+    let lengths = series.kinds().into_iter().find(|kind| kind.is_of_arm() && !kind.is_angle());
+    let noise = lengths.map(|kind| noise(problem, &series, kind));
     let forecast = Forecast::new(parameters, &told.select(&(0..count).collect::<Vec<_>>()));
     let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));
     Ok(Check {
@@ -136,9 +141,10 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         forecast: forecast.over(parameters, &arms),
         elsewhere,
         noise,
+        noise_of: lengths.unwrap_or_default().kind(),
         detection: detectable(problem, &poses)?,
-        growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise, count)),
-        coordinates: coordinates(&poses, told.coordinates, (0..count).collect()),
+        growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise.unwrap_or(0.0), count)),
+        coordinates: coordinates(&poses, told.coordinates, 0..count),
         distinct: coordinates(&poses, told.coordinates, first_of_each(&poses.pose_numbers(problem))),
         different: different(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
@@ -177,29 +183,19 @@ pub fn with_known_words(data: &Dataset) -> Vec<usize> {
     split.held_out.iter().copied().filter(judges).collect()
 }
 
-/// Numbers that some rows of a table measure, of which a position has so many.
-fn coordinates(table: &Measurements, of_position: usize, rows: Vec<usize>) -> usize {
-    let of_row = |row: usize| match table.observation(row) {
-        Observation::Position => of_position,
-        other => other.coordinates(),
-    };
-    rows.into_iter().map(of_row).sum()
-}
-
-/// The first row with each number.
-fn first_of_each(numbers: &[usize]) -> Vec<usize> {
-    (0..numbers.len()).filter(|&row| !numbers[..row].contains(&numbers[row])).collect()
-}
-
 fn finite(all: &Sensitivity) -> Sensitivity {
     all.select(&(0..all.len()).filter(|&row| all.is_finite(row)).collect::<Vec<_>>())
 }
 
-/// √3 σ, of the mean σ² of the rows.
-fn noise(problem: &Problem, table: &Measurements) -> f64 {
-    let declared = problem.data.position_sigma.unwrap_or(1.0);
+/// √3 σ, of the mean σ² of the rows of a kind.
+fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
+    let declared = problem.data.sigma_of(kind).unwrap_or(1.0);
+    let own = |row: &usize| table.observation(*row).kind() == kind.kind();
     let squares = match &table.sigma {
-        Some(sigmas) => sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len().max(1) as f64,
+        Some(sigmas) => {
+            let own: Vec<f64> = (0..sigmas.len()).filter(own).map(|row| sigmas[row] * sigmas[row]).collect();
+            own.iter().sum::<f64>() / own.len().max(1) as f64
+        }
         None => declared * declared,
     };
     (3.0 * squares).sqrt()

@@ -66,7 +66,11 @@ impl DesignError {
 
     /// Nothing says how exact positions will be.
     pub(super) fn no_sigma(problem: &Problem) -> Self {
-        let write = "the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)".to_owned();
+        let mut write = "the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)".to_owned();
+        if !problem.fixtures.is_empty() {
+            write += "; poses that are to touch or to measure against something stand in a table that says so in a column point, anchor or \
+                      surface: --candidates FILE.csv";
+        }
         let location = problem.data.location.clone().with_key("data.position_sigma_mm");
         location.error(InputErrorKind::MissingKey { write, near: None }).into()
     }

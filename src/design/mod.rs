@@ -6,6 +6,7 @@
 
 mod candidate_poses;
 mod check;
+mod coordinates;
 mod criterion;
 mod error;
 mod exchange;

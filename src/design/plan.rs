@@ -4,8 +4,9 @@ use rand::Rng;
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
+use super::coordinates::{coordinates, first_of_each};
 use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace};
-use crate::measurement::{Measurements, different};
+use crate::measurement::Measurements;
 use crate::model::parameter::{Parameter, Slot};
 use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
@@ -81,6 +82,8 @@ pub struct Plan {
     pub value: f64,
     /// Of the poses given and the planned ones together.
     pub planned: Forecast,
+    /// Numbers that the poses given and the planned ones measure together.
+    pub coordinates: usize,
     /// Of the poses given and as many others, drawn at random again and again.
     pub random: Vec<Forecast>,
     /// Whether the plan decides every parameter as far as all candidates together can, and measures as many
@@ -127,8 +130,8 @@ pub fn plan(
     };
     let parameters = &site.model.parameters;
     let of_arm = given.map(|given| given.clone().of_the_arm());
-    let measured = of_arm.as_ref().map_or(0, |own| different(&own.pose_numbers(problem), 0..own.len()));
-    let given = given.map(|given| site.at_rest(given).1);
+    let given = given.map(|given| site.at_rest(given));
+    let (measured, given): (Option<Measurements>, Option<Sensitivity>) = given.unzip();
     let (mut table, usual) = admitted(site.at_rest(&usual));
     let mut all = usual.clone();
     if let Some(ends) = ends {
@@ -178,12 +181,16 @@ pub fn plan(
         .map(|draw| forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64))))
         .collect();
     let planned = forecast(&told);
-    let apart = measured + different(&chosen.pose_numbers(problem), 0..chosen.len());
+    let of_position = all.coordinates;
+    let distinct = |own: &Measurements| coordinates(own, of_position, first_of_each(&own.pose_numbers(problem)));
+    let apart = of_arm.as_ref().map_or(0, distinct) + distinct(&chosen);
+    let every = |own: &Measurements| coordinates(own, of_position, 0..own.len());
+    let coordinates = measured.as_ref().map_or(0, every) + every(&chosen);
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
     let open = planned.open.saturating_sub(untouched(parameters, &[Some(&told), given.as_ref()]));
-    let suffices = open <= attainable && all.coordinates * apart >= without_prior;
+    let suffices = open <= attainable && apart >= without_prior;
     let given = of_arm.map_or(0, |own| own.len());
-    Ok(Plan { poses: chosen, given, candidates: tried, starts, value, planned, random, suffices })
+    Ok(Plan { poses: chosen, given, candidates: tried, starts, value, planned, coordinates, random, suffices })
 }
 
 /// What is measured in any case, with the known distances between points that only the candidates touch.

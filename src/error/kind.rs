@@ -147,6 +147,10 @@ pub enum InputErrorKind {
     HalfObserved { has: &'static str, lacks: &'static str },
     #[error("nothing is measured in this row: every column that could hold something is empty")]
     NothingMeasured,
+    #[error(
+        "the column means nothing in this problem, which does not declare {write}; declare what the column speaks of"
+    )]
+    NotDeclared { write: &'static str },
     #[error("rows of several kinds are weighed against each other; write {write} in [data]")]
     NoSigmaOfKind { write: String },
 
@@ -293,6 +297,11 @@ pub enum InputErrorKind {
     NoIdentificationRows { cause: NoRows },
     #[error("no rows are held out: {cause}")]
     NoHeldOutRows { cause: NoRows },
+    #[error(
+        "no held-out row measures a position, and pose accuracy is of positions: hold out rows with x_mm, y_mm and z_mm, measured by \
+         whatever is to judge the arm; identify tells the errors of contacts, distances and tilts"
+    )]
+    NoPositionsHeldOut,
     #[error("no session is called \"{session}\"; there {}", list("is", sessions, "is no column session"))]
     UnknownSession { session: String, sessions: Vec<String> },
 

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::identification::IdentifyError;
 use super::outcome::Identification;
 use super::placement::Placement;
+use crate::error::InputErrorKind;
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::numeric::{Interval, mean_interval};
@@ -69,19 +70,36 @@ impl Accuracy {
     }
 }
 
-/// Of the held-out poses of an identification; poses without an equilibrium are left out.
+/// Held-out rows that measure positions, of which alone a pose accuracy is.
 ///
 /// # Errors
-/// Problem and data do not fit each other.
+/// There are none.
+pub fn held_out_positions(
+    problem: &Problem,
+    Dataset { measurements, split }: &Dataset,
+) -> Result<Vec<usize>, IdentifyError> {
+    let is_position = |row: &usize| measurements.observation(*row).is_position();
+    let rows: Vec<usize> = split.held_out.iter().copied().filter(is_position).collect();
+    if rows.is_empty() {
+        return Err(problem.data.location.clone().error(InputErrorKind::NoPositionsHeldOut).into());
+    }
+    Ok(rows)
+}
+
+/// Of the held-out poses of an identification whose positions were measured; poses without an equilibrium are left out.
+///
+/// # Errors
+/// Problem and data do not fit each other, or no held-out row measures a position.
 pub fn acceptance(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Acceptance, IdentifyError> {
-    let Dataset { measurements, split } = data;
+    let measurements = &data.measurements;
+    let held_out = held_out_positions(problem, data)?;
     let placement = Placement::of(measurements);
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
-    let errors = |x| placement.position_errors(&model, x, measurements, &split.held_out);
+    let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
     let (before, after) = (errors(&found.registered_x), errors(&found.x));
     let numbers = measurements.pose_numbers(problem);
     let mut groups: BTreeMap<(usize, [i64; 3]), Vec<usize>> = BTreeMap::new();
-    for (k, &row) in split.held_out.iter().enumerate() {
+    for (k, &row) in held_out.iter().enumerate() {
         if !(before[k].norm().is_finite() && after[k].norm().is_finite()) {
             continue;
         }
@@ -103,12 +121,12 @@ pub fn acceptance(problem: &Problem, data: &Dataset, found: &Identification) -> 
         own.iter().map(|&k| all[k]).sum::<Vector3<f64>>() / own.len().max(1) as f64
     };
     let pose = |own: Vec<usize>| {
-        let positions: Vec<Vector3<f64>> = own.iter().map(|&k| measurements.positions[split.held_out[k]]).collect();
+        let positions: Vec<Vector3<f64>> = own.iter().map(|&k| measurements.positions[held_out[k]]).collect();
         AcceptancePose {
             before: mean(&before, &own).norm(),
             after: mean(&after, &own).norm(),
             repeatability: repeatability(&positions),
-            rows: own.into_iter().map(|k| split.held_out[k]).collect(),
+            rows: own.into_iter().map(|k| held_out[k]).collect(),
         }
     };
     let mut poses: Vec<AcceptancePose> = groups.into_values().map(pose).collect();

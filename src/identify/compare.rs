@@ -26,7 +26,8 @@ pub struct Comparison {
     pub paper: Vec<Baseline>,
     /// One identification per ablation, everything fitted at once.
     pub ablations: Vec<(Ablation, Identification)>,
-    /// The joint fit and every form of the paper's procedure but the rigid one, in the terms of the paper.
+    /// The joint fit and every form of the paper's procedure but the rigid one, in the terms of the paper; none where rows measure
+    /// anything else than positions.
     pub procedures: Vec<Procedure>,
     /// What the paper calls before: the nominal arm with nothing that gives way, base and tool as declared.
     pub before: Before,
@@ -91,14 +92,16 @@ pub fn compare(problem: &Problem, data: &Dataset, options: &CompareOptions) -> R
     let rigid_model = model.ablated(Ablation::Rigid);
     let rigid = run(&rigid_model, Strategy::Joint, SolverChoice::Auto)?;
     let is_papers_arm = is_its_arm(problem);
-    let paper = if options.paper || is_papers_arm { baselines(problem, data) } else { Vec::new() };
+    // The paper's procedure and its tables are of positions.
+    let of_positions = data.measurements.kinds().iter().all(|kind| kind.is_position());
+    let paper = if of_positions && (options.paper || is_papers_arm) { baselines(problem, data) } else { Vec::new() };
     let held_out =
         |model: &Model, x: &DVector<f64>| placement.position_errors(model, x, &data.measurements, &data.split.held_out);
     let ignoring = elastic.then(|| held_out(&rigid_model, &rigid.x));
     let own = Procedure::of_fit(problem, &joint, held_out(&model, &joint.x), ignoring);
     let papers = paper.iter().filter(|own| !elastic || own.stage != StiffnessStage::Rigid);
     let papers = papers.map(|own| own.procedure(paper.first().filter(|_| elastic)));
-    let procedures = std::iter::once(own).chain(papers).collect();
+    let procedures = std::iter::once(own).chain(papers).filter(|_| of_positions).collect();
     let unknown = |parameter: &crate::model::parameter::Parameter| {
         parameter.slot.is_placement() && parameter.sigma.is_none() && !parameter.is_bounded()
     };

@@ -5,10 +5,11 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use super::Errors;
 use super::fitting::Fitting;
+use super::kind::Kind;
 use super::outliers::{Outlier, chances, scatter};
-use super::quality::{LEAST_SPREAD, MISSES, QualityFlag};
-use super::{ErrorSummary, Errors};
+use super::quality::{BEYOND_NOISE, LEAST_SPREAD, MISSES, QualityFlag};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::numeric::median;
@@ -61,7 +62,7 @@ pub(super) fn outliers(
     let errors = fitting.position_errors(rows, x);
     let outlier = |place: usize| {
         let (row, distance) = (rows[place], lengths[place] / scatter);
-        let far = || Outlier { row, location: fitting.measurements.location(row), distance, error: errors[place] };
+        let far = || Outlier::of(fitting.measurements, row, distance, errors[place]);
         (distance > chances[place].1).then(far)
     };
     (0..rows.len()).filter_map(outlier).collect()
@@ -81,21 +82,34 @@ pub(super) fn copies(measurements: &Measurements, identification: &[usize], held
 /// Whether held-out poses contradict the fit: most are missed as if they were of another arm, or they are met worse than by the
 /// registered nominal arm.
 ///
-/// `spread` \[m\] is that of the identification positions, `sigma` \[m\] what the fit took for noise, `least` \[m\] an error below
-/// which nothing is said.
+/// Rows of each of the identified `kinds` are judged by themselves; worse than the nominal arm is asked of those that errors are told of.
 pub(super) fn contradict(
     fitting: &Fitting,
     x: &DVector<f64>,
     (registered, fitted): (&Errors, &Errors),
-    (spread, sigma, least): (f64, f64, f64),
+    kinds: &[Kind],
 ) -> Option<QualityFlag> {
     let errors = fitting.position_errors(&fitting.split.held_out, x);
-    let typical = median(errors.iter().map(Vector3::norm).filter(|length| length.is_finite())).unwrap_or(0.0);
-    if spread > LEAST_SPREAD && typical > MISSES * spread && typical > least {
-        return Some(QualityFlag::HeldOutMisses { median: typical, spread });
-    }
-    let size = |of: &ErrorSummary| of.rms.norm;
-    let (before, after) = (size(&registered.held_out), size(&fitted.held_out));
-    (after > WORSE * before && after > ABOVE_NOISE * 3.0_f64.sqrt() * sigma)
-        .then_some(QualityFlag::HeldOutWorse { before, after })
+    let missed =
+        |own: &Kind| {
+            let kind = own.observation.kind();
+            let rows = fitting.split.held_out.iter().zip(&errors);
+            let lengths = rows.filter(|(row, _)| fitting.measurements.observation(**row).kind() == kind);
+            let lengths = lengths.map(|(_, error)| error.norm()).filter(|length| length.is_finite());
+            let (median, spread) = (median(lengths).unwrap_or(0.0), own.spread);
+            let least = own.sigma.0.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+            (spread > LEAST_SPREAD && median > MISSES * spread && median > least)
+                .then_some(QualityFlag::HeldOutMisses { kind, median, spread })
+        };
+    let worse = || {
+        let (before, after) = (registered.held_out.rms.norm, fitted.held_out.rms.norm);
+        let own = kinds.iter().find(|own| own.observation.kind() == fitted.held_out.kind)?;
+        let noise = own.observation.root() * own.sigma.1;
+        (after > WORSE * before && after > ABOVE_NOISE * noise).then_some(QualityFlag::HeldOutWorse {
+            kind: fitted.held_out.kind,
+            before,
+            after,
+        })
+    };
+    kinds.iter().find_map(missed).or_else(worse)
 }

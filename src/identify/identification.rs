@@ -9,7 +9,7 @@ use super::active::ActiveConstraint;
 use super::covariance::Collected;
 use super::fitting::{FitEnd, Fitting};
 use super::judgement::Judgement;
-use super::noise::fitted;
+use super::noise::{fitted, taken};
 use super::noise_model::{LEAST_NOISE, NoiseModel};
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
@@ -275,15 +275,15 @@ pub fn identify_model(
     }
     estimates.iter_mut().filter(|_| noise == Noise::Unknown).for_each(|own| own.std_error = None);
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
-    let declared_all = together(whole.declared.iter().copied());
-    let taken = together(whole.poses.iter().map(|pose| pose.sigma));
+    let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
     let judgement = Judgement {
         fitting: &fitting,
         start: &start,
         end: &end,
         errors: (&registered, &fitted),
         outliers: &outliers,
-        sigma: (noise_is_declared.then_some(declared_all), taken),
+        whole: &whole,
+        noise_is_declared,
     };
     let quality_flag = judgement.flag(enough.flag, not_converged, enough.poses);
     let cautions = judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
@@ -305,8 +305,8 @@ pub fn identify_model(
         fitted,
         reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
         chance: statistics.chance.filter(|_| noise_is_declared),
-        noise_factor: (taken / declared_all).powi(2),
-        sigma_taken: taken,
+        noise_factor,
+        sigma_taken,
         sigma_scale: fitting.noise_model.scale.min(1.0),
         kinds: fitting.errors_by_kind(&start, &end.x),
         spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
@@ -354,12 +354,6 @@ fn place_held_out(
     enter(results, &stage, &placed, &statistics);
     end.x = placed.x;
     Ok((!placed.termination.converged()).then_some(placed.termination))
-}
-
-/// Root mean square of the σ of some rows.
-fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let n = sigmas.len().max(1) as f64;
-    (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()
 }
 
 /// The loss that `[robust]` stands for, on the three coordinates of a position.

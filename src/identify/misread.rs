@@ -178,8 +178,11 @@ pub(super) fn misreadings(fitting: &Fitting, problem: &Problem, rms: f64) -> Vec
     let rows = fitting.measurements.select(&chosen);
     let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
     let one = |own: Misreading| Some((own, own.rms(fitting, problem, &rows, &split)?));
+    // Contacts with one point agree with every arm that hardly moves.
+    let tells = |own: &Misreading| rows.leading().is_position() || matches!(own, Misreading::Reversed { .. });
     let mut explained: Vec<(Misreading, f64)> = Misreading::all(problem, &rows)
         .into_iter()
+        .filter(tells)
         .filter_map(one)
         .filter(|(_, left)| *left < EXPLAINED * rms)
         .collect();

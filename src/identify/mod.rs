@@ -17,6 +17,7 @@ mod identification;
 mod jacobian;
 mod joint_source;
 mod judgement;
+mod kind;
 mod misread;
 mod noise;
 mod noise_model;
@@ -40,7 +41,7 @@ mod statistics;
 mod strategy;
 mod surroundings;
 
-pub use acceptance::{Acceptance, AcceptancePose, Accuracy, acceptance};
+pub use acceptance::{Acceptance, AcceptancePose, Accuracy, acceptance, held_out_positions};
 pub use active::ActiveConstraint;
 pub use alternation::Alternation;
 pub use applied::{ErrorsBySession, PredictError, Prediction, predict};

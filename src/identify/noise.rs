@@ -12,6 +12,7 @@ use super::statistics::Statistics;
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood, residual_vector};
 use crate::model::Pose;
+use crate::problem::Observation;
 
 /// An undeclared σ has settled when it changes by less than this part.
 const NOISE_SETTLED: f64 = 1e-3;
@@ -138,4 +139,20 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
     let (position, turn) = (mean(sums[0], counts[0]), mean(sums[1], counts[1]));
     let all = mean(sums[0] + sums[1], counts[0] + counts[1]);
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
+}
+
+/// The variance that a stage took over the declared one, and 1 σ of the rows of one kind as it took it; known distances between
+/// points keep the σ that they have.
+pub(super) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
+    let rows = stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
+    let (poses, declared): (Vec<&Pose>, Vec<f64>) = rows.unzip();
+    let all = together(poses.iter().map(|pose| pose.sigma));
+    let own = poses.iter().filter(|pose| pose.observation.kind() == kind.kind()).map(|pose| pose.sigma);
+    ((all / together(declared.into_iter())).powi(2), together(own.collect::<Vec<f64>>().into_iter()))
+}
+
+/// Root mean square of the σ of some rows.
+pub(super) fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = sigmas.len().max(1) as f64;
+    (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()
 }

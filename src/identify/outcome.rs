@@ -109,7 +109,7 @@ pub struct Identification {
     pub chance: Option<(f64, f64)>,
     /// Variance that the fit took over the declared one: 1 where residual and priors do not contradict that.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate that the fit took, of the identification rows together \[m\].
+    /// 1 σ of a coordinate that the fit took, of the identification rows together that errors are told of \[m\]; of tilts \[rad\].
     pub sigma_taken: f64,
     /// By what the declared σ are multiplied because they are too large; 1 where they are not.
     pub sigma_scale: f64,

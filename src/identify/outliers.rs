@@ -52,10 +52,19 @@ pub struct Outlier {
     pub row: usize,
     /// File and line.
     pub location: Location,
+    /// What the row measures ([`Observation::kind`](crate::problem::Observation::kind)).
+    pub kind: &'static str,
     /// Length of the whitened residual in units of the scatter \[σ\].
     pub distance: f64,
-    /// Residual measured − predicted, measuring frame \[m\].
+    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts \[rad\].
     pub error: Vector3<f64>,
+}
+
+impl Outlier {
+    pub(super) fn of(measurements: &Measurements, row: usize, distance: f64, error: Vector3<f64>) -> Self {
+        let kind = measurements.observation(row).kind();
+        Self { row, location: measurements.location(row), kind, distance, error }
+    }
 }
 
 /// Lengths of the whitened residuals of some poses, and what counts as too long.
@@ -110,7 +119,7 @@ impl Lengths {
     pub fn list(&self, rows: &[usize], errors: &[Vector3<f64>], measurements: &Measurements) -> Vec<Outlier> {
         let outlier = |((place, &row), &error): ((usize, &usize), &Vector3<f64>)| {
             let distance = self.outlying(place)?;
-            Some(Outlier { row, location: measurements.location(row), distance, error })
+            Some(Outlier::of(measurements, row, distance, error))
         };
         rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{DVector, Vector3};
 
 use super::Placement;
+use super::kind::{Kind, measured, named, rows, size};
 use super::sizes::largest;
 use crate::least_squares::solver::Termination;
 use crate::model::Model;
@@ -16,6 +17,11 @@ pub(super) const MISSES: f64 = 0.02;
 /// … unless the declared noise is of that size: in units of 1 σ of a position.
 pub(super) const BEYOND_NOISE: f64 = 100.0;
 
+/// A fit that leaves more than this part of what the nominal arm misses by …
+const NO_BETTER: f64 = 0.9;
+/// … and so many σ has not fitted what was measured.
+const FAR_BEYOND_NOISE: f64 = 1000.0;
+
 /// Parameters of an arm that describes the measured one stay within so many σ of their priors: chance takes one in two million
 /// beyond.
 const OUT_OF_PROPORTION: f64 = 5.0;
@@ -23,7 +29,7 @@ const OUT_OF_PROPORTION: f64 = 5.0;
 /// Sizes of what was measured and of what the nominal arm predicts that differ by more than this factor are of two arms.
 const OTHER_SIZE: f64 = 2.0;
 
-/// Points this close together say nothing about the size of an arm \[m\].
+/// Points this close together say nothing about the size of an arm \[m\], and tilts this close together nothing of it \[rad\].
 pub(super) const LEAST_SPREAD: f64 = 0.01;
 
 /// Why a fit is not to be trusted.
@@ -77,24 +83,40 @@ pub enum QualityFlag {
     HeldOutCopied,
     /// Most held-out poses are missed as if they were of another arm.
     HeldOutMisses {
-        /// Median error \[m\].
+        /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)).
+        kind: &'static str,
+        /// Median error \[m\]; of tilts \[rad\].
         median: f64,
-        /// Root mean squared distance of the identification points from their centre \[m\].
+        /// Root mean squared distance of the identification points from their centre \[m\]; of tilts \[rad\].
         spread: f64,
     },
     /// The fitted arm meets held-out poses worse than the registered nominal one.
     HeldOutWorse {
-        /// Root mean squared error of the nominal arm \[m\].
+        /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)).
+        kind: &'static str,
+        /// Root mean squared error of the nominal arm \[m\]; of tilts \[rad\].
         before: f64,
         /// The same of the fitted arm \[m\].
         after: f64,
     },
     /// The fitted arm is far from the measurements.
     Misses {
-        /// Root mean squared error on the identification poses \[m\].
+        /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)).
+        kind: &'static str,
+        /// Root mean squared error on the identification rows \[m\]; of tilts \[rad\].
         rms: f64,
-        /// Root mean squared distance of the measured points from their centre \[m\].
+        /// Root mean squared distance of the measured points, or of the places where others than positions were measured, from
+        /// their centre \[m\]; of tilts \[rad\].
         spread: f64,
+    },
+    /// The fit is as far from what was touched or measured against as the nominal arm is, and far beyond the noise.
+    NoBetter {
+        /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)).
+        kind: &'static str,
+        /// Root mean squared error of the nominal arm on the identification rows \[m\]; of tilts \[rad\].
+        before: f64,
+        /// The same of the fitted arm.
+        after: f64,
     },
 }
 
@@ -136,30 +158,44 @@ impl fmt::Display for QualityFlag {
             Self::HeldOutCopied => {
                 write!(f, "all held-out rows are identification rows again: their errors judge nothing")
             }
-            Self::HeldOutMisses { median, spread } => write!(
+            Self::HeldOutMisses { kind, median, spread } => {
+                let rows = rows(kind);
+                write!(
+                    f,
+                    "half of the held-out {rows} are missed by more than {}, {:.0} % of the spread of the fitted ones; check \
+                     whether these rows belong together, and whether the fitted poses cover them",
+                    size(kind, *median, 1),
+                    100.0 * median / spread
+                )
+            }
+            Self::HeldOutWorse { kind, before, after } => write!(
                 f,
-                "half of the held-out poses are missed by more than {:.1} mm, {:.0} % of the spread of the fitted ones; check \
-                 whether these rows belong together, and whether the fitted poses cover them",
-                median * 1e3,
-                100.0 * median / spread
-            ),
-            Self::HeldOutWorse { before, after } => write!(
-                f,
-                "held-out poses are met worse than by the nominal arm ({:.3} mm rms before, {:.3} mm after); more poses, fewer free \
+                "held-out {} are met worse than by the nominal arm ({} rms before, {} after); more poses, fewer free \
                  parameters or smaller priors are needed",
-                before * 1e3,
-                after * 1e3
+                rows(kind),
+                size(kind, *before, 3),
+                size(kind, *after, 3)
             ),
             Self::HeldOutNotConverged(termination) => write!(f, "the bases of held-out sessions: {termination}"),
             Self::Misses { rms, .. } if !rms.is_finite() => {
                 write!(f, "the fitted arm misses the measurements by more than numbers hold; check their units")
             }
-            Self::Misses { rms, spread } => write!(
+            Self::Misses { kind, rms, spread } => write!(
                 f,
-                "the fitted arm misses the measurements by {:.1} mm, {:.0} % of their spread; check units, signs of \
-                 joints, and whether base and session are declared",
-                rms * 1e3,
-                100.0 * rms / spread
+                "the fitted arm misses the {} by {}, {:.0} % of their spread; check units, signs of joints, and {}",
+                measured(kind),
+                size(kind, *rms, 1),
+                100.0 * rms / spread,
+                named(kind)
+            ),
+            Self::NoBetter { kind, before, after } => write!(
+                f,
+                "the fitted arm misses the {} by {}, the nominal one by {}, both far beyond the declared σ; check units, signs of \
+                 joints, and {}",
+                measured(kind),
+                size(kind, *after, 1),
+                size(kind, *before, 1),
+                named(kind)
             ),
         }
     }
@@ -232,15 +268,49 @@ pub(super) fn spread(placement: &Placement, rows: &[usize], point: impl Fn(usize
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
-/// Whether the fitted arm is far from what was measured, of which `rms` \[m\] is the error and `spread` \[m\] the spread;
-/// `sigma` \[m\] is that of a coordinate, if it was declared.
-pub(super) fn misses(rms: f64, spread: f64, sigma: Option<f64>) -> Option<QualityFlag> {
-    let noise = sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
-    (spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise).then_some(QualityFlag::Misses { rms, spread })
+/// Whether the fitted arm is far from what rows of a kind measured, of which `rms` is the error.
+pub(super) fn misses(kind: &Kind, rms: f64) -> Option<QualityFlag> {
+    let Kind { observation, spread, sigma, .. } = *kind;
+    let noise = sigma.0.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+    let far = spread > LEAST_SPREAD && rms > MISSES * spread && rms > noise;
+    far.then_some(QualityFlag::Misses { kind: observation.kind(), rms, spread })
+}
+
+/// Whether the fit met rows that are no positions no better than the nominal arm, whose errors are `before` and `after`: how far
+/// apart such rows lie may say nothing.
+pub(super) fn no_better(kind: &Kind, before: f64, after: f64) -> Option<QualityFlag> {
+    let Kind { observation, sigma, .. } = *kind;
+    let far = sigma.0.is_some_and(|sigma| after > FAR_BEYOND_NOISE * sigma);
+    (!observation.is_position() && far && after > NO_BETTER * before).then_some(QualityFlag::NoBetter {
+        kind: observation.kind(),
+        before,
+        after,
+    })
 }
 
 /// Whether the points that were measured are of an arm of another size than the nominal one.
 pub(super) fn other_size(measured: f64, expected: f64) -> Option<QualityFlag> {
     let same = (expected / OTHER_SIZE..=expected * OTHER_SIZE).contains(&measured);
     (expected > LEAST_SPREAD && !same).then_some(QualityFlag::OtherSize { measured, expected })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Observation;
+
+    #[test]
+    fn a_fit_that_changes_nothing_far_beyond_the_noise_fits_nothing() {
+        let sigma = Some(5e-5);
+        for (observation, sigma, after, is_flagged) in [
+            (Observation::Point(0), sigma, 0.058, true),
+            (Observation::Point(0), sigma, 0.051, false),
+            (Observation::Point(0), Some(1e-3), 0.058, false),
+            (Observation::Point(0), None, 0.058, false),
+            (Observation::Position, sigma, 0.058, false),
+        ] {
+            let kind = Kind { observation, rows: Vec::new(), spread: 0.0, sigma: (sigma, 1e-3) };
+            assert_eq!(no_better(&kind, 0.06, after).is_some(), is_flagged, "{observation:?} {sigma:?} {after}");
+        }
+    }
 }

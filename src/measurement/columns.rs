@@ -195,6 +195,11 @@ impl Columns {
         if !has_position && (!measured || self.observes()) {
             return self.require_marked(table, problem, measured, near);
         }
+        let named_otherwise = Unit::Length.spellings("x").find_map(|name| near(&name)).is_some();
+        if let (false, Some((place, write))) = (has_position || named_otherwise, self.undeclared(problem, |_| true)) {
+            let name = self.names.get(place).map_or("", String::as_str);
+            return Err(table.column(name).error(InputErrorKind::NotDeclared { write }));
+        }
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             if !self.has(Role::Position(axis)) {
                 return missing(&[name], Unit::Length);
@@ -228,6 +233,12 @@ impl Columns {
         [Role::Point, Role::Anchor, Role::Distance, Role::Surface, Role::Tilt(0), Role::Frame]
             .into_iter()
             .any(|role| self.has(role))
+    }
+
+    /// The place of the first column for which the problem lacks a declaration, of those `chosen`, and what it lacks.
+    pub fn undeclared(&self, problem: &Problem, chosen: impl Fn(usize) -> bool) -> Option<(usize, &'static str)> {
+        let lacking = |(place, name): (usize, &String)| Some((place, Role::undeclared(name, problem)?));
+        self.names.iter().enumerate().filter_map(lacking).find(|&(place, _)| chosen(place))
     }
 
     /// Whether the row that the table is at measures something else than a position.

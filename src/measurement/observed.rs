@@ -94,6 +94,10 @@ pub(super) fn of_row(
         (None, None, Some(place)) => return lone(place, "a frame", "its tilts"),
         (None, None, None) => {}
     }
+    let filled = |place: usize| table.text(place).is_ok_and(|cell| !cell.is_empty());
+    if let (true, Some((place, write))) = (all.is_empty(), columns.undeclared(problem, filled)) {
+        return Err(table.cell_error(place, InputErrorKind::NotDeclared { write }));
+    }
     match all.is_empty() {
         true if measured => Err(table.error(InputErrorKind::NothingMeasured)),
         true => Ok(vec![Observed::position(false)]),

@@ -58,6 +58,19 @@ impl Role {
         self.declared_by().is_none_or(|word| problem.fixtures.iter().any(|own| own.kind.word() == word))
     }
 
+    /// What `problem.toml` lacks for a column of this name to mean anything, if it lacks something.
+    pub fn undeclared(name: &str, problem: &Problem) -> Option<&'static str> {
+        let tilts = name.strip_prefix("tilt_").is_some_and(|rest| rest.starts_with(['x', 'y']));
+        let (role, write) = match name {
+            "point" => (Self::Point, "[[point]]"),
+            "anchor" => (Self::Anchor, "[[anchor]]"),
+            "surface" => (Self::Surface, "[[surface]]"),
+            _ if tilts => (Self::Tilt(0), "tilt_sigma_deg in [data]"),
+            _ => return None,
+        };
+        (!role.is_known_to(problem)).then_some(write)
+    }
+
     /// Whether it says what is measured rather than where or under which conditions.
     pub fn is_observed(self) -> bool {
         self.declared_by().is_some()

@@ -125,7 +125,7 @@ fn score(study: &Study, data: &Data, found: &Identification) -> Score {
             return Score::Failed("not-converged");
         }
         Some(QualityFlag::Misses { .. }) if !found.termination.converged() => return Score::Failed("not-converged"),
-        Some(QualityFlag::Misses { .. }) => return Score::Failed("misses-the-data"),
+        Some(QualityFlag::Misses { .. } | QualityFlag::NoBetter { .. }) => return Score::Failed("misses-the-data"),
         Some(QualityFlag::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
         Some(QualityFlag::BeyondArm { .. }) => return Score::Failed("beyond-the-arm"),
         Some(QualityFlag::OtherSize { .. }) => return Score::Failed("another-size"),

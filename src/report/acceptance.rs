@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::document::{Block, Headline, Table};
+use super::errors::rows_in;
 use super::figures::range;
 use super::identify::{BEFORE, short_mm};
 use super::json::{object, to_text};
@@ -45,7 +46,7 @@ object! {
         solver: &'a str = found.solver.as_str(),
         trusted: bool = found.is_trusted(),
         conditions: Vec<RangeEntry> = conditions(problem, rows, judged).into_iter().map(RangeEntry::of).collect(),
-        identification_rows: usize = found.fitted.identification.n,
+        identification_rows: usize = rows_in(found, |errors| errors.identification),
         held_out_rows: usize = found.fitted.held_out.n,
         poses: usize = judged.poses.len(),
         before: AccuracyEntry = AccuracyEntry::of(&judged.before),
@@ -203,7 +204,7 @@ pub fn acceptance_page(
         Block::Text(format!(
             "Poses {}. Rows that were fitted: {}. {trust}",
             protocol(problem),
-            found.fitted.identification.n
+            rows_in(found, |errors| errors.identification)
         )),
         Block::Table(Table::new(&["held-out poses", "from", "to", "unit"], conditions.collect(), &[0, 3])),
         Block::heading("What it is of"),

@@ -3,11 +3,12 @@
 use super::around::unsteady;
 use super::closed_loop::{called, errors, quality_flag, set_aside, verdict};
 use super::document::{Block, Point};
-use super::errors::{both_parts, shown, unit};
+use super::errors::{both_parts, noun, outlier_size, shown, unit};
 use super::findings;
-use super::identify::{errors_by_axis, headline, noise};
+use super::identify::{errors_by_axis, headline};
+use super::noise::noise;
 use super::parameters::correlated;
-use super::quantity::{counted, mm, number};
+use super::quantity::{counted, number};
 use super::render::text_within;
 use super::unexplained::{place, size_alone};
 use crate::diagnose::{ClosedLoop, Verdict};
@@ -53,8 +54,8 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     }
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|own| {
-        let (n, error) = (counted(found.outliers.len(), "pose"), mm(own.error.norm(), 3));
-        format!("{n} too far off to be noise, the farthest {}: {error} mm", own.location)
+        let n = counted(found.outliers.len(), noun(found));
+        format!("{n} too far off to be noise, the farthest {}: {}", own.location, outlier_size(own))
     }));
     points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
     let unidentifiable = found.identifiability().unidentifiable.len();

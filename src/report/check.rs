@@ -2,6 +2,7 @@
 
 use super::detection;
 use super::document::{Block, Table};
+use super::errors::plural;
 use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{conditioning, unidentifiable};
@@ -23,8 +24,8 @@ object! {
         parameters: Vec<ExpectedEntry<'a>> = check.forecast.expected.iter().map(ExpectedEntry::of).collect(),
         unidentified: Vec<Unidentified<'a>> =
             unidentified(&check.forecast.identifiability, |k| check.forecast.expected[k].name.as_str()),
-        /// Root mean square length of the error of one measured position.
-        noise_mm: f64 = check.noise * 1e3,
+        /// Root mean square length of the error of one position measured with the σ of the poses; of tilts alone none.
+        noise_mm: Option<f64> = check.noise.map(|noise| noise * 1e3),
         prediction: PredictionEntry = PredictionEntry::of(check),
         growth: Vec<StepEntry> = check.growth.steps.iter().map(StepEntry::of).collect(),
         /// Least number of poses that see everything and predict as exactly as one position is measured.
@@ -43,7 +44,7 @@ object! {
         #[serde(flatten)]
         lengths: Lengths = Lengths::of(&check.prediction),
         /// Of measured − predicted there: with the noise of the measurement.
-        held_out_rms_mm: f64 = check.prediction.rms.hypot(check.noise) * 1e3,
+        held_out_rms_mm: Option<f64> = check.noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3),
     }
 }
 object! {
@@ -131,12 +132,28 @@ fn prediction(check: &Check) -> String {
         Elsewhere::Same => "in these very poses (no ranges are known)",
     };
     let Prediction { median, most, rms } = check.prediction;
-    let [median, most, rms, noise, total] =
-        [median, most, rms, check.noise, rms.hypot(check.noise)].map(|own| mm(own, 3));
+    let noise = match check.noise {
+        Some(noise) if positions(check) => format!(
+            "One measured position has {} mm of noise (rms), so held-out errors to expect are {} mm (rms).",
+            mm(noise, 3),
+            mm(rms.hypot(noise), 3)
+        ),
+        Some(noise) => format!(
+            "One position measured with the σ of the {} would have {} mm of noise (rms).",
+            plural(check.noise_of),
+            mm(noise, 3)
+        ),
+        None => "Tilts measure no length to compare that with.".to_owned(),
+    };
+    let [median, most, rms] = [median, most, rms].map(|own| mm(own, 3));
     format!(
-        "The identified arm will predict positions {place} to {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n\
-         One measured position has {noise} mm of noise (rms), so held-out errors to expect are {total} mm (rms)."
+        "The identified arm will predict positions {place} to {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n{noise}"
     )
+}
+
+/// Whether the poses measure positions.
+fn positions(check: &Check) -> bool {
+    check.noise_of == "position"
 }
 
 fn growth(check: &Check) -> Table {
@@ -155,6 +172,10 @@ fn enough(check: &Check) -> String {
         Some(enough) => format!(
             "From {enough} poses on they identify all that such poses can, and predictions are as accurate as one measured position."
         ),
+        None if check.noise.is_none() => {
+            "From how many poses on predictions are accurate enough is not said: nothing measured is a length."
+                .to_owned()
+        }
         None => format!(
             "Even {} poses do not make predictions as accurate as one measured position.",
             check.growth.steps.last().map_or(0, |step| step.poses)

@@ -8,7 +8,8 @@ use super::errors::{
     with_unit,
 };
 use super::figures::{Figure, PlotData};
-use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, size, spread, told, why_not_trusted};
+use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, spread, told, why_not_trusted};
+use super::noise::size;
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};

@@ -5,14 +5,13 @@ use std::borrow::Cow;
 use serde::{Serialize, Serializer};
 
 use super::document::{Block, Headline, Table, code};
-use super::errors::unit;
+use super::errors::{both_parts, held_out_rows, noun, shown, unit};
 use super::figures::{Figure, PlotData};
-use super::identify::{
-    BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder, short_mm, size,
-};
+use super::identify::{BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder};
 use super::json::{Both, object, to_text};
+use super::noise::size;
 use super::paper_tables::{Tables, table_2, table_3, title};
-use super::quantity::{counted, mm, number, or_dash};
+use super::quantity::{counted, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::{Baseline, Comparison, Errors, Identification, SolverChoice};
 use crate::model::Ablation;
@@ -111,8 +110,12 @@ pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     let joint = &comparison.joint;
     let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
-    let mut blocks =
-        vec![Block::lines(format!("{}\n{} to identify, {held_out} held out", problem.title, counted(poses, "pose")))];
+    let parts_of = if of_positions(joint) {
+        format!("{} to identify, {held_out} held out", counted(poses, "pose"))
+    } else {
+        both_parts(joint)
+    };
+    let mut blocks = vec![Block::lines(format!("{}\n{parts_of}", problem.title))];
     blocks.extend(in_the_papers_shape(comparison));
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(strategies(comparison)));
@@ -121,6 +124,11 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     }
     blocks.push(Block::Table(parts(comparison)));
     text(&blocks)
+}
+
+/// Whether every row measures a position.
+fn of_positions(found: &Identification) -> bool {
+    noun(found) == "pose"
 }
 
 /// Tables 2 and 3 from each procedure.
@@ -141,11 +149,14 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
     let head = Headline {
         states: vec![(BEFORE, mean(&joint.registered.held_out)), ("identified", mean(&held_out))],
         unit: unit(&held_out),
-        of: format!("{} held-out poses, everything fitted at once", held_out.n),
+        of: format!(
+            "{}, everything fitted at once",
+            if of_positions(joint) { format!("{} held-out poses", held_out.n) } else { held_out_rows(joint) }
+        ),
         facts: vec![
             poses(joint),
             fitted_parameters(joint),
-            ("Elasticity ignored", format!("{} mm", short_mm(comparison.rigid.fitted.held_out.mean.norm))),
+            ("Elasticity ignored", format!("{} {}", mean(&comparison.rigid.fitted.held_out), unit(&held_out))),
             size("Residual against σ", joint),
         ],
     };
@@ -161,8 +172,10 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         Block::heading("What each part of the elasticity is worth"),
         Block::Figures(vec![Figure::Ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
-        Block::heading("From each procedure, as in tables 2 and 3 and figure 13 of the paper"),
     ];
+    if !comparison.procedures.is_empty() {
+        blocks.push(Block::heading("From each procedure, as in tables 2 and 3 and figure 13 of the paper"));
+    }
     for own in &comparison.procedures {
         blocks.push(Block::Text(format!("{}.", title(own))));
         blocks.extend([Block::Table(table_2(own)), Block::Table(table_3(comparison, own))]);
@@ -179,7 +192,7 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
 
 /// One row for each strategy and solver.
 fn strategies(comparison: &Comparison) -> Table {
-    side_by_side("strategy", fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect())
+    side_by_side(comparison, "strategy", fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect())
 }
 
 /// The same without times, with further errors.
@@ -187,7 +200,10 @@ fn in_full(comparison: &Comparison) -> Table {
     let mut table = untimed(strategies(comparison));
     table.header.extend(["fitted mean", "held out, largest"]);
     for (row, Row { errors, .. }) in table.rows.iter_mut().zip(fits(comparison)) {
-        row.extend([errors.identification.mean.norm, errors.held_out.max.norm].map(|error| mm(error, 4)));
+        row.extend([
+            shown(&errors.identification, errors.identification.mean.norm),
+            shown(&errors.held_out, errors.held_out.max.norm),
+        ]);
     }
     table
 }
@@ -195,11 +211,13 @@ fn in_full(comparison: &Comparison) -> Table {
 /// One row for each part of the elasticity.
 fn parts(comparison: &Comparison) -> Table {
     let row = |(part, found): &(Ablation, Identification)| cells(part.as_str(), &found.into());
-    side_by_side("elasticity", comparison.ablations.iter().map(row).collect())
+    side_by_side(comparison, "elasticity", comparison.ablations.iter().map(row).collect())
 }
 
-fn side_by_side(first: &'static str, rows: Vec<Vec<String>>) -> Table {
-    let header: Vec<&str> = std::iter::once(first).chain(ROWS).collect();
+fn side_by_side(comparison: &Comparison, first: &'static str, rows: Vec<Vec<String>>) -> Table {
+    let is_angle = comparison.joint.fitted.held_out.is_angle();
+    let rest = ROWS.map(|name| if is_angle && name == "rms, mm" { "rms, °" } else { name });
+    let header: Vec<&str> = std::iter::once(first).chain(rest).collect();
     Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }
 }
 
@@ -214,9 +232,9 @@ fn cells(name: &str, fit: &Row) -> Vec<String> {
     vec![
         name.to_owned(),
         fit.solver.to_owned(),
-        mm(fit.errors.held_out.mean.norm, 4),
-        mm(fit.errors.held_out.rms.norm, 4),
-        mm(fit.errors.identification.rms.norm, 4),
+        shown(&fit.errors.held_out, fit.errors.held_out.mean.norm),
+        shown(&fit.errors.held_out, fit.errors.held_out.rms.norm),
+        shown(&fit.errors.identification, fit.errors.identification.rms.norm),
         fit.iterations.to_string(),
         fit.evaluations.to_string(),
         number(fit.seconds * 1e3, 1),

@@ -1,7 +1,7 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
-use super::quantity::{counted, decimals, number};
-use crate::identify::{ErrorSummary, Errors, Identification};
+use super::quantity::{counted, decimals, mm, number};
+use crate::identify::{ErrorSummary, Errors, Identification, Outlier};
 
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
@@ -26,6 +26,23 @@ pub(super) fn in_unit(of: &ErrorSummary, value: f64) -> f64 {
 /// The same with four decimals.
 pub(super) fn shown(of: &ErrorSummary, value: f64) -> String {
     number(in_unit(of, value), 4)
+}
+
+/// The axes along which errors of a kind of rows are told.
+pub(super) fn axes(of: &ErrorSummary) -> usize {
+    match of.kind {
+        "position" | "point" => 3,
+        "tilt" => 2,
+        _ => 0,
+    }
+}
+
+/// The size of an outlier with its unit.
+pub(super) fn outlier_size(of: &Outlier) -> String {
+    match of.kind {
+        "tilt" => format!("{}°", number(of.error.norm().to_degrees(), 4)),
+        _ => format!("{} mm", mm(of.error.norm(), 3)),
+    }
 }
 
 /// The same with its unit.
@@ -82,18 +99,35 @@ pub(super) fn held_out_rows(found: &Identification) -> String {
     counted_rows(found, &found.fitted.held_out, "held-out ")
 }
 
+/// Rows of a kind.
+pub(super) fn plural(kind: &str) -> &'static str {
+    match kind {
+        "point" => "contacts with points",
+        "distance" => "distances",
+        "surface" => "contacts with surfaces",
+        "tilt" => "rows of tilts",
+        _ => "positions",
+    }
+}
+
 /// How many rows of a kind there are, with an adjective that ends in a space.
 fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> String {
     let (one, many) = match of.kind {
-        "point" => ("contact with a point", "contacts with points"),
-        "distance" => ("distance", "distances"),
-        "surface" => ("contact with a surface", "contacts with surfaces"),
-        "tilt" => ("row of tilts", "rows of tilts"),
+        "point" => ("contact with a point", plural(of.kind)),
+        "distance" => ("distance", plural(of.kind)),
+        "surface" => ("contact with a surface", plural(of.kind)),
+        "tilt" => ("row of tilts", plural(of.kind)),
         _ if !found.kinds.is_empty() => ("position", "positions"),
         _ if found.several_targets && adjective.is_empty() => ("point", "points"),
         _ => ("pose", "poses"),
     };
     format!("{} {adjective}{}", of.n, if of.n == 1 { one } else { many })
+}
+
+/// What rows are called where they may be of any kind.
+pub(super) fn noun(found: &Identification) -> &'static str {
+    let positions = found.kinds.is_empty() && found.fitted.identification.kind == "position";
+    if positions { "pose" } else { "row" }
 }
 
 /// How many rows there are of all kinds on one part of the data.

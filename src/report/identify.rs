@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::around::around;
-use super::document::{Block, Headline, Table, first_of};
-use super::errors::{
-    NOMINAL, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted, with_unit,
-};
+use super::document::{Block, Headline, Table};
+use super::errors::{NOMINAL, axes, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted};
 use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
 use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
+use super::noise::{noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
 };
@@ -20,13 +19,10 @@ use super::quantity::{counted, decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
     ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors, Outlier,
-    QualityFlag,
 };
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
 
-/// Outliers that fit on a screen.
-const SHOWN_OUTLIERS: usize = 20;
 /// The file that holds everything.
 const FILE: &str = "estimate.json";
 
@@ -59,7 +55,10 @@ object! {
         },
         chance: Option<[f64; 2]> = found.chance.map(<[f64; 2]>::from),
         noise_factor: f64 = found.noise_factor,
-        sigma_taken_mm: f64 = found.sigma_taken * 1e3,
+        /// Of the kind of rows that errors are told of.
+        sigma_taken_mm: Option<f64> = (!found.fitted.identification.is_angle()).then_some(found.sigma_taken * 1e3),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sigma_taken_deg: Option<f64> = found.fitted.identification.is_angle().then(|| found.sigma_taken.to_degrees()),
         rank: usize = found.identifiability().rank,
         #[serde(flatten)]
         conditioning: Conditioning<'a> = Conditioning::of(found.identifiability(), found.coordinates),
@@ -131,7 +130,10 @@ object! {
         line: Option<usize> = outlier.location.line,
         /// Counted from 1 over all files.
         pose_row: usize = outlier.row + 1,
-        error_mm: f64 = outlier.error.norm() * 1e3,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        error_mm: Option<f64> = (outlier.kind != "tilt").then(|| outlier.error.norm() * 1e3),
+        #[serde(skip_serializing_if = "Option::is_none")]
+        error_deg: Option<f64> = (outlier.kind == "tilt").then(|| outlier.error.norm().to_degrees()),
         sigmas: f64 = outlier.distance,
     }
 }
@@ -249,8 +251,9 @@ fn steps(found: &Identification) -> String {
 
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
-        let values = [of.mean.x, of.mean.y, of.mean.z, of.mean.norm, of.rms.norm, of.max.norm];
-        [vec![poses.to_owned(), when.to_owned()], values.map(|value| shown(of, value)).to_vec()].concat()
+        let axes = &[of.mean.x, of.mean.y, of.mean.z][..axes(of)];
+        let values = axes.iter().chain([&of.mean.norm, &of.rms.norm, &of.max.norm]).map(|value| shown(of, *value));
+        [poses.to_owned(), when.to_owned()].into_iter().chain(values).collect::<Vec<String>>()
     };
     let (before, after) = (&found.registered, &found.fitted);
     let rows = vec![
@@ -259,8 +262,9 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
         row("held out", "before", &before.held_out),
         row("", "after", &after.held_out),
     ];
-    let header =
-        [measure(&found.fitted.held_out), "", "mean x", "mean y", "mean z", "mean norm", "rms norm", "max norm"];
+    let of = &found.fitted.held_out;
+    let sizes = if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
+    let header = [&[measure(of), ""], &["mean x", "mean y", "mean z"][..axes(of)], &sizes].concat();
     let mut table = Table::new(&header, rows, &[0, 1]);
     table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
@@ -348,56 +352,6 @@ pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     blocks
 }
 
-/// How large the residual is against the declared noise.
-pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
-    let of = &found.fitted.identification;
-    match (found.noise, found.reduced_chi2) {
-        (Noise::Estimated(sigma), _) => format!(
-            "No σ is declared; the scatter about the fit gives {} per coordinate, model errors included.",
-            with_unit(of, sigma)
-        ),
-        (Noise::Unknown, _) => {
-            "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors."
-                .to_owned()
-        }
-        (Noise::Declared, Some(_))
-            if found.too_few_poses.is_some()
-                || matches!(found.quality_flag, Some(QualityFlag::TooFewEquations { .. })) =>
-        {
-            "There are not enough different poses to judge the declared σ, or the model.".to_owned()
-        }
-        (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
-        (Noise::Declared, Some(chi2)) if contradicted(found) => {
-            let declared = problem.data.position_sigma.filter(|_| of.kind == "position");
-            let declared = declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, 4)));
-            let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
-            let chance = found.chance.map_or_else(String::new, |(low, high)| {
-                format!("; chance gives {} to {}", number(low, 2), number(high, 2))
-            });
-            let (size, cause) = if found.noise_factor > 1.0 {
-                (format!("{size} times the declared σ{declared}"), "so the model lacks something")
-            } else {
-                (format!("{size} of the declared σ{declared}"), "which is too large")
-            };
-            format!(
-                "Reduced χ² is {}{chance}: the scatter is {size},\n\
-                 {cause}. Fit and standard errors take a σ of {} {}, which residual and priors speak for.",
-                short(chi2),
-                brief(of, found.sigma_taken),
-                unit(of)
-            )
-        }
-        (Noise::Declared, Some(chi2)) => {
-            format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2))
-        }
-    }
-}
-
-/// Whether residual and priors contradict the declared σ.
-pub(super) fn contradicted(found: &Identification) -> bool {
-    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > 1e-9
-}
-
 /// Which of commands and readings of the joints fits better, in one line.
 pub fn joint_sources_text(sources: &JointSources) -> String {
     let JointSources { used, commanded, read } = *sources;
@@ -415,16 +369,6 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
     )
 }
 
-/// Whether a fit leaves more than the declared noise explains.
-pub fn lacks_something(found: &Identification) -> bool {
-    contradicted(found) && found.noise_factor > 1.0
-}
-
-/// A χ² / ν with two decimals, or two digits where it is small.
-fn short(chi2: f64) -> String {
-    number(chi2, decimals(chi2, 6).clamp(2, 6))
-}
-
 /// The constraints that hold parameters back; nothing to say without any.
 fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
     let point = |active: &ActiveConstraint| {
@@ -434,23 +378,6 @@ fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
     let words = "Held by a constraint (standard errors are those along it):".to_owned();
     let points: Vec<String> = found.active_constraints.iter().map(point).collect();
     (!points.is_empty()).then_some(Block::Lines(words, points))
-}
-
-/// Poses whose residual is too long to be noise; nothing to say without any.
-fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> {
-    let treatment = if problem.robust.is_some() {
-        "the robust loss keeps them from ruling the fit"
-    } else {
-        "they count in full; a section [robust] would limit them"
-    };
-    let (n, poses) = (found.outliers.len(), rows_in(found, |errors| errors.identification));
-    let point = |own: &Outlier| {
-        format!("{}: {} mm, {} σ of the scatter", own.location, mm(own.error.norm(), 3), number(own.distance, 1))
-    };
-    let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
-    let are = if n == 1 { "is" } else { "are" };
-    let words = format!("{n} of {} {are} too far off to be noise ({treatment}):", counted(poses, "pose"));
-    (n > 0).then_some(Block::Lines(words, points))
 }
 
 /// A length \[m\] in mm with about three digits.
@@ -480,17 +407,4 @@ pub(super) fn spread(errors: &ErrorSummary) -> String {
     let [rms, max] =
         [errors.rms.norm, errors.max.norm].map(|value| format!("{} {}", brief(errors, value), unit(errors)));
     format!("rms {rms}, largest {max}")
-}
-
-/// How large the residual is, in brief.
-pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
-    let size = match (found.noise, found.reduced_chi2) {
-        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", number(chi2, 2)),
-        (Noise::Estimated(sigma), _) => {
-            let of = &found.fitted.identification;
-            format!("{} {} per coordinate", brief(of, sigma), unit(of))
-        }
-        _ => "not to be judged".to_owned(),
-    };
-    (term, size)
 }

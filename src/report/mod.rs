@@ -25,6 +25,7 @@ mod init;
 mod json;
 mod limits;
 mod loop_json;
+mod noise;
 mod paper_tables;
 mod parameters;
 mod plan;
@@ -52,11 +53,10 @@ pub use export::{ExportErrors, Exported, export_json, export_text};
 pub use figures::{
     Cause, Command, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure,
 };
-pub use identify::{
-    estimate_json, estimate_text, identification_report, joint_sources_text, lacks_something, why_not_trusted,
-};
+pub use identify::{estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted};
 pub use init::{init_json, init_text};
 pub use loop_json::loop_json;
+pub use noise::lacks_something;
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
 pub use predict::{errors_json, prediction_text, predictions_csv};

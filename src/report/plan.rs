@@ -35,7 +35,7 @@ object! {
         gain_over: Vec<&'a str> = plan.meaningful().iter().map(|&k| plan.planned.expected[k].name.as_str()).collect(),
         rank: usize = plan.planned.identifiability.rank,
         #[serde(flatten)]
-        conditioning: Conditioning<'a> = Conditioning::of(&plan.planned.identifiability, 3 * plan.planned.poses),
+        conditioning: Conditioning<'a> = Conditioning::of(&plan.planned.identifiability, plan.coordinates),
         parameters: Vec<PlannedEntry<'a>> =
             plan.planned.expected.iter().enumerate().map(|(k, own)| PlannedEntry::of(own, plan.random_error(k))).collect(),
         unidentified: Vec<Unidentified<'a>> =
@@ -104,7 +104,7 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
         Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])),
     ];
     blocks.extend(gain);
-    blocks.push(conditioning(&planned.identifiability, names.len(), 3 * planned.poses));
+    blocks.push(conditioning(&planned.identifiability, names.len(), plan.coordinates));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
     blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());

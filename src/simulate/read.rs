@@ -12,7 +12,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::item::{Document, Item, join};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
-use crate::problem::{HeldOut, Joint, JointKind, Problem};
+use crate::problem::{HeldOut, Joint, JointKind, Observation, Problem};
 use crate::quantity::Unit;
 
 impl Truth {
@@ -42,10 +42,23 @@ impl Truth {
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
-    let Noise { position: noise_sigma, contacts: contact_sigmas, turn, tilt } =
-        root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
+    let noise = root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;
+    let Noise { position, contacts, turn, tilt, missing } = noise;
+    let things = truth.positions + problem.fixtures.len() + truth.tilts.len();
+    let needed = truth.observations(&problem.fixtures, things.max(1)).into_iter().any(|own| match own {
+        Observation::Point(_) => contacts[0].is_none(),
+        Observation::Distance(_) => contacts[1].is_none(),
+        Observation::Surface(_) => contacts[2].is_none(),
+        Observation::Tilt(_) => false,
+        _ => true,
+    });
+    if let Some(error) = missing.filter(|_| needed) {
+        return Err(error);
+    }
+    let noise_sigma = position.unwrap_or(0.0);
+    let contact_sigmas = contacts.map(|own| own.unwrap_or(noise_sigma));
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
@@ -123,19 +136,21 @@ fn example(joints: &[Joint]) -> String {
 /// `[noise]`.
 #[derive(Default)]
 struct Noise {
-    /// 1 σ of a position \[m\].
-    position: f64,
+    /// 1 σ of a position \[m\], if it is given.
+    position: Option<f64>,
     /// The same of a contact with a point, of a distance, and of a contact with a surface.
-    contacts: [f64; 3],
+    contacts: [Option<f64>; 3],
     /// 1 σ of an orientation \[rad\], if it is given.
     turn: Option<f64>,
     /// 1 σ of a tilt \[rad\], if it is given.
     tilt: Option<f64>,
+    /// What is wrong if positions are measured, or contacts that scatter as they do.
+    missing: Option<InputError>,
 }
 
 /// The section; contacts scatter as positions do where it says nothing else.
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
-    let sigma = section.not_negative("position_sigma", Unit::Length)?;
+    let position = section.not_negative("position_sigma", Unit::Length)?;
     let contact = |section: &mut Section<'_, '_>, base| section.not_negative(base, Unit::Length);
     let contacts = [
         contact(&mut section, "point_sigma")?,
@@ -146,8 +161,8 @@ fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let tilt = section.not_negative("tilt_sigma", Unit::Angle)?;
     section.finish()?;
     let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
-    let position = sigma.ok_or_else(missing)?;
-    Ok(Noise { position, contacts: contacts.map(|own| own.unwrap_or(position)), turn, tilt })
+    let missing = position.is_none().then(missing);
+    Ok(Noise { position, contacts, turn, tilt, missing })
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {

@@ -5,9 +5,10 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use flexcal::design::{self, Candidates, Criterion, PlanOptions};
 use serde_json::Value;
 
-use crate::bench::{ARM, AROUND, Bench, LINE, problem, true_arm};
+use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
 
 /// Runs a command in a folder; what it prints.
 fn run(folder: &Path, command: &str, out: &str, more: &[&str]) -> String {
@@ -217,4 +218,87 @@ fn a_plan_of_contacts_says_what_to_touch() {
         *kinds.entry(told[0]).or_default() += 1;
     }
     assert!(kinds["point"] >= 2 && kinds.values().sum::<usize>() == 60, "{kinds:?}");
+
+    // Contacts with a plane are one number each, tilts two.
+    let problem = problem(AROUND);
+    let rows = read(&problem, &table).measurements;
+    let of_kind = |kind: &str| (0..rows.len()).filter(|&row| rows.observation(row).kind() == kind).collect::<Vec<_>>();
+    for (kind, numbers) in [("surface", 30), ("tilt", 60)] {
+        let candidates = Candidates::Rows(Box::new(rows.select(&of_kind(kind))));
+        let criterion = Criterion::D;
+        let options = PlanOptions { poses: 30, criterion: &criterion, seed: 1, workspace: None, progress: None };
+        assert_eq!(design::plan(&problem, &candidates, None, &options).unwrap().coordinates, numbers, "{kind}");
+    }
+}
+
+/// A problem of the bench in a folder, and so many rows of each of `kinds`.
+fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}files = [\"rows.csv\"]\n")).unwrap();
+    let (arm, _) = true_arm(&problem(AROUND), 3);
+    fs::write(folder.path().join("rows.csv"), Bench::new(arm, 5).table(kinds, rows)).unwrap();
+    folder
+}
+
+/// Pose accuracy is of positions: of nothing else, and of all of them.
+#[test]
+fn positions_alone_are_accepted() {
+    let folder = bench(AROUND, &["point", "plane", "tilt"], 40);
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let refused = flexcal.current_dir(folder.path()).args(["accept", ".", "--out", "out"]).assert().code(2);
+    let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(error.contains("problem.toml:") && error.contains("no held-out row measures a position"), "{error}");
+    assert!(!folder.path().join("out").exists());
+
+    let folder = bench(AROUND, &["position", "plane", "tilt"], 40);
+    let folder = folder.path();
+    run(folder, "identify", "fit", &[]);
+    run(folder, "accept", "signed", &[]);
+    let (estimate, record) = (json(folder, "fit/estimate.json"), json(folder, "signed/acceptance.json"));
+    let kinds = estimate["kinds"].as_array().unwrap();
+    let all: u64 = kinds.iter().map(|own| own["identification"]["n"].as_u64().unwrap()).sum();
+    assert_eq!(record["identification_rows"], all);
+    assert_eq!([&record["poses"], &record["held_out_rows"]], [&estimate["held_out"]["n"]; 2]);
+    let [accepted, fitted] = [&record["after"]["rms_mm"], &estimate["held_out"]["rms_mm"]["norm"]].map(Value::as_f64);
+    assert!((accepted.unwrap() / fitted.unwrap() - 1.0).abs() < 1e-9, "{record}");
+    let page = fs::read_to_string(folder.join("signed/acceptance.html")).unwrap();
+    assert!(page.contains(&format!("Rows that were fitted: {all}.")), "{page}");
+}
+
+/// Lengths and angles have no σ together, rows of one number no axes, and rows without positions no place in figures of positions.
+#[test]
+fn every_kind_is_told_in_its_own_terms() {
+    let small = AROUND.replace("0.05", "0.01").replace("0.002", "0.0004");
+    let folder = bench(&small, &["distance", "tilt"], 60);
+    let folder = folder.path();
+    let told = run(folder, "identify", "fit", &["-v"]);
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("take every declared σ times"), "{told}");
+    assert!(told.contains("distance, mm mean rms max") && !told.contains("mean y"), "{told}");
+    let estimate = json(folder, "fit/estimate.json");
+    let number = |key: &str| estimate[key].as_f64().unwrap();
+    assert!((number("sigma_taken_mm") / 0.01 / number("noise_factor").sqrt() - 1.0).abs() < 1e-6, "{estimate}");
+    let page = fs::read_to_string(folder.join("fit/report.html")).unwrap();
+    assert!(page.contains("no row measures a position") && page.contains("The largest residuals of 60 rows"), "{page}");
+    assert!(!folder.join("fit/figures/residual-vectors.svg").exists());
+
+    // √3 of the σ of distances, which tilts do not blur.
+    let checked = run(folder, "check", "check", &[]);
+    let checked = checked.split_whitespace().collect::<Vec<_>>().join(" ");
+    let words = "One position measured with the σ of the distances would have 0.017 mm of noise (rms).";
+    assert!(checked.contains(words), "{checked}");
+
+    let folder = bench(AROUND, &["point"], 60);
+    let folder = folder.path();
+    run(folder, "identify", "fit", &[]);
+    let page = fs::read_to_string(folder.join("fit/report.html")).unwrap();
+    // The target is at the points, not at the origin; the known distance is no pose.
+    assert_eq!(page.matches(r#""kind":"point""#).count(), 60, "{page}");
+    assert!(!page.contains("known distance\","), "{page}");
+    assert!(page.contains(r#""position":[70"#) || page.contains(r#""position":[69"#), "{page}");
+
+    // The paper's tables are of positions.
+    let compared = run(folder, "compare", "compare", &[]);
+    assert!(!compared.contains("max x") && compared.contains("contacts with points to identify"), "{compared}");
 }

@@ -39,7 +39,8 @@ fn inverse(mut k: u32, base: u32) -> f64 {
 /// Over configurations within the limits of the joints, or where one has none within its measured range.
 pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let all = poses.all(1.0);
-    let fitted: Vec<&Pose> = poses.split.identification.iter().filter_map(|&row| all.get(row)).collect();
+    let of_arm = poses.split.identification.iter().filter_map(|&row| all.get(row));
+    let fitted: Vec<&Pose> = of_arm.filter(|pose| pose.observation.is_of_arm()).collect();
     let Some(&first) = fitted.first() else { return Coverage::default() };
     let ends = |(joint, own): (usize, &crate::problem::Joint)| {
         let measured = range(fitted.iter().map(|pose| pose.setup.configuration[joint]));
@@ -74,7 +75,13 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let bases = arm.model.base_frames(arm.x.as_slice());
     let there = |pose: &&Pose| {
         let own = &bases[pose.base];
-        bases[first.base].point(&own.resolve(&(pose.measured - own.origin)))
+        // A row that measures no position is where the arm has its target.
+        let at = if pose.observation.is_position() {
+            pose.measured
+        } else {
+            arm.model.geometric_positions(&[**pose], arm.x.as_slice())[0]
+        };
+        bases[first.base].point(&own.resolve(&(at - own.origin)))
     };
     let fitted: Vec<Vector3<f64>> = fitted.iter().map(there).collect();
     let covered = |at: &Vector3<f64>| fitted.iter().any(|own| (own - at).norm_squared() <= near * near);

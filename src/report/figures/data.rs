@@ -70,7 +70,8 @@ pub struct PlotData {
     pub stages: Vec<StageErrors>,
     /// What the best leaves, pose by pose, in the order of the rows.
     pub residuals: Vec<PoseError>,
-    /// The rows among them that figures may draw, ascending: all, or evenly many with the largest residuals among them.
+    /// The rows among them that figures may draw, ascending: all in which the target has a place, or evenly many of these with the
+    /// largest residuals among them.
     pub shown: Vec<usize>,
     /// How many rows each of `shown` stands for.
     pub stand_for: Vec<f64>,
@@ -157,21 +158,30 @@ impl PlotData {
             let name = whole.file.file_name().filter(|_| distinct).map(PathBuf::from);
             Location { file: name.unwrap_or_else(|| whole.file.clone()), ..whole }.to_string()
         };
+        let all = poses.all(found.sigma);
+        let targets = best.model.geometric_positions(&all, best.x.as_slice());
+        let bases = best.model.base_frames(best.x.as_slice());
+        // What is missing to a point is told along the axes of the arm's base.
+        let turned = |pose: &Pose, error: Vector3<f64>| match bases.get(pose.base) {
+            Some(base) if pose.observation.is_point() => base.point(&error) - base.origin,
+            _ => error,
+        };
         let residual = |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| PoseError {
             place: place(row),
             configuration: pose.setup.configuration.to_vec(),
             held_out: poses.split.held_out.binary_search(&row).is_ok(),
-            position: pose.measured,
-            error,
-            before,
+            observation: pose.observation,
+            position: if pose.observation.is_position() { pose.measured } else { targets[row] },
+            error: turned(&pose, error),
+            before: turned(&pose, before),
             sigma: pose.sigma,
             time: if measurements.time_measured { pose.setup.time } else { (row + 1) as f64 },
         };
         let errors = poses.errors(best, &rows).into_iter().zip(before);
-        let all = poses.all(found.sigma);
         let residuals: Vec<PoseError> = all.iter().copied().enumerate().zip(errors).map(residual).collect();
         // The few of one kind are not crowded out by the many of the other.
-        let (held_out, fitted): (Vec<usize>, Vec<usize>) = rows.iter().partition(|&&row| residuals[row].held_out);
+        let placed = rows.iter().filter(|&&row| residuals[row].has_place());
+        let (held_out, fitted): (Vec<usize>, Vec<usize>) = placed.partition(|&&row| residuals[row].held_out);
         let few = held_out.len().min(fitted.len()).min(MOST / 2);
         let room = |kind: &[usize]| if kind.len() <= few { few } else { MOST - few };
         let size = |row: usize| residuals[row].error.norm();
@@ -195,6 +205,21 @@ impl PlotData {
             causes: Vec::new(),
             trend: None,
         }
+    }
+
+    /// How many rows could be drawn.
+    pub fn placed(&self) -> usize {
+        self.residuals.iter().filter(|own| own.has_place()).count()
+    }
+
+    /// Whether a row measures a position, along the axes of the measuring frame.
+    pub fn is_position(&self, row: usize) -> bool {
+        self.residuals[row].observation.is_position()
+    }
+
+    /// Whether any row does.
+    pub fn has_positions(&self) -> bool {
+        self.residuals.iter().any(|own| own.observation.is_position())
     }
 
     /// Rows of held-out poses, in the order of the errors of `stages`.

@@ -42,14 +42,26 @@ fn colour(place: usize, count: usize) -> RGBColor {
 }
 
 /// The error of every held-out pose in x, y, z and norm [Chen2021, fig. 13].
-pub fn errors(data: &PlotData) -> Drawing {
-    let rows = data.held_out();
+///
+/// None where no held-out row measures a position.
+pub fn errors(data: &PlotData) -> Option<Drawing> {
+    let all = data.held_out();
+    let places: Vec<usize> = (0..all.len()).filter(|&k| data.is_position(all[k])).collect();
+    let rows: Vec<usize> = places.iter().map(|&k| all[k]).collect();
+    let of_positions = |own: &StageErrors| {
+        let errors = places.iter().filter_map(|&k| own.errors.get(k).copied()).collect();
+        StageErrors { stage: own.stage, errors }
+    };
+    let stages: Vec<StageErrors> = data.stages.iter().map(of_positions).collect();
+    if rows.is_empty() || stages.is_empty() {
+        return None;
+    }
     let known: Vec<usize> = (0..rows.len()).filter(|&k| data.shown.binary_search(&rows[k]).is_ok()).collect();
-    let names: Vec<String> = data.stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
+    let names: Vec<String> = stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect();
     let columns: Vec<&str> = names.iter().map(String::as_str).collect();
-    let errors = |k: usize| data.stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
+    let errors = |k: usize| stages.iter().filter_map(|stage| Some(stage.errors.get(k)?.norm() * 1e3)).collect();
     let sheet = Sheet::of_poses(&columns, known.iter().map(|&k| (&data.residuals[rows[k]], errors(k))));
-    drawn(("held-out-errors", "Error of each held-out pose"), &data.stages, &known, &rows).with(sheet)
+    Some(drawn(("held-out-errors", "Error of each held-out pose"), &stages, &known, &rows).with(sheet))
 }
 
 /// The same of one procedure of a comparison, by its name.

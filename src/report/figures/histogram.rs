@@ -5,6 +5,7 @@ use plotters::style::text_anchor::HPos;
 
 use super::data::PlotData;
 use super::frame::{ACCENT, Axis, Drawing, FAINT, LEFT, Mark, WARM, WIDTH, chart, figure, legend, line, write};
+use super::pose::PoseError;
 use super::sheet::Sheet;
 use crate::numeric::median;
 use crate::report::quantity::fixed;
@@ -14,11 +15,15 @@ const HEIGHT: i32 = 280;
 /// bars.
 const REACH: f64 = 5.0;
 
+/// The numbers that a row measures, in units of σ.
+fn numbers(own: &PoseError) -> impl Iterator<Item = f64> + use<> {
+    (own.error / own.sigma).data.0[0].into_iter().take(own.observation.coordinates())
+}
+
 /// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
 pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
-    let values: Vec<f64> =
-        fitted.flat_map(|residual| (residual.error / residual.sigma).data.0[0]).filter(|v| v.is_finite()).collect();
+    let values: Vec<f64> = fitted.flat_map(numbers).filter(|v| v.is_finite()).collect();
     if values.len() < 3 {
         return None;
     }

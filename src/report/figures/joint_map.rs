@@ -26,7 +26,7 @@ struct Part {
 
 /// Residuals of a joint's ranges, from the lowest to the highest.
 fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
-    let of = || data.residuals.iter().filter(|pose| pose.error.norm().is_finite());
+    let of = || data.residuals.iter().filter(|pose| pose.has_place() && pose.error.norm().is_finite());
     let (low, high) = range(of().map(|pose| pose.configuration[joint]));
     if high - low <= 0.0 || !(high - low).is_finite() {
         return Vec::new();

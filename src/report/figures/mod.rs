@@ -63,8 +63,8 @@ impl Figure<'_> {
     /// Its drawing; nothing where there is too little to draw.
     pub fn draw(&self) -> Option<Drawing> {
         match *self {
-            Self::Errors(data) => Some(errors::errors(data)),
-            Self::Vectors(data) => Some(vectors::vectors(data)),
+            Self::Errors(data) => errors::errors(data),
+            Self::Vectors(data) => vectors::vectors(data),
             Self::Histogram(data) => histogram::histogram(data),
             Self::Order(data) => order::order(data),
             Self::Correlations(data) => correlation::correlation(&data.correlations),

@@ -16,11 +16,12 @@ use super::tags::Tags;
 const MOST: usize = 300;
 const PANEL: i32 = 92;
 
-/// Residual coordinates in the order of time, with the band of ±2 σ.
+/// Residual coordinates of positions in the order of time, with the band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
-    let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
+    let fitted = data.residuals.iter().filter(|residual| !residual.held_out && residual.observation.is_position());
     let (finite, lost): (Vec<&PoseError>, Vec<&PoseError>) = fitted.partition(|own| own.error.norm().is_finite());
-    let is_fitted = |row: &usize| !data.residuals[*row].held_out && data.size(*row).is_finite();
+    let is_fitted =
+        |row: &usize| data.is_position(*row) && !data.residuals[*row].held_out && data.size(*row).is_finite();
     let known: Vec<usize> = data.shown.iter().copied().filter(is_fitted).collect();
     let shown: Vec<(usize, &PoseError)> =
         thin(&known, MOST, |row| data.size(row)).into_iter().map(|row| (row, &data.residuals[row])).collect();

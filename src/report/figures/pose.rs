@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::problem::Observation;
+
 /// A pose and what arms leave of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
@@ -11,9 +13,11 @@ pub struct PoseError {
     pub configuration: Vec<f64>,
     /// Whether it was held out.
     pub held_out: bool,
-    /// Measured position, measuring frame \[m\].
+    /// What was measured.
+    pub observation: Observation,
+    /// Measured position, or where the best arm has its target in a row that measures none, measuring frame \[m\].
     pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame \[m\].
+    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts \[rad\].
     pub error: Vector3<f64>,
     /// The same of the nominal arm, with base and tool fitted where they are free \[m\].
     pub before: Vector3<f64>,
@@ -21,6 +25,13 @@ pub struct PoseError {
     pub sigma: f64,
     /// Time \[s\], or the row's number where no time was measured.
     pub time: f64,
+}
+
+impl PoseError {
+    /// Whether its residual is a length at a place of the target.
+    pub fn has_place(&self) -> bool {
+        self.observation.is_of_arm() && !self.observation.is_angle()
+    }
 }
 
 /// Of those that are drawn, one in so many is there because its value is among the largest.

@@ -21,10 +21,15 @@ const LONG: f64 = 0.09;
 const LEAST: f64 = 150.0;
 const GREATEST: f64 = 330.0;
 
-/// Residuals from above and from the side, at their measured positions.
-pub fn vectors(data: &PlotData) -> Drawing {
-    let count = (0..data.residuals.len()).filter(|&row| data.size(row).is_finite()).count();
-    let finite: Vec<usize> = data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
+/// Residuals from above and from the side, at their measured positions; none where no row measures a position.
+pub fn vectors(data: &PlotData) -> Option<Drawing> {
+    if !data.has_positions() {
+        return None;
+    }
+    let positions: Vec<usize> = (0..data.residuals.len()).filter(|&row| data.is_position(row)).collect();
+    let is_finite = |row: &usize| data.is_position(*row) && data.size(*row).is_finite();
+    let count = positions.iter().filter(|&row| is_finite(row)).count();
+    let finite: Vec<usize> = data.shown.iter().copied().filter(is_finite).collect();
     let shown: Vec<(usize, &PoseError)> =
         thin(&finite, MOST, |row| data.size(row)).into_iter().map(|row| (row, &data.residuals[row])).collect();
     let tags = Tags::of_dots();
@@ -59,13 +64,13 @@ pub fn vectors(data: &PlotData) -> Drawing {
              too long: from above (x, y) and from the side (x, z) of the measuring frame. Neighbours that point alike are \
              structure; a tangle is noise.{}{}",
         short(larger),
-        left_out(data.residuals.len() - count),
+        left_out(positions.len() - count),
         thinned(shown.len(), count)
     );
     let columns = ["x_mm", "y_mm", "z_mm", "residual_x_mm", "residual_y_mm", "residual_z_mm"];
     let row = |(_, own): (usize, &'_ PoseError)| own.position.iter().chain(own.error.iter()).map(|x| x * 1e3).collect();
     let sheet = Sheet::of_poses(&columns, shown.iter().map(|&own| (own.1, row(own))));
-    Drawing::new("residual-vectors", "What is left, over the workspace", caption, tags.put(&svg)).with(sheet)
+    Some(Drawing::new("residual-vectors", "What is left, over the workspace", caption, tags.put(&svg)).with(sheet))
 }
 
 /// 1, 2 or 5 times the power of ten below.

@@ -53,7 +53,7 @@ const flexcal = (() => {
     const pose = byRow.get(row);
     if (panel) {
       panel.hidden = !pose;
-      panel.querySelector("output").textContent = pose ? words(pose) + ". " + joints(pose) + ". Measured at " + pose.position.map((value) => value.toFixed(2).replace("-", "\u2212")).join(", ") + " mm; residual " + pose.after.map(shown).join(", ") + " mm." : "";
+      panel.querySelector("output").textContent = pose ? words(pose) + ". " + joints(pose) + (pose.kind ? ". Target at " : ". Measured at ") + pose.position.map((value) => value.toFixed(2).replace("-", "\u2212")).join(", ") + " mm" + (pose.kind && pose.kind !== "point" ? "." : "; residual " + pose.after.map(shown).join(", ") + " mm.") : "";
     }
     document.querySelectorAll("tr[data-row]").forEach((line) => line.classList.toggle("picked", Number(line.dataset.row) === row));
     tell();

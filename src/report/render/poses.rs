@@ -29,6 +29,9 @@ struct Entry {
     row: usize,
     place: String,
     held_out: bool,
+    /// What was measured, where that is no position.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind: Option<&'static str>,
     /// How many poses it stands for, where not all are there.
     #[serde(skip_serializing_if = "Option::is_none")]
     n: Option<f64>,
@@ -80,6 +83,7 @@ impl Store {
                 row,
                 place: own.place.clone(),
                 held_out: own.held_out,
+                kind: Some(own.observation.kind()).filter(|_| !own.observation.is_position()),
                 n: Some(count).filter(|count| *count > 1.0),
                 q: data
                     .commands
@@ -116,8 +120,13 @@ fn store(data: &PlotData) -> String {
 
 /// The section.
 pub(super) fn section(data: &PlotData) -> Markup {
+    let without = without_positions(data);
+    if data.shown.is_empty() && !without.is_empty() {
+        return html! { p { (without) } };
+    }
     html! {
         h2 { "Pose by pose" }
+        @if !without.is_empty() { p { (without) } }
         p hidden data-script { "Point at a dot of any figure to see which row it is; choose it, here or there, and all figures mark it." }
         (view(data))
         (ranges(data))
@@ -130,6 +139,20 @@ pub(super) fn section(data: &PlotData) -> Markup {
         (largest(data))
         script type="application/json" id="poses" { (PreEscaped(store(data))) }
     }
+}
+
+/// What is not drawn of rows that measure no positions; nothing to say where all do.
+fn without_positions(data: &PlotData) -> String {
+    if data.residuals.iter().all(|own| own.observation.is_position()) {
+        return String::new();
+    }
+    let figures =
+        if data.has_positions() { "show positions alone" } else { "are left out: no row measures a position" };
+    let tilts = if data.residuals.iter().any(|own| own.observation.is_angle()) { "; tilts have no place" } else { "" };
+    format!(
+        "Figures of errors along axes, of residual vectors and of residuals in order {figures}. In the view of the arm, contacts and \
+         distances stand where the fitted arm has its target, those of one number without a stroke{tilts}."
+    )
 }
 
 /// The arm in its poses; shown by the script where there is WebGL. The figure of residual vectors is the same without.
@@ -185,7 +208,8 @@ fn largest(data: &PlotData) -> Markup {
     rows.sort_by(|&a, &b| data.size(b).total_cmp(&data.size(a)));
     rows.truncate(LISTED);
     html! {
-        p { "The largest residuals of " (data.residuals.len()) " poses:" }
+        @let all = data.residuals.iter().all(|own| own.observation.is_position());
+        p { "The largest residuals of " (data.placed()) @if all { " poses:" } @else { " rows:" } }
         div.scroll tabindex="0" role="region" aria-label="The largest residuals" { table.sort {
             thead { tr {
                 th.l { "row" } th.l { "pose" }

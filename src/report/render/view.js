@@ -177,7 +177,7 @@
     if (input("vectors").value !== "none") {
       for (const pose of poses) {
         const vector = before ? pose.before : pose.after;
-        if (vector.every(Number.isFinite)) segment(strokes, pose.position, pose.position, NONE, vector.map((x) => x / unit), [...tone(pose), 0.95], 1.5 * ratio);
+        if ((!pose.kind || pose.kind === "point") && vector.every(Number.isFinite)) segment(strokes, pose.position, pose.position, NONE, vector.map((x) => x / unit), [...tone(pose), 0.95], 1.5 * ratio);
       }
     }
     draw("line", strokes, matrix, lengthen);

@@ -1,0 +1,53 @@
+//! The identification rows of one kind, and the words for them.
+
+use crate::problem::Observation;
+
+/// The identification rows of one kind; lengths \[m\], of tilts angles \[rad\].
+pub(super) struct Kind {
+    pub observation: Observation,
+    pub rows: Vec<usize>,
+    /// Root mean squared distance from their centre: of positions and tilts as they were measured, of others of the places at which
+    /// the nominal arm has its target there.
+    pub spread: f64,
+    /// 1 σ of a number: as declared, if it was, and as the fit took it.
+    pub sigma: (Option<f64>, f64),
+}
+
+/// An error with its unit.
+pub(super) fn size(kind: &str, error: f64, decimals: usize) -> String {
+    if kind == "tilt" {
+        format!("{:.*}°", decimals + 1, error.to_degrees())
+    } else {
+        format!("{:.*} mm", decimals, error * 1e3)
+    }
+}
+
+/// Rows of a kind.
+pub(super) fn rows(kind: &str) -> &'static str {
+    match kind {
+        "point" => "contacts with points",
+        "distance" => "distances",
+        "surface" => "contacts with surfaces",
+        "tilt" => "tilts",
+        _ => "poses",
+    }
+}
+
+/// What rows of a kind measure.
+pub(super) fn measured(kind: &str) -> &'static str {
+    match kind {
+        "position" => "measurements",
+        _ => rows(kind),
+    }
+}
+
+/// Which words of a table are to be checked where rows of a kind are missed.
+pub(super) fn named(kind: &str) -> &'static str {
+    match kind {
+        "point" => "the names in the column point",
+        "distance" => "the names in the column anchor",
+        "surface" => "the names in the column surface",
+        "tilt" => "the names in the column frame",
+        _ => "whether base and session are declared",
+    }
+}
