@@ -1,5 +1,7 @@
 //! How many numbers poses measure.
 
+use std::collections::HashSet;
+
 use crate::measurement::Measurements;
 use crate::problem::Observation;
 
@@ -14,5 +16,6 @@ pub(super) fn coordinates(table: &Measurements, of_position: usize, rows: impl I
 
 /// The first row with each number.
 pub(super) fn first_of_each(numbers: &[usize]) -> Vec<usize> {
-    (0..numbers.len()).filter(|&row| !numbers[..row].contains(&numbers[row])).collect()
+    let mut seen = HashSet::new();
+    (0..numbers.len()).filter(|&row| seen.insert(numbers[row])).collect()
 }

@@ -29,7 +29,7 @@ pub(super) struct Data<'a> {
     /// Effects that are looked for besides those of the catalogue.
     pub candidates: &'a [Effect],
     /// The wish that the search end early.
-    pub stop: Option<Stop>,
+    pub stop: Stop,
 }
 
 impl<'a> Data<'a> {
@@ -46,7 +46,7 @@ impl<'a> Data<'a> {
             block_of[configuration] = place % rules.blocks.min(count.max(1));
         }
         let block = configurations.into_iter().map(|configuration| block_of[configuration]).collect();
-        Self { dataset, measurements, split, rules, setup, block, candidates: &[], stop: None }
+        Self { dataset, measurements, split, rules, setup, block, candidates: &[], stop: Stop::default() }
     }
 
     /// The same with more effects to look for.
@@ -55,13 +55,8 @@ impl<'a> Data<'a> {
     }
 
     /// The same, whose hypotheses are weighed until `stop` asks for the end.
-    pub fn with_stop(self, stop: Option<Stop>) -> Self {
+    pub fn with_stop(self, stop: Stop) -> Self {
         Self { stop, ..self }
-    }
-
-    /// Whether the end was asked for.
-    pub fn is_stopped(&self) -> bool {
-        self.stop.as_ref().is_some_and(Stop::is_requested)
     }
 
     /// The identification rows.

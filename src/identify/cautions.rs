@@ -50,8 +50,7 @@ impl fmt::Display for Caution {
         match self {
             Self::HeldOutOutliers { rows, of } => {
                 let row = |own: &Outlier| {
-                    let most = own.error.amax();
-                    let size = if most < 1e6 { size(own.kind, most, 3) } else { format!("{:.2e} mm", most * 1e3) };
+                    let size = size(own.kind, own.error.amax(), 3);
                     let axis = if matches!(own.kind, "position" | "point") { " along an axis" } else { "" };
                     format!("{} (off by {size}{axis})", own.location)
                 };

@@ -99,7 +99,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// Some rows as poses, with the σ that were declared.
-    fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
+    pub fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }
 
@@ -331,15 +331,6 @@ impl<'a> Fitting<'a> {
             Errors { identification: of(&self.split.identification), held_out: of(&self.split.held_out) }
         };
         Some(OrientationErrors { registered: errors(registered), fitted: errors(fitted), sigma_taken })
-    }
-
-    /// Where the arm at the full parameter vector `x` has its target in some rows, measuring frame \[m\]; NaN where it has no
-    /// equilibrium.
-    pub fn targets(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
-        let (bases, poses) = (self.model.base_frames(x.as_slice()), self.poses(rows));
-        let points = self.model.points(&poses, x.as_slice());
-        let lost = nalgebra::Vector3::from_element(f64::NAN);
-        poses.iter().zip(points).map(|(pose, at)| at.map_or(lost, |at| bases[pose.base].point(&at))).collect()
     }
 
     /// Residuals measured − predicted of some rows, measuring frame \[m\].

@@ -102,7 +102,8 @@ impl Judgement<'_> {
         let (places, rows): (Vec<usize>, Vec<usize>) =
             split.identification.iter().copied().enumerate().filter(|&(_, row)| is_own(row)).unzip();
         let measured = observation.is_position() || observation.is_angle();
-        let at = if measured { Vec::new() } else { self.fitting.targets(&rows, self.start) };
+        let places_of = || self.fitting.model.target_places(&self.fitting.poses(&rows), self.start.as_slice());
+        let at = if measured { Vec::new() } else { places_of() };
         let point = |place: usize| if measured { measurements.positions[rows[place]] } else { at[place] };
         let declared = together(places.iter().map(|&place| self.whole.declared[place]));
         let taken = together(places.iter().map(|&place| self.whole.poses[place].sigma));

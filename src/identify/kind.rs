@@ -13,22 +13,25 @@ pub(super) struct Kind {
     pub sigma: (Option<f64>, f64),
 }
 
-/// An error with its unit.
-pub(super) fn size(kind: &str, error: f64, decimals: usize) -> String {
-    if kind == "tilt" {
-        format!("{:.*}°", decimals + 1, error.to_degrees())
-    } else {
-        format!("{:.*} mm", decimals, error * 1e3)
+/// From here on lengths are written with a power of ten \[m\].
+const HUGE: f64 = 1e6;
+
+/// An error with its unit: of tilts \[rad\] with a decimal more, of others \[m\].
+pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
+    match kind {
+        "tilt" => format!("{:.*}°", decimals + 1, error.to_degrees()),
+        _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
+        _ => format!("{:.2e} mm", error * 1e3),
     }
 }
 
 /// Rows of a kind.
-pub(super) fn rows(kind: &str) -> &'static str {
+pub(crate) fn rows(kind: &str) -> &'static str {
     match kind {
         "point" => "contacts with points",
         "distance" => "distances",
         "surface" => "contacts with surfaces",
-        "tilt" => "tilts",
+        "tilt" => "rows of tilts",
         _ => "poses",
     }
 }
@@ -37,6 +40,7 @@ pub(super) fn rows(kind: &str) -> &'static str {
 pub(super) fn measured(kind: &str) -> &'static str {
     match kind {
         "position" => "measurements",
+        "tilt" => "tilts",
         _ => rows(kind),
     }
 }

@@ -54,6 +54,7 @@ pub use errors::{AxisValues, ErrorSummary, Errors, OrientationErrors};
 pub use identification::{IdentifyError, Options, identify, identify_model};
 pub use jacobian::jacobian;
 pub use joint_source::{JointSources, joint_sources};
+pub(crate) use kind::{rows as rows_of_kind, size as size_of_kind};
 pub use misread::Misreading;
 pub use outcome::{Estimate, Identification, Noise, STRONG_CORRELATION};
 pub use outliers::Outlier;

@@ -96,7 +96,7 @@ pub enum QualityFlag {
         kind: &'static str,
         /// Root mean squared error of the nominal arm \[m\]; of tilts \[rad\].
         before: f64,
-        /// The same of the fitted arm \[m\].
+        /// The same of the fitted arm.
         after: f64,
     },
     /// The fitted arm is far from the measurements.

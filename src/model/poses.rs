@@ -237,6 +237,14 @@ impl Model {
         poses.iter().zip(self.frames(poses, x)).map(shape).collect()
     }
 
+    /// Where the arm has its target in each pose at the full parameter vector `x`, whatever was measured of it, measuring frame \[m\]; NaN
+    /// without equilibrium. What effects do to the measurement is not in them.
+    pub(crate) fn target_places(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+        let (bases, points) = (self.base_frames(x), self.points(poses, x));
+        let lost = Vector3::from_element(f64::NAN);
+        poses.iter().zip(points).map(|(pose, at)| at.map_or(lost, |at| bases[pose.base].point(&at))).collect()
+    }
+
     /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.
     ///
     /// What effects do to the measurement is not in them.

@@ -3,7 +3,7 @@
 use super::around::unsteady;
 use super::closed_loop::{called, errors, quality_flag, set_aside, verdict};
 use super::document::{Block, Point};
-use super::errors::{both_parts, noun, outlier_size, shown, unit};
+use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
 use super::identify::{errors_by_axis, headline};
 use super::noise::noise;
@@ -12,7 +12,7 @@ use super::quantity::{counted, number};
 use super::render::text_within;
 use super::unexplained::{place, size_alone};
 use crate::diagnose::{ClosedLoop, Verdict};
-use crate::identify::{Estimate, Identification};
+use crate::identify::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
 
 /// Lines of a screen, less those that say where results are and what to do next.
@@ -55,7 +55,11 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|own| {
         let n = counted(found.outliers.len(), noun(found));
-        format!("{n} too far off to be noise, the farthest {}: {}", own.location, outlier_size(own))
+        format!(
+            "{n} too far off to be noise, the farthest {}: {}",
+            own.location,
+            size_of_kind(own.kind, own.error.norm(), 3)
+        )
     }));
     points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
     let unidentifiable = found.identifiability().unidentifiable.len();

@@ -2,13 +2,13 @@
 
 use super::detection;
 use super::document::{Block, Table};
-use super::errors::plural;
 use super::forecast::{ExpectedEntry, assumptions, cells};
 use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
 use crate::design::{Check, Elsewhere, GrowthStep, Prediction};
+use crate::identify::rows_of_kind;
 use crate::problem::Problem;
 
 object! {
@@ -140,7 +140,7 @@ fn prediction(check: &Check) -> String {
         ),
         Some(noise) => format!(
             "One position measured with the σ of the {} would have {} mm of noise (rms).",
-            plural(check.noise_of),
+            rows_of_kind(check.noise_of),
             mm(noise, 3)
         ),
         None => "Tilts measure no length to compare that with.".to_owned(),

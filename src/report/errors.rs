@@ -1,7 +1,7 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
-use super::quantity::{counted, decimals, mm, number};
-use crate::identify::{ErrorSummary, Errors, Identification, Outlier};
+use super::quantity::{counted, decimals, number};
+use crate::identify::{ErrorSummary, Errors, Identification, rows_of_kind};
 
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
@@ -34,14 +34,6 @@ pub(super) fn axes(of: &ErrorSummary) -> usize {
         "position" | "point" => 3,
         "tilt" => 2,
         _ => 0,
-    }
-}
-
-/// The size of an outlier with its unit.
-pub(super) fn outlier_size(of: &Outlier) -> String {
-    match of.kind {
-        "tilt" => format!("{}°", number(of.error.norm().to_degrees(), 4)),
-        _ => format!("{} mm", mm(of.error.norm(), 3)),
     }
 }
 
@@ -99,24 +91,14 @@ pub(super) fn held_out_rows(found: &Identification) -> String {
     counted_rows(found, &found.fitted.held_out, "held-out ")
 }
 
-/// Rows of a kind.
-pub(super) fn plural(kind: &str) -> &'static str {
-    match kind {
-        "point" => "contacts with points",
-        "distance" => "distances",
-        "surface" => "contacts with surfaces",
-        "tilt" => "rows of tilts",
-        _ => "positions",
-    }
-}
-
 /// How many rows of a kind there are, with an adjective that ends in a space.
 fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> String {
+    let many = rows_of_kind(of.kind);
     let (one, many) = match of.kind {
-        "point" => ("contact with a point", plural(of.kind)),
-        "distance" => ("distance", plural(of.kind)),
-        "surface" => ("contact with a surface", plural(of.kind)),
-        "tilt" => ("row of tilts", plural(of.kind)),
+        "point" => ("contact with a point", many),
+        "distance" => ("distance", many),
+        "surface" => ("contact with a surface", many),
+        "tilt" => ("row of tilts", many),
         _ if !found.kinds.is_empty() => ("position", "positions"),
         _ if found.several_targets && adjective.is_empty() => ("point", "points"),
         _ => ("pose", "poses"),

@@ -1,9 +1,9 @@
 //! How large the residual of a fit is against the declared σ, and which rows are beyond it.
 
 use super::document::{Block, first_of};
-use super::errors::{brief, noun, outlier_size, rows_in, unit, with_unit};
+use super::errors::{brief, noun, rows_in, unit, with_unit};
 use super::quantity::{counted, decimals, mm, number};
-use crate::identify::{Identification, Noise, Outlier, QualityFlag};
+use crate::identify::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
 use crate::problem::Problem;
 
 /// Outliers that fit on a screen.
@@ -86,7 +86,12 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     let (n, all) = (found.outliers.len(), rows_in(found, |errors| errors.identification) + known);
     let point = |own: &Outlier| {
         let known = if own.kind == "known distance" { " (known distance)" } else { "" };
-        format!("{}{known}: {}, {} σ of the scatter", own.location, outlier_size(own), number(own.distance, 1))
+        format!(
+            "{}{known}: {}, {} σ of the scatter",
+            own.location,
+            size_of_kind(own.kind, own.error.norm(), 3),
+            number(own.distance, 1)
+        )
     };
     let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
     let are = if n == 1 { "is" } else { "are" };

@@ -11,41 +11,18 @@ use crate::bench::read;
 
 /// Four joints whose hand is set into two sockets and on a table.
 const IN_SOCKETS: &str = "name = 'in sockets'
-[[joint]]
-d_m = 0.5
-[[joint]]
-alpha_deg = -90
-a_m = 0.05
-[[joint.body]]
-mass_kg = 6
-com_m = [0.2, 0, 0]
-[[joint]]
-a_m = 0.5
-[[joint.body]]
-mass_kg = 4
-com_m = [0.2, 0, 0]
-[[joint]]
-alpha_deg = -90
-a_m = 0.4
-[[joint.body]]
-mass_kg = 1
-com_m = [0.05, 0, 0]
-[[joint]]
-kind = 'fixed'
-xyz_m = [0, -0.1, 0]
-rpy_deg = [90, 0, 0]
+joint = [
+  { d_m = 0.5 },
+  { alpha_deg = -90, a_m = 0.05, body = [{ mass_kg = 6, com_m = [0.2, 0, 0] }] },
+  { a_m = 0.5, body = [{ mass_kg = 4, com_m = [0.2, 0, 0] }] },
+  { alpha_deg = -90, a_m = 0.4, body = [{ mass_kg = 1, com_m = [0.05, 0, 0] }] },
+  { kind = 'fixed', xyz_m = [0, -0.1, 0], rpy_deg = [90, 0, 0] },
+]
+point = [{ name = 'left' }, { name = 'right' }]
+distance = [{ between = ['left', 'right'], mm = 300 }]
+surface = [{ name = 'table', kind = 'plane' }]
 [tool]
 target_m = [0.03, 0.01, 0.05]
-[[point]]
-name = 'left'
-[[point]]
-name = 'right'
-[[distance]]
-between = ['left', 'right']
-mm = 300
-[[surface]]
-name = 'table'
-kind = 'plane'
 [parameters]
 'joint*.*' = { sigma_deg = 0.5, sigma_mm = 2.0 }
 'tool.*' = { sigma_mm = 100.0 }
@@ -101,7 +78,11 @@ fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
         assert_eq!(closure.effects.len(), 1, "{seed}: {:?}", closure.effects);
         let found = &closure.effects[0];
         let (law, own) = (found.claims.as_ref().unwrap().law.1, found.effect.name_and_place());
-        println!("{seed}: {own} {law:.3}");
+        let share = 1.0 / (1 + found.alternatives.len()) as f64;
+        println!("{seed}: {own} {law:.3}, an even share {share:.3}");
+        // What is held is the most probable, and has more than its even share: two rigidities, a compliance and a stiffness that changes
+        // do nearly as well.
+        assert!(law > share, "{seed}: {own} {law}, {:?}", found.alternatives);
         assert!(law > 0.3 && !(law >= 0.9 && own != "joint-compliance 2"), "{seed}: {own} {law}");
     }
 }

@@ -333,7 +333,7 @@ fn blocks(
         }
         Block::new(design, &neighbourhood, candidate.ln_prior, coefficients)
     };
-    let unless_stopped = |candidate: &&Candidate| (!data.is_stopped()).then(|| of_candidate(candidate));
+    let unless_stopped = |candidate: &&Candidate| (!data.stop.is_requested()).then(|| of_candidate(candidate));
     let blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
@@ -360,7 +360,7 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| of(k).effect().is_some_and(is_added)).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
     let weighted = search(&blocks, &target, data.rules, &present);
-    if data.is_stopped() {
+    if data.stop.is_requested() {
         return None;
     }
     for Weighted { members, sizes, probability } in weighted.into_iter().filter(|set| set.probability > NEGLIGIBLE) {

@@ -17,13 +17,7 @@ pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
     /// The wish that the search end early.
-    pub stop: Option<Stop>,
-}
-
-impl Target {
-    fn is_stopped(&self) -> bool {
-        self.stop.as_ref().is_some_and(Stop::is_requested)
-    }
+    pub stop: Stop,
 }
 
 /// A set of hypotheses, and its probability among all sets looked at.
@@ -121,7 +115,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             let tried: Vec<usize> = promising.as_ref().filter(|_| place > 0).map_or_else(all, Vec::clone);
             let gains: Vec<(usize, (f64, f64))> = tried
                 .into_par_iter()
-                .filter(|block| !set.members.contains(block) && !target.is_stopped())
+                .filter(|block| !set.members.contains(block) && !target.stop.is_requested())
                 .map(|block| (block, conditioned.gain(&blocks[block], target, rules)))
                 .collect();
             for (block, gain) in gains {

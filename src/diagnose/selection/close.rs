@@ -125,7 +125,8 @@ pub fn close_by(
     rules.check()?;
     // What was found is finished in any case: the search alone is stopped.
     let data = Data::new(data, rules).with_candidates(&options.candidates);
-    let (hurried, unhurried) = (data.clone().with_stop(options.stop.clone()), options.clone().with_stop(None));
+    let (hurried, unhurried) =
+        (data.clone().with_stop(options.stop.clone().unwrap_or_default()), options.clone().with_stop(None));
     // Evidence is of positions: so are the fits.
     let first = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&first, &data);

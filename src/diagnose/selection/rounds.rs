@@ -69,7 +69,7 @@ impl<'a> Rounds<'a> {
     /// Weighs what may explain the residual of the fit that was taken last; `None` where it is not a finite number.
     pub fn weigh(&mut self, fitted: &Fitted) -> Result<Option<Evidence>, IdentifyError> {
         let evidence = weigh(fitted, self.data, &self.added(fitted));
-        if self.data.is_stopped() {
+        if self.data.stop.is_requested() {
             return Err(IdentifyError::interrupted());
         }
         self.known.clone_from(&evidence);

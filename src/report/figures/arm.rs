@@ -49,6 +49,17 @@ impl<'a> Poses<'a> {
         self.placement.poses(self.measurements, &self.rows(), sigma)
     }
 
+    /// Where some poses were measured, or where an arm has its target in those that measure no position, measuring frame \[m\].
+    pub fn places(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
+        let (others, places): (Vec<Pose>, Vec<usize>) =
+            poses.iter().copied().zip(0..).filter(|(pose, _)| !pose.observation.is_position()).unzip();
+        let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.measured).collect();
+        for (place, target) in places.into_iter().zip(arm.model.target_places(&others, arm.x.as_slice())) {
+            at[place] = target;
+        }
+        at
+    }
+
     /// Errors measured − predicted of some rows, measuring frame \[m\].
     pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)

@@ -40,8 +40,8 @@ fn inverse(mut k: u32, base: u32) -> f64 {
 pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let all = poses.all(1.0);
     let of_arm = poses.split.identification.iter().filter_map(|&row| all.get(row));
-    let fitted: Vec<&Pose> = of_arm.filter(|pose| pose.observation.is_of_arm()).collect();
-    let Some(&first) = fitted.first() else { return Coverage::default() };
+    let fitted: Vec<Pose> = of_arm.filter(|pose| pose.observation.is_of_arm()).copied().collect();
+    let Some(first) = fitted.first() else { return Coverage::default() };
     let ends = |(joint, own): (usize, &crate::problem::Joint)| {
         let measured = range(fitted.iter().map(|pose| pose.setup.configuration[joint]));
         match own.commanded() {
@@ -73,17 +73,11 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
             .sqrt();
     // Sessions have measuring frames of their own.
     let bases = arm.model.base_frames(arm.x.as_slice());
-    let there = |pose: &&Pose| {
+    let there = |(pose, at): (&Pose, Vector3<f64>)| {
         let own = &bases[pose.base];
-        // A row that measures no position is where the arm has its target.
-        let at = if pose.observation.is_position() {
-            pose.measured
-        } else {
-            arm.model.geometric_positions(&[**pose], arm.x.as_slice())[0]
-        };
         bases[first.base].point(&own.resolve(&(at - own.origin)))
     };
-    let fitted: Vec<Vector3<f64>> = fitted.iter().map(there).collect();
+    let fitted: Vec<Vector3<f64>> = fitted.iter().zip(Poses::places(arm, &fitted)).map(there).collect();
     let covered = |at: &Vector3<f64>| fitted.iter().any(|own| (own - at).norm_squared() <= near * near);
     let uncovered: Vec<Vector3<f64>> = positions.iter().filter(|at| !covered(at)).copied().collect();
     Coverage { uncovered, tried: positions.len(), near }

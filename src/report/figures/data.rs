@@ -159,7 +159,7 @@ impl PlotData {
             Location { file: name.unwrap_or_else(|| whole.file.clone()), ..whole }.to_string()
         };
         let all = poses.all(found.sigma);
-        let targets = best.model.geometric_positions(&all, best.x.as_slice());
+        let places = Poses::places(best, &all);
         let bases = best.model.base_frames(best.x.as_slice());
         // What is missing to a point is told along the axes of the arm's base.
         let turned = |pose: &Pose, error: Vector3<f64>| match bases.get(pose.base) {
@@ -171,7 +171,7 @@ impl PlotData {
             configuration: pose.setup.configuration.to_vec(),
             held_out: poses.split.held_out.binary_search(&row).is_ok(),
             observation: pose.observation,
-            position: if pose.observation.is_position() { pose.measured } else { targets[row] },
+            position: places[row],
             error: turned(&pose, error),
             before: turned(&pose, before),
             sigma: pose.sigma,
