@@ -130,6 +130,10 @@ pub struct SelectionRules {
     pub slow_length: f64,
     /// Highest order of what nearly repeats in a turn of a joint: as that of harmonics.
     pub near_orders: u32,
+    /// Highest order of a wave that is looked for, whole number or not: about the teeth of a strain-wave gear, twice its ratio.
+    pub wave_orders: f64,
+    /// ln of the odds to a whole number, or to an order that was taken before, from which on the order of a wave is another one: 20 to 1.
+    pub another_order: f64,
     /// Seed of what is random: blocks, permutations, resamples, telling poses.
     pub seed: u64,
 }
@@ -193,6 +197,8 @@ impl SelectionRules {
         surface_length: 0.4,
         slow_length: 0.5,
         near_orders: 60,
+        wave_orders: 320.0,
+        another_order: 3.0,
         seed: 20_211_206,
     };
 
@@ -249,6 +255,8 @@ impl SelectionRules {
             ("smooth_lengths", self.smooth_lengths.iter().all(|&length| size(length))),
             ("surface_length", size(self.surface_length)),
             ("slow_length", size(self.slow_length)),
+            ("wave_orders", size(self.wave_orders)),
+            ("another_order", size(self.another_order)),
         ];
         rules.into_iter().find(|(_, holds)| !holds).map_or(Ok(()), |(rule, _)| Err(IdentifyError::Rule { rule }))
     }

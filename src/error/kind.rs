@@ -179,6 +179,8 @@ pub enum InputErrorKind {
     NotOnePlace,
     #[error("no order; write at least one, as in [1]")]
     NoOrders,
+    #[error("{order} is no order; write a number of cycles a revolution, above 0 and up to {highest}")]
+    NotAnOrder { order: f64, highest: f64 },
     #[error("order {order} stands twice")]
     RepeatedOrder { order: u32 },
     #[error("declared already on line {line}")]

@@ -85,6 +85,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::LoadedSide { joint, .. }
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
+        | Driver::Wave { joint, .. }
         | Driver::Spline { of: Quantity::Command(joint), .. }
         | Driver::Bump { of: Quantity::Command(joint), .. }
         | Driver::Step { of: Quantity::Command(joint), .. } => joint < joints,

@@ -10,6 +10,8 @@ use crate::quantity::Unit;
 
 /// Most orders of one effect.
 const MOST_ORDERS: usize = 100;
+/// Highest order of a wave: beyond it commands to a hundredth of a degree tell no phase.
+const HIGHEST_ORDER: f64 = 1e4;
 
 /// Where something of the arm moves with a covariate: a joint, from 1, or the base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,8 +33,8 @@ pub enum Argument {
     Orders(Vec<u32>),
     /// Name of a beam, or the place of a custom effect.
     Name(String),
-    /// A time \[s\].
-    Time(f64),
+    /// A time \[s\], or the order of a wave.
+    Number(f64),
     /// The base, `true`.
     Base(bool),
 }
@@ -52,18 +54,18 @@ impl Argument {
             }
             Self::Name(name) => quoted(name),
             Self::Base(there) => there.to_string(),
-            // A time is a float, whatever its value.
-            Self::Time(time) if time.fract() == 0.0 => format!("{time:.1}"),
-            Self::Time(time) => time.to_string(),
+            // A float, whatever its value.
+            Self::Number(number) if number.fract() == 0.0 => format!("{number:.1}"),
+            Self::Number(number) => number.to_string(),
         }
     }
 
     /// Its part of the place of an effect: orders have none.
-    pub(super) fn place(&self) -> Option<String> {
+    pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),
             Self::Name(name) => Some(name.clone()),
-            Self::Time(time) => Some(time.to_string()),
+            Self::Number(number) => Some(number.to_string()),
             Self::Base(_) => Some("base".to_owned()),
             Self::Orders(_) => None,
         }
@@ -98,8 +100,8 @@ impl From<&Mount> for Argument {
 }
 
 impl From<&f64> for Argument {
-    fn from(time: &f64) -> Self {
-        Self::Time(*time)
+    fn from(number: &f64) -> Self {
+        Self::Number(*number)
     }
 }
 
@@ -197,6 +199,17 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         if orders.is_empty() { Err(item.error(InputErrorKind::NoOrders)) } else { Ok(orders) }
     }
 
+    /// An order of a wave, above zero: cycles a revolution.
+    pub fn order(&mut self, key: &str) -> Result<f64, InputError> {
+        let item = self.section.require(key, &format!("{key} = 7.5, cycles a revolution"))?;
+        let order = item.number()?;
+        if order > 0.0 && order <= HIGHEST_ORDER {
+            Ok(order)
+        } else {
+            Err(item.error(InputErrorKind::NotAnOrder { order, highest: HIGHEST_ORDER }))
+        }
+    }
+
     /// A time \[s\]; its key ends in the unit.
     pub fn time(&mut self, key: &str) -> Result<f64, InputError> {
         let base = key.strip_suffix("_s").unwrap_or(key);
@@ -273,5 +286,10 @@ impl<'s> Examples<'s> {
 
     pub fn duration(&self) -> String {
         self.time()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn order(&self) -> String {
+        "7.5".to_owned()
     }
 }

@@ -96,6 +96,8 @@ effects! {
     JointCompliance "joint-compliance" { joint: usize = any_joint }
     /// Δθ = Σₖ aₖ sin kθ + bₖ cos kθ, with θ = q as commanded.
     JointHarmonic "joint-harmonic" { joint: usize = moving_joint, orders: Vec<u32> = orders }
+    /// Δθ = a sin kθ + b cos kθ of an order k that need be no whole number, with θ = q as commanded.
+    JointWave "joint-wave" { joint: usize = moving_joint, order: f64 = order }
     /// Δθ = ε θ, with θ = q as commanded.
     GearRatio "gear-ratio" { joint: usize = moving_joint }
     /// Δθ = (b/2)·approach; without directions of approach the moment decides.

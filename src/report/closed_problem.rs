@@ -166,7 +166,7 @@ fn arguments(effect: &Effect) -> Value {
             Argument::Joint(joint) => whole(joint),
             Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
             Argument::Name(name) => Value::from(name),
-            Argument::Time(time) => Value::from(time),
+            Argument::Number(number) => Value::from(number),
             Argument::Base(there) => Value::from(there),
         };
         (key, value)

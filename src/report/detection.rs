@@ -80,7 +80,7 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut places: Vec<String> = Vec::new();
     let rows = own.iter().filter(|(effect, _)| {
         // Times of a shift are not places.
-        let place = if effect.effect.is_searched() { String::new() } else { effect.effect.place() };
+        let place = effect.effect.name_and_place();
         let new = !places.contains(&place);
         places.push(place);
         new

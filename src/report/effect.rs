@@ -126,6 +126,7 @@ fn group(members: &[Effect]) -> String {
     }
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
+        Effect::JointWave { joint, order } => format!("{joint} (order {order})"),
         Effect::StationShift { at_time } => format!("{at_time} s"),
         Effect::TrackerSettling { time_constant } => format!("{time_constant} s"),
         other => other.place(),

@@ -29,6 +29,9 @@ impl Rig {
                         wave[0] * sin + wave[1] * cos
                     })
                     .sum(),
+                (Effect::JointWave { joint, order }, [a, b]) if *joint == number => {
+                    a * (q * order).sin() + b * (q * order).cos()
+                }
                 (Effect::GearRatio { joint }, [error]) if *joint == number => error * q,
                 (Effect::Backlash { joint }, [width]) if *joint == number => {
                     0.5 * width

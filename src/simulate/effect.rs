@@ -99,6 +99,7 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             .iter()
             .flat_map(|order| ["sin", "cos"].map(|wave| (format!("{wave}{order}"), coordinate(joint))))
             .collect(),
+        Effect::JointWave { joint, .. } => named(&[("sin", coordinate(joint)), ("cos", coordinate(joint))]),
         Effect::JointCompliance { .. } => named(&[("compliance", Unit::Compliance)]),
         Effect::GearRatio { .. } | Effect::HoistForce | Effect::TrackerScale => named(&[("error", Unit::Ratio)]),
         Effect::Backlash { joint } => named(&[("width", coordinate(joint))]),

@@ -11,6 +11,7 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
     vec![
         (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
         (Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::JointWave { joint: 3, order: 7.37 }, vec![2e-4, -1e-4]),
         (Effect::GearRatio { joint: 3 }, vec![4e-4]),
         (Effect::Backlash { joint: 3 }, vec![5e-4]),
         (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),

@@ -34,6 +34,7 @@ pub fn odd() -> (Problem, Vec<Strong>) {
     let all = vec![
         (Effect::JointCompliance { joint: 2 }, vec![1e-5]),
         (Effect::JointHarmonic { joint: 4, orders: vec![1, 7] }, vec![1e-4, 2e-4, 3e-4, 4e-4]),
+        (Effect::JointWave { joint: 4, order: 12.5 }, vec![2e-4, -3e-4]),
         (Effect::GearRatio { joint: 4 }, vec![4e-3]),
         (Effect::Backlash { joint: 4 }, vec![5e-4]),
         (Effect::Backlash { joint: 5 }, vec![5e-4]),

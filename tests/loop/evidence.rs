@@ -10,7 +10,7 @@ use flexcal::diagnose::{Evidence, Hypothesis, Law, Verdict, WitnessVerdict, clos
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::monte_carlo::table;
-use flexcal::problem::Problem;
+use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::{Truth, simulate};
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -46,10 +46,16 @@ fn stated(evidence: &Evidence) -> Vec<String> {
 }
 
 /// Families that hold a cause of the cases outside the catalogue, switched off.
-const UNKNOWN: &str = "'frame-strain*' = { fixed = true }\n'payload-backlash*' = { fixed = true }\n'tracker-settling*' = { fixed = true }\n";
+const UNKNOWN: &str = "'frame-strain*' = { fixed = true }\n'payload-backlash*' = { fixed = true }\n'tracker-settling*' = { fixed = true }\n\
+                       'joint-wave*' = { fixed = true }\n";
 /// The causes that they hold.
-const BY_NOW: [(&str, &str); 3] =
-    [("out-frame", "frame-strain"), ("out-payload", "payload-backlash"), ("out-settling", "tracker-settling")];
+const BY_NOW: [(&str, &str); 4] = [
+    ("out-frame", "frame-strain"),
+    ("out-payload", "payload-backlash"),
+    ("out-settling", "tracker-settling"),
+    // Beyond the harmonics that are listed.
+    ("out-order-100", "joint-harmonic"),
+];
 
 #[test]
 fn causes_outside_the_catalogue_are_located_and_get_no_law() {
@@ -237,6 +243,34 @@ fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
             .for_each(|bar| *bar = ((*bar - 100.0) / 20.0).powi(3));
         let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
         assert_eq!(stated(&evidence), Vec::<String>::new(), "{:?}", evidence.best());
+    }
+}
+
+#[test]
+fn waves_are_named_with_their_orders_and_whole_numbers_are_harmonics() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let truth = truth.split("[[effect]]").next().unwrap();
+    for (effect, waves, order) in [
+        ("joint-wave = { joint = 1, order = 6.4 }", "sin_deg = 0.012\ncos_deg = -0.008", 6.4),
+        ("joint-wave = { joint = 2, order = 81.7 }", "sin_deg = -0.004\ncos_deg = 0.012", 81.7),
+        ("joint-harmonic = { joint = 1, orders = [6] }", "sin6_deg = 0.012\ncos6_deg = -0.008", 6.0),
+        ("joint-harmonic = { joint = 2, orders = [160] }", "sin160_deg = -0.004\ncos160_deg = 0.012", 160.0),
+    ] {
+        let text = format!("{truth}\n[[effect]]\n{effect}\n{waves}\n");
+        let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 80, 5).unwrap().rows;
+        let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+        let evidence =
+            trace(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap().evidence.unwrap();
+        assert_eq!(stated(&evidence), [effect.split(' ').next().unwrap()], "{:?}", evidence.best());
+        let found = match evidence.best()[0].effect().unwrap() {
+            Effect::JointWave { order, .. } => *order,
+            Effect::JointHarmonic { orders, .. } => f64::from(orders[0]),
+            _ => f64::NAN,
+        };
+        assert!((found - order).abs() < 0.1, "{found}, not {order}");
     }
 }
 

@@ -141,6 +141,7 @@ fn every_effect_has_its_arguments() {
     let effects = [
         ("joint-compliance = { joint = 1 }", Effect::JointCompliance { joint: 1 }),
         ("joint-harmonic = { joint = 2, orders = [1, 3] }", Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }),
+        ("joint-wave = { joint = 1, order = 7.37 }", Effect::JointWave { joint: 1, order: 7.37 }),
         ("gear-ratio = { joint = 1 }", Effect::GearRatio { joint: 1 }),
         ("backlash = { joint = 1 }", Effect::Backlash { joint: 1 }),
         ("joint-nonlinear-stiffness = { joint = 1 }", Effect::JointNonlinearStiffness { joint: 1 }),

@@ -63,6 +63,36 @@ const NOISE_ALONE: f64 = 3.0;
 /// A contact that decides a command no better than by this \[rad or m\] decides none.
 const DECIDES: f64 = 0.02;
 
+/// Columns of an effect at the first poses, `weighed` ones, of one length, and the root mean square displacements, in units of σ, that the
+/// largest plausible values of its parameters cause: of several units, each alone moves the poses as much as the others.
+pub(super) fn even(
+    mut columns: DMatrix<f64>,
+    terms: &[Term],
+    weighed: usize,
+    rules: &SelectionRules,
+) -> (DMatrix<f64>, Vec<f64>) {
+    let mut largest = Vec::new();
+    for (k, mut column) in columns.column_iter_mut().enumerate() {
+        let length = column.rows(0, 3 * weighed).norm();
+        let most = terms.get(k).map_or(f64::INFINITY, |term| rules.plausible * term.size);
+        largest.push(if length > 0.0 { most * length / ((3 * weighed) as f64).sqrt() } else { NOTHING });
+        if length > 0.0 {
+            column /= length;
+        }
+    }
+    (columns, largest)
+}
+
+/// Whether it is a wave of any order: of that family no list holds all, so that each has its own chance, whichever others are looked at.
+pub(super) fn is_wave(effect: &Effect) -> bool {
+    matches!(effect, Effect::JointWave { .. })
+}
+
+/// Joints that a command turns.
+pub(super) fn turning(problem: &Problem) -> f64 {
+    problem.joints.iter().filter(|joint| joint.commanded() == JointKind::Revolute).count().max(1) as f64
+}
+
 const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
 /// Everything that may explain a residual.
@@ -83,14 +113,15 @@ pub(super) struct Columns<'a, 'l> {
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Effects with their columns and functions of unknown law, or those of one hypothesis alone; and the covariates of those functions.
+    /// Effects with their columns and functions of unknown law, or those of one hypothesis alone; the covariates of those functions; and ln
+    /// of the chance of a family of effects.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
         (time_measured, rules, weighed): (bool, &'a SelectionRules, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
-    ) -> (Vec<Candidate>, Vec<Known>) {
+    ) -> (Vec<Candidate>, Vec<Known>, f64) {
         let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Self { problem, linearised, time_measured, rules, weighed, only, candidates, shares, covariates };
         all.effects(effects);
@@ -137,25 +168,16 @@ impl<'a, 'l> Columns<'a, 'l> {
         let (tries, _) = tries(&only);
         let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
         for ((effect, columns), tries) in effects.iter().zip(tries) {
-            let mut columns = columns.clone();
             let terms = effect.terms(self.problem);
-            let mut largest = Vec::new();
-            // Parameters of several units: each alone moves the poses as much as the others.
-            for (k, mut column) in columns.column_iter_mut().enumerate() {
-                let length = column.rows(0, 3 * self.weighed).norm();
-                let most = terms.get(k).map_or(f64::INFINITY, |term| self.rules.plausible * term.size);
-                largest.push(if length > 0.0 { most * length / ((3 * self.weighed) as f64).sqrt() } else { NOTHING });
-                if length > 0.0 {
-                    column /= length;
-                }
-            }
+            let (columns, largest) = even(columns.clone(), &terms, self.weighed, self.rules);
             let hypothesis = Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
             let coefficients = Coefficients {
                 never_negative: terms.iter().map(|term| term.never_negative).collect(),
                 alone: acts_along_axes(&terms),
                 largest,
             };
-            self.entered(effect.name(), 1.0 / tries, hypothesis, Design::Dense(columns), coefficients);
+            let joints = if is_wave(effect) { turning(self.problem) } else { 1.0 };
+            self.entered(effect.name(), 1.0 / (tries * joints), hypothesis, Design::Dense(columns), coefficients);
         }
     }
 
@@ -428,7 +450,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// The candidates with their prior probabilities: odds of one to two for each further hypothesis, then equal chances for all families and,
     /// but for harmonics, all members of a family.
-    fn weighted(self) -> (Vec<Candidate>, Vec<Known>) {
+    fn weighted(self) -> (Vec<Candidate>, Vec<Known>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
             if let Some((_, _, sum)) = families.iter_mut().find(|(known, ..)| *known == family.as_str()) {
@@ -443,8 +465,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
             let own = families.iter().find(|(known, ..)| *known == family.as_str());
             let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
+            let sum = if candidate.hypothesis.effect().is_some_and(is_wave) { 1.0 } else { sum };
             candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
         }
-        (candidates, self.covariates)
+        (candidates, self.covariates, -(2.0 * all.max(1.0)).ln())
     }
 }

@@ -23,6 +23,10 @@ pub(in crate::diagnose) struct Hypotheses<'a> {
     /// Their columns among those of the fit.
     pub unknowns: Vec<usize>,
     pub(super) all: Vec<Candidate>,
+    /// Poses, the first ones, that hypotheses are weighed on.
+    pub(super) weighed: usize,
+    /// ln of the chance of a family of effects.
+    pub(super) ln_family: f64,
     covariates: Vec<Known>,
 }
 
@@ -39,16 +43,16 @@ impl<'a> Hypotheses<'a> {
         let new = candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.chain(new).collect();
         let how = (data.measurements.time_measured, data.rules, weighed);
-        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &effects, None);
-        Self { linearised, added, unknowns, all, covariates }
+        let (all, covariates, ln_family) = Columns::all(&fitted.problem, &linearised, how, &effects, None);
+        Self { linearised, added, unknowns, all, weighed, ln_family, covariates }
     }
 
     /// The functions of one hypothesis alone, about what the whole fit leaves.
     pub fn only(fitted: &'a Fitted, data: &Data<'a>, rows: &[usize], weighed: usize, of: &Hypothesis) -> Self {
         let linearised = fitted.linearised_with(data, rows, &[], &slots(&fitted.problem));
         let how = (data.measurements.time_measured, data.rules, weighed);
-        let (all, covariates) = Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
-        Self { linearised, added: Vec::new(), unknowns: Vec::new(), all, covariates }
+        let (all, covariates, ln_family) = Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
+        Self { linearised, added: Vec::new(), unknowns: Vec::new(), all, weighed, ln_family, covariates }
     }
 
     /// The function of a hypothesis that an explanation holds.
@@ -87,6 +91,11 @@ impl<'a> Hypotheses<'a> {
             Some((*shape, Candidate { hypothesis: hypothesis.clone(), variant: 0, design, ln_prior, coefficients }))
         };
         shapes.iter().filter_map(one).collect()
+    }
+
+    /// A covariate at every pose.
+    pub(super) fn known(&self, covariate: &Covariate) -> Option<&Known> {
+        self.covariates.iter().find(|known| known.covariate == *covariate)
     }
 
     /// The covariates that a hypothesis depends on.

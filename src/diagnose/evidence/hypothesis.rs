@@ -83,10 +83,12 @@ pub enum Law {
 }
 
 impl Law {
-    /// Whether it is the same law: of an effect that is searched at whatever time.
+    /// Whether it is the same law: of an effect whose time or order is searched with whatever one.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Effect(own), Self::Effect(other)) if own.is_searched() => own.name() == other.name(),
+            (Self::Effect(own), Self::Effect(other)) if own.is_searched() => {
+                own.name_and_place() == other.name_and_place()
+            }
             _ => self == other,
         }
     }
@@ -150,9 +152,11 @@ fn covariate(
 ) -> Covariate {
     let time = Covariate::of(Quantity::Elapsed, problem, time_measured);
     match driver {
-        Driver::Command(joint) | Driver::Travel(joint) | Driver::Sine(joint, _) | Driver::Cosine(joint, _) => {
-            Covariate::Command(joint)
-        }
+        Driver::Command(joint)
+        | Driver::Travel(joint)
+        | Driver::Sine(joint, _)
+        | Driver::Cosine(joint, _)
+        | Driver::Wave { joint, .. } => Covariate::Command(joint),
         Driver::Warming { .. } => Covariate::Temperature,
         Driver::Elapsed | Driver::Since(_) | Driver::Settling(_) => time,
         Driver::Covariate(which) => Covariate::own(which, problem),

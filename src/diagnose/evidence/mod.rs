@@ -14,6 +14,7 @@ mod hypothesis;
 mod marginal;
 mod sag;
 mod search;
+mod waves;
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -23,6 +24,7 @@ use rayon::prelude::*;
 use super::covariate::Covariate;
 use super::data::{Data, bits, number};
 use super::fitted::Fitted;
+use super::neighbourhood::LinearNeighbourhood;
 use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
@@ -324,16 +326,9 @@ fn blocks(
         return None;
     }
     let is_declared = fitted.found.noise == Noise::Declared;
-    let of_candidate = |candidate: &&Candidate| {
-        let design = candidate.design.clone().without(left_out);
-        let mut coefficients = candidate.coefficients.clone();
-        if !is_declared {
-            // A σ from a residual that holds the effect says nothing of how large that is.
-            coefficients.largest.fill(f64::INFINITY);
-        }
-        Block::new(design, &neighbourhood, candidate.ln_prior, coefficients)
+    let unless_stopped = |candidate: &&Candidate| {
+        (!data.stop.is_requested()).then(|| block(candidate, (fitted, &neighbourhood), left_out))
     };
-    let unless_stopped = |candidate: &&Candidate| (!data.stop.is_requested()).then(|| of_candidate(candidate));
     let blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
@@ -348,18 +343,37 @@ fn blocks(
     Some((blocks, Target { fit: neighbourhood, noise, stop: data.stop.clone() }))
 }
 
+/// A hypothesis with everything that is fitted projected out, some poses left out.
+fn block(candidate: &Candidate, (fitted, neighbourhood): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Block {
+    let design = candidate.design.clone().without(left_out);
+    let mut coefficients = candidate.coefficients.clone();
+    if fitted.found.noise != Noise::Declared {
+        // A σ from a residual that holds the effect says nothing of how large that is.
+        coefficients.largest.fill(f64::INFINITY);
+    }
+    Block::new(design, neighbourhood, candidate.ln_prior, coefficients)
+}
+
 /// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.
 ///
 /// `None` where the residual is not a finite number, as that of a pose without equilibrium, or the end was asked for.
 pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let rows = data.weighed();
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), &[])?;
-    let is_added = |effect: &Effect| hypotheses.added.contains(effect);
-    let of = |k: usize| &hypotheses.all[k].hypothesis;
-    let present: Vec<usize> = (0..blocks.len()).filter(|&k| of(k).effect().is_some_and(is_added)).collect();
+    let mut hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let (mut blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), &[])?;
+    let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
+    let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    let weighted = search(&blocks, &target, data.rules, &present);
+    let mut weighted = search(&blocks, &target, data.rules, &present);
+    let of_wave = |wave: &Candidate| block(wave, (fitted, &target.fit), &[]);
+    let how = (&fitted.problem, data.rules);
+    let waves = waves::promising(&hypotheses, &weighted, (&mut blocks, &target), of_wave, how);
+    if !waves.is_empty() {
+        blocks.extend(waves.iter().map(of_wave));
+        hypotheses.all.extend(waves);
+        weighted = search(&blocks, &target, data.rules, &present);
+    }
+    let of = |k: usize| &hypotheses.all[k].hypothesis;
     if data.stop.is_requested() {
         return None;
     }

@@ -6,16 +6,18 @@ use super::family::{Candidate, Family, Term, USUAL};
 use super::{
     backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
     hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance,
-    joint_nonlinear_stiffness, joint_thermal_drift, link_bending, link_thermal_bending, link_thermal_expansion,
-    payload_backlash, payload_mass, station_shift, tracker_drift, tracker_scale, tracker_settling, unmodelled_mass,
+    joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending, link_thermal_bending,
+    link_thermal_expansion, payload_backlash, payload_mass, station_shift, tracker_drift, tracker_scale,
+    tracker_settling, unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 25] = [
+pub const FAMILIES: [&Family; 26] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
+    &joint_wave::FAMILY,
     &gear_ratio::FAMILY,
     &backlash::FAMILY,
     &payload_backlash::FAMILY,
@@ -96,15 +98,17 @@ impl Effect {
         by_row.unwrap_or_else(|| self.describe())
     }
 
-    /// Name and place for people; without the place where that is a time that is searched.
+    /// Name and place for people; without what is searched, as a time.
     pub fn name_and_place(&self) -> String {
-        let place = if self.family().is_searched { String::new() } else { self.place() };
+        let searched = self.family().searched;
+        let known = self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
+        let place = known.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",");
         if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
     }
 
-    /// Whether its place is a time that is searched: two of its family are the same effect at another time.
+    /// Whether an argument of it is searched, as a time: those that [`Self::name_and_place`] calls the same are one effect.
     pub fn is_searched(&self) -> bool {
-        self.family().is_searched
+        self.family().searched.is_some()
     }
 
     /// How often chance has a try at it: one over the share of its family's chance, whose `members` are the candidates.

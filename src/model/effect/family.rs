@@ -30,8 +30,9 @@ pub struct Family {
     pub function_of: fn(&Effect) -> Option<(usize, usize)>,
     /// The column without which an effect cannot be fitted, if measurements with these columns lack it, as a message names it.
     pub missing_column: fn(&Effect, &Problem, Columns) -> Option<&'static str>,
-    /// Whether its place is a time that is searched: several of the family are then one effect that is not yet placed.
-    pub is_searched: bool,
+    /// The key of an argument that is searched, as a time: those of the family that differ in nothing else are one effect that is not yet
+    /// found.
+    pub searched: Option<&'static str>,
 }
 
 /// A family about which there is nothing special to say.
@@ -47,7 +48,7 @@ pub(super) const USUAL: Family = Family {
     covers: |one, other| one == other,
     function_of: |_| None,
     missing_column: |_, _, _| None,
-    is_searched: false,
+    searched: None,
 };
 
 /// A parameter of an effect.

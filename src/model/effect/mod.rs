@@ -28,6 +28,7 @@ mod joint_harmonic;
 mod joint_lateral_compliance;
 mod joint_nonlinear_stiffness;
 mod joint_thermal_drift;
+mod joint_wave;
 mod link_bending;
 mod link_thermal_bending;
 mod link_thermal_expansion;

@@ -24,6 +24,6 @@ pub(super) const FAMILY: Family = Family {
         Effect::StationShift { at_time } => Some(format!("the measuring station moved after row {}", at_time.ceil())),
         _ => None,
     },
-    is_searched: true,
+    searched: Some("at_time_s"),
     ..USUAL
 };

@@ -43,7 +43,7 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => None,
     },
-    is_searched: true,
+    searched: Some("time_constant_s"),
     ..USUAL
 };
 

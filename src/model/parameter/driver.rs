@@ -20,6 +20,15 @@ pub enum Driver {
     Sine(usize, u32),
     /// cos kq.
     Cosine(usize, u32),
+    /// sin(kq + φ) of an order k that need be no whole number.
+    Wave {
+        /// The joint.
+        joint: usize,
+        /// k, cycles a revolution.
+        order: f64,
+        /// φ \[rad\].
+        phase: f64,
+    },
     /// Temperature above the reference \[K\].
     Warming {
         /// T₀ [°C].
@@ -109,6 +118,7 @@ impl Driver {
             Self::Command(joint) | Self::Travel(joint) => setup.configuration[joint],
             Self::Sine(joint, order) => (f64::from(order) * setup.configuration[joint]).sin(),
             Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
+            Self::Wave { joint, order, phase } => (order * setup.configuration[joint] + phase).sin(),
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
@@ -139,6 +149,9 @@ impl Driver {
             Self::Command(own) | Self::Travel(own) if own == joint => 1.0,
             Self::Sine(own, k) if own == joint => order(k) * (order(k) * setup.configuration[joint]).cos(),
             Self::Cosine(own, k) if own == joint => -order(k) * (order(k) * setup.configuration[joint]).sin(),
+            Self::Wave { joint: own, order, phase } if own == joint => {
+                order * (order * setup.configuration[joint] + phase).cos()
+            }
             Self::Spline { of: Quantity::Command(own), begin, step } if own == joint => {
                 cubic_slope((setup.configuration[joint] - begin) / step) / step
             }
@@ -156,7 +169,7 @@ impl Driver {
     /// Whether it depends on what the joints are told.
     pub fn follows_commands(self) -> bool {
         match self {
-            Self::Command(_) | Self::Travel(_) | Self::Sine(..) | Self::Cosine(..) => true,
+            Self::Command(_) | Self::Travel(_) | Self::Sine(..) | Self::Cosine(..) | Self::Wave { .. } => true,
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
                 matches!(of, Quantity::Command(_))
             }
@@ -265,6 +278,7 @@ mod tests {
             Driver::Travel(0),
             Driver::Sine(1, 3),
             Driver::Cosine(1, 2),
+            Driver::Wave { joint: 1, order: 2.43, phase: 0.7 },
             Driver::Elapsed,
             Driver::Spline { of, begin: -1.0, step: 0.7 },
             Driver::Spline { of: Quantity::Payload, begin: -1.0, step: 0.7 },

@@ -200,7 +200,7 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
         levers.iter().zip(&rows.own).map(|(lever, own)| along(lever, own)).collect()
     };
     let (joint, across, x, levers, law): (_, _, Vec<f64>, _, Law) = match *found {
-        Effect::JointHarmonic { joint, .. } | Effect::GearRatio { joint } => {
+        Effect::JointHarmonic { joint, .. } | Effect::JointWave { joint, .. } | Effect::GearRatio { joint } => {
             (joint, Quantity::command(problem, joint), commands(joint), lever(joint), of_command)
         }
         Effect::JointCoupling { joint, from } => {

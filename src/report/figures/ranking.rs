@@ -30,6 +30,7 @@ fn named(found: &Effect, trace: &Trace) -> String {
     match found {
         Effect::StationShift { at_time } if trace.time_measured => format!("{name} {at_time:.0} s"),
         Effect::StationShift { at_time } => format!("{name} row {}", at_time.ceil()),
+        Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
         Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
         _ if place.is_empty() => name.to_owned(),
         _ => format!("{name} {place}{orders}"),

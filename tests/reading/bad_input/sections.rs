@@ -182,7 +182,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 27] = [
+    let effects: [(&str, &[&str]); 30] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
@@ -196,6 +196,9 @@ fn effects() {
         ("unmodelled-mass = { link = 'A' }", &[":4: effect[1].unmodelled-mass.link: no beam is called \"A\""]),
         ("joint-harmonic = { joint = 1, orders = [] }", &[":4: effect[1].joint-harmonic.orders: no order"]),
         ("joint-harmonic = { joint = 1, orders = [0] }", &[":4: effect[1].joint-harmonic.orders[1]: 0 is not"]),
+        ("joint-wave = { joint = 1, order = 0 }", &[":4: effect[1].joint-wave.order: 0 is no order"]),
+        ("joint-wave = { joint = 1, order = 1e9 }", &[":4: effect[1].joint-wave.order: 1000000000 is no order"]),
+        ("joint-wave = { joint = 1 }", &[":4: effect[1].joint-wave.order: missing"]),
         ("joint-harmonic = { joint = 1, orders = [1, 1] }", &[":4: effect[1].joint-harmonic.orders[2]: order 1"]),
         (
             "joint-harmonic = { joint = 1, order = 1 }",
