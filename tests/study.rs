@@ -391,6 +391,15 @@ fn a_folder_without_a_study_is_told_where_to_read() {
 }
 
 #[test]
+fn a_study_of_contacts_is_refused() {
+    let bench = Bench::new();
+    fs::write(bench.path("problem.toml"), format!("{ARM}[[point]]\nname = 'left'\n")).unwrap();
+    let assert = bench.flexcal(&["study", "."]).code(2);
+    let message = text(&assert.get_output().stderr);
+    assert!(message.contains("STUDY.toml:3: problem: a study draws and fits positions"), "{message}");
+}
+
+#[test]
 fn bad_studies_are_named_and_leave_nothing_behind() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("seed = 7", "sed = 7", &["seed", "missing", "(is it sed?)"]),

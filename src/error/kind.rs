@@ -26,6 +26,10 @@ pub enum InputErrorKind {
     StudyMissing,
     #[error("no such file: {}; paths are relative to the study's folder", path.display())]
     StudyFileMissing { path: PathBuf },
+    #[error(
+        "a study draws and fits positions; this problem measures points, distances or surfaces: `simulate` and `identify` do"
+    )]
+    StudyOfContacts,
     #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]

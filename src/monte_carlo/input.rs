@@ -16,7 +16,11 @@ pub(super) fn problem_of(item: &Item<'_, '_>, folder: &Path) -> Result<(Problem,
         file.push("problem.toml");
     }
     let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
-    Ok((Problem::parse(&document.text, &file)?, document.text.to_string(), file))
+    let problem = Problem::parse(&document.text, &file)?;
+    if !problem.fixtures.is_empty() {
+        return Err(item.error(InputErrorKind::StudyOfContacts));
+    }
+    Ok((problem, document.text.to_string(), file))
 }
 
 /// A file that the study names.
