@@ -8,6 +8,7 @@ use nalgebra::DVector;
 use serde::Deserialize;
 
 use super::Strategy;
+use crate::error::one_line;
 use crate::files::at_most;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
@@ -102,11 +103,15 @@ impl SavedEstimate {
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
         let file = file.to_owned();
-        let Document { problem, arm_digest, strategy, trusted, estimated_sigma_mm, first_time_s, parameters } =
+        let Document { problem, arm_digest, strategy, trusted, estimated_sigma_mm, first_time_s, mut parameters } =
             match serde_json::from_str(text) {
                 Ok(document) => document,
                 Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
             };
+        let problem = one_line(&problem);
+        for own in &mut parameters {
+            own.name = one_line(&own.name);
+        }
         let mut names = HashSet::new();
         for Entry { name, nominal, estimate } in &parameters {
             if !names.insert(name.as_str()) {

@@ -1,10 +1,11 @@
 //! Each reader of the library on mutations of its corpus: it accepts them, or says what is wrong on one line.
 
+use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use flexcal::error::{InputError, is_hidden};
-use flexcal::identify::{Options, identify};
+use flexcal::identify::{Options, PredictError, SavedEstimate, identify, predict};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::Arm;
 use flexcal::model::Model;
@@ -21,15 +22,25 @@ use super::mutation::mutated;
 /// Mutations of each file of the corpus in the short run.
 const SHORT: u64 = 100;
 
+/// What a reader says of a text.
+type Said = Result<(), Box<dyn Error>>;
 /// A reader, by the name of its folder in the corpus.
-type Target = (&'static str, fn(&[u8], &Bench) -> Result<(), InputError>);
-const TARGETS: [Target; 6] =
-    [("problem", problem), ("table", table), ("truth", truth), ("study", study), ("targets", targets), ("urdf", urdf)];
+type Target = (&'static str, fn(&[u8], &Bench) -> Said);
+const TARGETS: [Target; 7] = [
+    ("problem", problem),
+    ("table", table),
+    ("truth", truth),
+    ("study", study),
+    ("targets", targets),
+    ("estimate", estimate),
+    ("urdf", urdf),
+];
 
 /// A folder to put files in, and an arm for what is read against one.
 struct Bench {
     folder: tempfile::TempDir,
     arm: Problem,
+    rows: Measurements,
 }
 
 impl Bench {
@@ -39,7 +50,9 @@ impl Bench {
             fs::write(folder.path().join(name), text).unwrap();
         }
         let arm = Problem::read(folder.path()).unwrap();
-        Self { folder, arm }
+        let table = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/table/elastic.csv");
+        let (rows, _) = Measurements::read(&[table], &arm).unwrap();
+        Self { folder, arm, rows }
     }
 
     fn file(&self, name: &str, text: &[u8]) -> PathBuf {
@@ -49,40 +62,52 @@ impl Bench {
     }
 }
 
-fn problem(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+fn problem(text: &[u8], bench: &Bench) -> Said {
     let problem = Problem::read(&bench.file("arm.toml", text))?;
     let _ = (problem.digest(), Model::new(&problem, &[String::new()], &[String::new()])?);
     Ok(())
 }
 
-fn table(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+fn table(text: &[u8], bench: &Bench) -> Said {
     let (data, _) = Dataset::read_files(&[bench.file("rows.csv", text)], &bench.arm)?;
     // Whatever can be read can be fitted, or said not to be.
     let _ = identify(&bench.arm, &data, &Options::default());
     Ok(())
 }
 
-fn truth(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+fn truth(text: &[u8], bench: &Bench) -> Said {
     let truth = Truth::read(&bench.file("true.toml", text), &bench.arm)?;
     let _ = simulate(&bench.arm, &truth, 3, 1);
     Ok(())
 }
 
-fn study(text: &[u8], bench: &Bench) -> Result<(), InputError> {
-    Study::read(&bench.file("STUDY.toml", text)).map(|_| ())
+fn study(text: &[u8], bench: &Bench) -> Said {
+    Study::read(&bench.file("STUDY.toml", text))?;
+    Ok(())
 }
 
-fn targets(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+fn targets(text: &[u8], bench: &Bench) -> Said {
     let problem =
         Problem { data: flexcal::problem::Data { held_out: None, ..bench.arm.data.clone() }, ..bench.arm.clone() };
-    Measurements::read(&[bench.file("targets.csv", text)], &problem).map(|_| ())
+    Measurements::read(&[bench.file("targets.csv", text)], &problem)?;
+    Ok(())
 }
 
-fn urdf(text: &[u8], bench: &Bench) -> Result<(), InputError> {
+fn estimate(text: &[u8], bench: &Bench) -> Said {
+    let saved = SavedEstimate::read(&bench.file("estimate.json", text))?;
+    // Whatever can be read can be applied, or said not to be of this arm.
+    match predict(&bench.arm, Some(&saved), &bench.rows, None) {
+        Err(PredictError::Estimate(error)) => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
+fn urdf(text: &[u8], bench: &Bench) -> Said {
     let robot = Robot::read(&bench.file("arm.urdf", text))?;
     let chain = Chain::new(&robot, None, None).or_else(|_| Chain::new(&robot, None, Some("tool")))?;
     let problem = Problem::parse(&describe(&chain)?.text, Path::new("problem.toml"))?;
-    export(&chain, &problem, &Arm::nominal(&problem)).map(|_| ())
+    export(&chain, &problem, &Arm::nominal(&problem))?;
+    Ok(())
 }
 
 /// The files that a reader begins with.
@@ -110,7 +135,11 @@ fn readers_stand_what_they_are_given() {
                     Err(error) => {
                         let message = error.to_string();
                         let clean = message.chars().all(|own| !is_hidden(own)) && !message.contains('\n');
-                        assert!(error.location.file.file_name().is_some(), "{}: no file: {message}", path.display());
+                        let named = match error.downcast_ref::<InputError>() {
+                            Some(error) => error.location.file.file_name().is_some(),
+                            None => message.contains("estimate.json: "),
+                        };
+                        assert!(named, "{}: no file: {message}", path.display());
                         assert!(clean && message.len() < 20_000, "{}: {message:?}", path.display());
                     }
                 }
