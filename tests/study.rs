@@ -173,6 +173,23 @@ fn declared_effects_are_drawn_and_found_again() {
     assert!(error.contains("problem.toml:") && error.contains("temperature_C = [from, to] in [poses]"), "{error}");
 }
 
+#[test]
+fn an_effect_of_loads_or_temperature_is_studied_as_the_loop_declares_it() {
+    let bench = Bench::new();
+    let problem = include_str!("cases/problem.toml");
+    let effect = "[[effect]]\nlink-thermal-bending = { link = \"A\" }\n[parameters]";
+    fs::write(bench.path("problem.toml"), problem.replacen("[parameters]", effect, 1)).unwrap();
+    let (before, _) = STUDY.split_once("[poses]").unwrap();
+    let study =
+        before.replace("repetitions = 120", "repetitions = 2").replace("[8]", "[30]").replace(", \"gauss-newton\"", "");
+    let poses = "[poses]\nq1_deg = [-90, 90]\nq2_deg = [-65, 15]\nq3_deg = [15, 130]\nq4_deg = [-95, 75]\ntemperature_C = [15, 30]\n";
+    fs::write(bench.path("STUDY.toml"), study + poses).unwrap();
+    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
+    let rows = fs::read_to_string(bench.path("out/parameters.csv")).unwrap();
+    let fitted = rows.lines().filter(|row| row.contains("link-thermal-bending[A].about_") && row.contains(",2,"));
+    assert_eq!(fitted.count(), 4, "{rows}");
+}
+
 fn text_of_error(assert: &assert_cmd::assert::Assert) -> String {
     text(&assert.get_output().stderr)
 }

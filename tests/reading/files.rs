@@ -287,6 +287,23 @@ fn the_same_rows_under_two_names_are_said() {
 }
 
 #[test]
+fn a_fraction_holds_out_the_same_rows_in_any_order() {
+    let bench = Bench::new();
+    fs::write(bench.path("arm/problem.toml"), format!("{ARM}held_out = {{ fraction = 0.3, seed = 1 }}\n")).unwrap();
+    let table = bench.read("arm/measurements.csv");
+    let (header, rows) = table.split_once('\n').unwrap();
+    let reversed: Vec<&str> = std::iter::once(header).chain(rows.lines().rev()).collect();
+    fs::write(bench.path("reversed.csv"), reversed.join("\n")).unwrap();
+    let held_out = |data: &str| {
+        let run = bench.flexcal(&format!("identify arm --json --out {data}.out --data {data}")).success();
+        let json: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        ["mean_mm", "rms_mm", "max_mm"].map(|key| json["held_out"][key]["norm"].as_f64().unwrap())
+    };
+    let (one, other) = (held_out("arm/measurements.csv"), held_out("reversed.csv"));
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-6), "{one:?} {other:?}");
+}
+
+#[test]
 fn an_estimate_with_a_name_twice_is_refused() {
     let bench = Bench::new();
     bench.flexcal("identify arm --out out").success();
