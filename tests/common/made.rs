@@ -85,6 +85,28 @@ pub fn split_at(count: usize, measurements: &Measurements) -> Split {
     Split { identification: (0..count).collect(), held_out: (count..measurements.len()).collect() }
 }
 
+/// Rows as a table to read: joints, positions, the split, and sessions and targets where there are any.
+pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -> String {
+    let unit = |kind: JointKind| if kind == JointKind::Prismatic { "m" } else { "rad" };
+    let mut header: Vec<String> =
+        problem.joints.iter().enumerate().map(|(k, joint)| format!("q{}_{}", k + 1, unit(joint.kind))).collect();
+    header.extend(["x_m", "y_m", "z_m", "split"].map(str::to_owned));
+    let sessions = Some(&rows.session).filter(|own| own.names.iter().any(|name| !name.is_empty()));
+    let labels = [("session", sessions), ("target", rows.target.as_ref())];
+    let labels: Vec<(&str, &Labels)> = labels.into_iter().filter_map(|(name, own)| Some((name, own?))).collect();
+    header.extend(labels.iter().map(|(name, _)| (*name).to_owned()));
+    let mut text = header.join(",") + "\n";
+    for (row, position) in rows.positions.iter().enumerate() {
+        let numbers = rows.configuration(row).iter().chain(position);
+        let mut cells: Vec<String> = numbers.map(f64::to_string).collect();
+        let held_out = split.held_out.contains(&row);
+        cells.push(if held_out { "validation" } else { "identification" }.to_owned());
+        cells.extend(labels.iter().map(|(_, own)| own.names[own.of_row[row]].clone()));
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
 /// The same with the rows themselves.
 pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
     Dataset::new(measurements.clone(), split_at(count, measurements))

@@ -17,5 +17,6 @@ mod recovery;
 mod robust;
 mod runaway;
 mod sigma;
+mod told;
 mod tree;
 mod trust;

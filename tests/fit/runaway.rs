@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const SIGMA: f64 = 5e-5;
-const PRIORS: &str = "'joint*.alpha' = { sigma_deg = 0.5 }
+pub const PRIORS: &str = "'joint*.alpha' = { sigma_deg = 0.5 }
 'joint*.a' = { sigma_mm = 3 }
 'joint*.theta' = { sigma_deg = 0.5 }
 'joint*.beta' = { sigma_deg = 0.5 }
@@ -19,15 +19,19 @@ const PRIORS: &str = "'joint*.alpha' = { sigma_deg = 0.5 }
 
 /// An elbow arm with three axes that are parallel up to `twist` [°].
 fn elbow(twist: f64, parameters: &str) -> Problem {
-    parse(&format!(
+    parse(&text(twist, parameters))
+}
+
+pub fn text(twist: f64, parameters: &str) -> String {
+    format!(
         "name = 'elbow'\n[[joint]]\nd_m = 0.1273\n[[joint]]\nalpha_deg = 90\n[[joint]]\nalpha_deg = {twist}\na_m = -0.612\n\
          [[joint]]\na_m = -0.5723\nd_m = 0.163941\n[[joint]]\nalpha_deg = 90\nd_m = 0.1157\n[[joint]]\nalpha_deg = -90\n\
          d_m = 0.0922\n[tool]\ntarget_m = [0.03, 0.02, 0.109]\n[parameters]\n{parameters}\n[data]\nposition_sigma_mm = 0.05\n"
-    ))
+    )
 }
 
 /// Sixty noisy poses and thirty held out, of an arm that is off by 0.1° and 1 mm.
-fn measured(problem: &Problem, seed: u64) -> Dataset {
+pub fn measured(problem: &Problem, seed: u64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = at_random(problem, 90, 2.5, &mut rng);
     let size = |unit| if unit == Unit::Length { 1e-3 } else { 2e-3 };

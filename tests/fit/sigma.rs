@@ -1,9 +1,9 @@
 //! A declared σ that the residual contradicts decides nothing: priors and data are weighed by the scatter there is.
 
-use crate::common::arms::{measured, path};
+use crate::common::arms::{measured, parse, path};
 use flexcal::diagnose::{Verdict, close};
 use flexcal::identify::{Identification, Options, identify};
-use flexcal::measurement::Dataset;
+use flexcal::measurement::{Dataset, Split};
 use flexcal::problem::Problem;
 use flexcal::report::estimate_text;
 use flexcal::simulate::{Truth, simulate};
@@ -92,25 +92,31 @@ q6_deg = [-180, 180]
 identification = 60
 ";
 
+/// An elbow arm by its declared σ [mm].
+pub fn elbow(sigma: f64) -> String {
+    format!(
+        "name = 'elbow'\n[[joint]]\nd_m = 0.1273\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = -0.612\n[[joint]]\n\
+         a_m = -0.5723\nd_m = 0.163941\n[[joint]]\nalpha_deg = 90\nd_m = 0.1157\n[[joint]]\nalpha_deg = -90\n\
+         d_m = 0.0922\n[tool]\ntarget_m = [0.03, 0.02, 0.109]\n[parameters]\n'joint*' = {{ sigma_deg = 0.5, sigma_mm = 3 }}\n\
+         'tool.*' = {{ sigma_mm = 3 }}\n[data]\nposition_sigma_mm = {sigma}\n"
+    )
+}
+
+/// Its measurements on the rig, with noise of 0.05 mm.
+pub fn simulated(seed: u64) -> Dataset {
+    let problem = parse(&elbow(0.05));
+    let truth = Truth::parse(TRUTH, std::path::Path::new("truth.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 110, seed).unwrap().rows;
+    let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
+    Dataset::new(flexcal::monte_carlo::table(&rows), Split { identification, held_out })
+}
+
 #[test]
 fn a_sigma_too_large_makes_the_loop_invent_nothing() {
-    let arm = |sigma: f64| {
-        crate::common::arms::parse(&format!(
-            "name = 'elbow'\n[[joint]]\nd_m = 0.1273\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = -0.612\n[[joint]]\n\
-             a_m = -0.5723\nd_m = 0.163941\n[[joint]]\nalpha_deg = 90\nd_m = 0.1157\n[[joint]]\nalpha_deg = -90\n\
-             d_m = 0.0922\n[tool]\ntarget_m = [0.03, 0.02, 0.109]\n[parameters]\n'joint*' = {{ sigma_deg = 0.5, sigma_mm = 3 }}\n\
-             'tool.*' = {{ sigma_mm = 3 }}\n[data]\nposition_sigma_mm = {sigma}\n"
-        ))
-    };
     for seed in [2, 4] {
-        let problem = arm(0.05);
-        let truth = Truth::parse(TRUTH, std::path::Path::new("truth.toml"), &problem).unwrap();
-        let rows = simulate(&problem, &truth, 110, seed).unwrap().rows;
-        let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
-        let split = flexcal::measurement::Split { identification, held_out };
-        let data = Dataset::new(flexcal::monte_carlo::table(&rows), split);
+        let data = simulated(seed);
         for factor in [1.0, 10.0, 100.0] {
-            let closed = close(&arm(0.05 * factor), &data, &Options::default()).unwrap();
+            let closed = close(&parse(&elbow(0.05 * factor)), &data, &Options::default()).unwrap();
             assert_eq!(closed.verdict, Verdict::NothingFound, "seed {seed} × {factor}: {:?}", closed.effects);
             let size = closed.findings.tests.first().unwrap();
             assert_eq!(size.to_string().contains("overstated"), factor > 1.0, "{size}");
