@@ -195,6 +195,8 @@ pub enum InputErrorKind {
     NoCommand { joint: usize },
     #[error("joint {joint} has no link that could bend: its a is 0")]
     NoLink { joint: usize },
+    #[error("joint {joint} has no slide that could bend: it is not prismatic")]
+    NoSlide { joint: usize },
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
     #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]

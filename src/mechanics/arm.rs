@@ -82,7 +82,9 @@ impl Arm<f64> {
 impl<S: Scalar> Arm<S> {
     /// Whether any joint or link deflects.
     pub fn is_elastic(&self) -> bool {
-        let gives = |joint: &Joint<S>| joint.turns() || joint.lateral.is_some() || joint.beam.is_some();
+        let gives = |joint: &Joint<S>| {
+            joint.turns() || joint.lateral.is_some() || joint.slide.is_some() || joint.beam.is_some()
+        };
         self.mounting.is_some() || self.joints.iter().any(gives)
     }
 

@@ -20,6 +20,14 @@ pub struct Flexibility<S> {
     pub about_z: S,
     /// 1/GJ [1/(N·m²)].
     pub twist: S,
+    /// Couplings `k_y`, `k_z` [1/(N·m²)] of twist with bending about y and z: curvature `k_y M_x`, rate of twist `k_y M_y`, the same
+    /// about z; with `k_y`² ≤ `about_y`·`twist` no load gains energy.
+    pub coupling: Option<[S; 2]>,
+}
+
+impl Flexibility<f64> {
+    /// Nothing gives way.
+    pub const RIGID: Self = Self { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0, coupling: None };
 }
 
 /// Force \[N\] and moment [N·m] at one point, in one frame.
@@ -155,7 +163,13 @@ impl<S: Scalar> Cantilever<'_, S> {
     fn signed_flexibility(&self) -> Flexibility<S> {
         let k = self.flexibility;
         if self.length.re() < 0.0 {
-            Flexibility { axial: -k.axial, about_y: -k.about_y, about_z: -k.about_z, twist: -k.twist }
+            Flexibility {
+                axial: -k.axial,
+                about_y: -k.about_y,
+                about_z: -k.about_z,
+                twist: -k.twist,
+                coupling: k.coupling.map(|coupling| coupling.map(|k| -k)),
+            }
         } else {
             k
         }
@@ -168,6 +182,9 @@ impl<S: Scalar> Cantilever<'_, S> {
         out.displacement.z += k.about_y * q.z * deflection;
         out.rotation.y -= k.about_y * q.z * slope;
         out.rotation.z += k.about_z * q.y * slope;
+        if let Some([k_y, k_z]) = k.coupling {
+            out.rotation.x += (k_z * q.y - k_y * q.z) * slope;
+        }
     }
 
     /// Strain without load turns the section at x by κ x and moves it by ε x along and κ x²/2 across.
@@ -190,4 +207,13 @@ fn superpose<S: Scalar>(out: &mut Deflection<S>, k: &Flexibility<S>, shape: &Sha
     out.rotation.x += k.twist * m.x * shape.slope_of_moment;
     out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
     out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
+    if let Some([k_y, k_z]) = k.coupling {
+        // The torsional moment is the same all along: it bends as a moment does.
+        out.displacement.y += k_z * m.x * shape.deflection_of_moment;
+        out.displacement.z -= k_y * m.x * shape.deflection_of_moment;
+        out.rotation.x += k_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force)
+            + k_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
+        out.rotation.y += k_y * m.x * shape.slope_of_moment;
+        out.rotation.z += k_z * m.x * shape.slope_of_moment;
+    }
 }

@@ -6,7 +6,7 @@ use super::Wrench;
 use super::arm::Arm;
 use super::element::{Element, LinkLoad};
 use super::link::{Beam, Hoist, PointMass};
-use super::segment::{Cut, Segment};
+use super::segment::{Cut, SLIDE_TILTS, Segment};
 use super::workspace::{Event, Workspace};
 use crate::problem::PoseView;
 use crate::scalar::Scalar;
@@ -75,6 +75,22 @@ impl<S: Scalar> Walk<'_, S> {
             self.frame.rotate(half);
             self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
+    }
+
+    /// Goes along a slide of `length` L \[m\], negative along −z, with `flexibility` 1/EI [1/(N·m²)]: a cantilever without weight that
+    /// everything beyond loads at its end.
+    ///
+    /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). Along it the moment changes evenly: two tilts at the points of Gauss and
+    /// Legendre, each by the moment there times L/(2EI), sum that up exactly. Small slopes only.
+    fn slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
+        let half = flexibility * length * (0.5 * length.re().signum());
+        let mut passed = 0.0;
+        for at in SLIDE_TILTS {
+            self.frame.translate_z(length * (at - passed));
+            self.tilt(&[half, half], segment, ws);
+            passed = at;
+        }
+        self.frame.translate_z(length * (1.0 - passed));
     }
 
     /// Takes note of a place from which `further` branches begin besides the next one.
@@ -210,12 +226,21 @@ impl<S: Scalar> Arm<S> {
                 twist = walk.moments().map(|[moment]| joint.twist(moment, approach));
                 slip = joint.slip(approach);
             }
-            joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
+            let offset = joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
+            let mut turned = usize::from(joint.turns());
+            if let Some(flexibility) = joint.slide {
+                walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
+                walk.slide(flexibility, offset, Segment::Joint(i), ws);
+                turned = 0;
+            } else {
+                walk.frame.translate_z(offset);
+            }
+            walk.frame.rotate_y(joint.beta.sin_cos);
             if self.tree.leads_through(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
             ws.keep(&walk.frame);
-            walk.cut(Segment::Joint(i), usize::from(joint.turns()), &mut ws.events, &mut ws.cuts);
+            walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
             if walk.records() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);

@@ -84,6 +84,8 @@ pub struct Joint<S> {
     pub nonlinear: Option<Nonlinear<S>>,
     /// Flexibility about x and y of the frame that has not yet turned [rad/(N·m)].
     pub lateral: Option<[S; 2]>,
+    /// Flexibility 1/EI of the slide, a cantilever that is as long as the joint's own d + q [1/(N·m²)].
+    pub slide: Option<S>,
     /// Elastic link along a.
     pub beam: Option<Beam<S>>,
     /// Masses carried by frame i.
@@ -112,6 +114,7 @@ impl Joint<f64> {
             flexibility: joint.stiffness.map(f64::recip),
             nonlinear: None,
             lateral: None,
+            slide: None,
             beam: joint.beam.as_ref().map(Beam::nominal),
             bodies: point_masses(&joint.bodies),
         }
@@ -130,6 +133,7 @@ impl Joint<f64> {
             flexibility: self.flexibility.map(S::from),
             nonlinear: self.nonlinear.as_ref().map(Nonlinear::lift),
             lateral: self.lateral.map(|lateral| lateral.map(S::from)),
+            slide: self.slide.map(S::from),
             beam: self.beam.as_ref().map(Beam::lift),
             bodies: self.bodies.clone(),
         }
@@ -154,8 +158,8 @@ impl<S: Scalar> Joint<S> {
         self.nonlinear.as_ref().zip(approach).map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }
 
-    /// Moves `frame` through the part of `T_i` after the link: Rz(θ + q + `twist`) Tz(d + q) Ry(β), `slip` added to q.
-    pub(super) fn turn(&self, frame: &mut Frame<S>, q: f64, slip: Option<S>, twist: Option<S>) {
+    /// Moves `frame` through Rz(θ + q + `twist`), `slip` added to q; the length d + q \[m\] of the slide beyond.
+    pub(super) fn turn(&self, frame: &mut Frame<S>, q: f64, slip: Option<S>, twist: Option<S>) -> S {
         let (mut angle, mut offset) = self.moved(q);
         match (slip, self.kind) {
             (Some(slip), JointKind::Prismatic) => offset += slip,
@@ -166,8 +170,7 @@ impl<S: Scalar> Joint<S> {
             angle += twist;
         }
         frame.rotate_z(angle.sin_cos());
-        frame.translate_z(offset);
-        frame.rotate_y(self.beta.sin_cos);
+        offset
     }
 
     /// Where a configuration puts the joint.
@@ -211,6 +214,8 @@ impl<S: Scalar> Joint<S> {
     /// Moves `frame` through the whole rigid `T_i`.
     pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
         self.root(frame);
-        self.turn(frame, q, None, None);
+        let offset = self.turn(frame, q, None, None);
+        frame.translate_z(offset);
+        frame.rotate_y(self.beta.sin_cos);
     }
 }

@@ -59,6 +59,7 @@ impl Beam<f64> {
                 about_y: reciprocal(beam.ei_y),
                 about_z: reciprocal(beam.ei_z),
                 twist: reciprocal(beam.gj),
+                coupling: None,
             },
             masses: point_masses(&beam.masses),
             hoist: beam.hoist.as_ref().map(|hoist| Hoist {
@@ -80,6 +81,7 @@ impl Beam<f64> {
                 about_y: S::from(self.flexibility.about_y),
                 about_z: S::from(self.flexibility.about_z),
                 twist: S::from(self.flexibility.twist),
+                coupling: self.flexibility.coupling.map(|coupling| coupling.map(S::from)),
             },
             masses: self.masses.clone(),
             hoist: self.hoist,

@@ -8,6 +8,9 @@ use super::arm::Arm;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
+/// Where a slide tilts, as parts of its length: the points of Gauss and Legendre, (1 ∓ 1/√3)/2.
+pub(super) const SLIDE_TILTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
 /// A segment of the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -76,6 +79,9 @@ pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
         }
         if joint.turns() {
             add(Segment::Joint(i), 1);
+        }
+        if joint.slide.is_some() {
+            SLIDE_TILTS.iter().for_each(|_| add(Segment::Joint(i), 2));
         }
     }
     lanes

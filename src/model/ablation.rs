@@ -10,7 +10,7 @@ use crate::model::parameter::{ArmField, BeamField, Slot};
 pub enum Ablation {
     /// Nothing: geometry alone.
     Rigid,
-    /// Whatever turns joints, and the base.
+    /// Whatever turns joints, the bending of slides, and the base.
     JointsOnly,
     /// Stretch, bending and twist of the links.
     LinksOnly,
@@ -40,7 +40,13 @@ impl Ablation {
             (Self::Rigid, slot) => !slot.is_elastic(),
             (Self::LinksOnly | Self::BendingOnly, Slot::Joint { .. }) => !slot.is_elastic(),
             (Self::LinksOnly | Self::BendingOnly, Slot::Arm(ArmField::MountingX | ArmField::MountingY))
-            | (Self::BendingOnly, Slot::Beam { field: BeamField::Axial | BeamField::Twist, .. }) => false,
+            | (
+                Self::BendingOnly,
+                Slot::Beam {
+                    field: BeamField::Axial | BeamField::Twist | BeamField::CouplingY | BeamField::CouplingZ,
+                    ..
+                },
+            ) => false,
             (Self::JointsOnly, Slot::Beam { field, .. }) => !field.is_rigidity(),
             _ => true,
         }
@@ -58,7 +64,7 @@ impl Model {
         model.constraints = self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
-                (joint.flexibility, joint.lateral) = (None, None);
+                (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);
             }
             // A rigid link that changes with temperature is still walked along.
             if ablation == Ablation::Rigid && joint.beam.as_ref().is_some_and(|beam| beam.thermal.is_none()) {
@@ -67,10 +73,8 @@ impl Model {
             let Some(beam) = &mut joint.beam else { continue };
             let all = &mut beam.flexibility;
             match ablation {
-                Ablation::Rigid | Ablation::JointsOnly => {
-                    *all = Flexibility { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0 };
-                }
-                Ablation::BendingOnly => (all.axial, all.twist) = (0.0, 0.0),
+                Ablation::Rigid | Ablation::JointsOnly => *all = Flexibility::RIGID,
+                Ablation::BendingOnly => (all.axial, all.twist, all.coupling) = (0.0, 0.0, None),
                 Ablation::LinksOnly | Ablation::All => {}
             }
         }

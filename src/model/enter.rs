@@ -17,6 +17,7 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
                     joint.nonlinear.get_or_insert(Nonlinear { cubic: 0.0, play: 0.0 });
                 }
                 JointField::LateralX | JointField::LateralY => _ = joint.lateral.get_or_insert([0.0; 2]),
+                JointField::SlideFlexibility => _ = joint.slide.get_or_insert(0.0),
                 _ => {}
             }
         }
@@ -25,6 +26,9 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
             match field {
                 BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion => {
                     beam.thermal.get_or_insert(Thermal { curvature: [0.0; 2], expansion: 0.0 });
+                }
+                BeamField::CouplingY | BeamField::CouplingZ => {
+                    beam.flexibility.coupling.get_or_insert([0.0; 2]);
                 }
                 BeamField::AddedMass | BeamField::AddedAt => {
                     let added = beam.added.get_or_insert(AddedMass { mass: 0.0, at: 0.0 });
@@ -55,14 +59,7 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
 
 /// A link that was declared rigid, ready to bend.
 fn weightless() -> Beam<f64> {
-    Beam {
-        mass: 0.0,
-        flexibility: Flexibility { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0 },
-        masses: Vec::new(),
-        hoist: None,
-        thermal: None,
-        added: None,
-    }
+    Beam { mass: 0.0, flexibility: Flexibility::RIGID, masses: Vec::new(), hoist: None, thermal: None, added: None }
 }
 
 /// Turns gravity by the rotation vector (x, y, 0) \[rad\].
@@ -95,6 +92,7 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play += x,
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
+                (JointField::SlideFlexibility, ..) => joint.slide = Some(joint.slide.map_or(x, |known| known + x)),
                 _ => {}
             }
         }
@@ -128,6 +126,8 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
             all.about_y += x;
             all.about_z += x;
         }
+        (BeamField::CouplingY, ..) => all.coupling = all.coupling.map(|[y, z]| [y + x, z]),
+        (BeamField::CouplingZ, ..) => all.coupling = all.coupling.map(|[y, z]| [y, z + x]),
         (BeamField::WarmingY, Some(thermal), _) => thermal.curvature[0] += x,
         (BeamField::WarmingZ, Some(thermal), _) => thermal.curvature[1] += x,
         (BeamField::Expansion, Some(thermal), _) => thermal.expansion += x,

@@ -122,7 +122,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
 fn is_declared(slot: Slot) -> bool {
     match slot {
         Slot::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
-        Slot::Beam { field, .. } => field.is_rigidity() && field != BeamField::Flexibility,
+        Slot::Beam { field, .. } => field.is_declared(),
         Slot::Base { .. } | Slot::Target { .. } | Slot::Fixture { .. } => true,
         Slot::Arm(_) | Slot::Shift { .. } | Slot::Turn { .. } | Slot::Scale | Slot::Strain { .. } => false,
     }

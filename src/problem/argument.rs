@@ -144,6 +144,16 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(joint)
     }
 
+    /// The number of a prismatic joint that takes a command.
+    pub fn sliding_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let joint = self.moving_joint(key)?;
+        let slides = self.joints.get(joint - 1).is_some_and(|own| own.kind == JointKind::Prismatic);
+        match self.section.peek(key) {
+            Some(item) if !slides => Err(item.error(InputErrorKind::NoSlide { joint })),
+            _ => Ok(joint),
+        }
+    }
+
     /// The number of another joint that takes a command than the one before.
     pub fn other_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let before = self.last;
@@ -254,6 +264,11 @@ impl<'s> Examples<'s> {
 
     pub fn other_joint(&self) -> String {
         self.moving().nth(1).unwrap_or(self.first() + 1).to_string()
+    }
+
+    pub fn sliding_joint(&self) -> String {
+        let slides = |&number: &usize| self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Prismatic);
+        self.moving().find(slides).unwrap_or(self.first()).to_string()
     }
 
     pub fn linked_joint(&self) -> String {

@@ -114,6 +114,10 @@ effects! {
     JointCoupling "joint-coupling" { joint: usize = moving_joint, from: usize = other_joint }
     /// Flexibility 1/EI of a link declared rigid.
     LinkBending "link-bending" { joint: usize = linked_joint }
+    /// Flexibility 1/EI of the slide of a prismatic joint, a cantilever as long as it is out.
+    SlideBending "slide-bending" { joint: usize = sliding_joint }
+    /// Torsional moments bend a beam by (`k_y`, `k_z`), and bending moments twist it by as much.
+    TwistBending "twist-bending" { link: String = beam }
     /// Curvature (`k_y`, `k_z`)·(T − T₀) along a beam.
     LinkThermalBending "link-thermal-bending" { link: String = beam }
     /// Strain α (T − T₀) of a beam.

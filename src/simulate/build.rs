@@ -42,7 +42,7 @@ impl Rig {
             }
             chain.hinge(about);
             chain.end().rotate_z(turn.sin_cos());
-            chain.end().translate_z(slide);
+            self.slide(number, slide, &mut chain);
             chain.end().rotate_y(joint.beta.sin_cos());
             for body in &joint.bodies {
                 chain.load(&body.position, weight(body.mass));

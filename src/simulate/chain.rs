@@ -9,6 +9,8 @@ use crate::spatial::Frame;
 pub(super) struct Hinge {
     /// Angle per moment about each axis [rad/(N·m)].
     pub compliance: Vector3<f64>,
+    /// Angle about x per moment about y, and about y per moment about x; then the same with z [rad/(N·m)].
+    pub coupling: Vector2<f64>,
     /// Angle about z per cube of the moment [rad/(N·m)³].
     pub cubic: f64,
     /// Play about z that the moment takes up: b \[rad\].
@@ -32,6 +34,11 @@ impl Hinge {
     /// What the hinge does under a force \[N\] and a moment [N·m] in its own axes.
     pub fn give(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
         let mut rotation = self.free_rotation + self.compliance.component_mul(moment);
+        rotation += Vector3::new(
+            self.coupling.x * moment.y + self.coupling.y * moment.z,
+            self.coupling.x * moment.x,
+            self.coupling.y * moment.x,
+        );
         rotation.z += self.cubic * moment.z.powi(3) + 0.5 * self.play * (moment.z / PLAY_MOMENT).tanh();
         Motion { rotation, stretch: self.free_stretch + self.stretch * force.x }
     }

@@ -112,7 +112,8 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             named(&[("rate", if slides(joint) { Unit::LengthPerDegree } else { Unit::AnglePerDegree })])
         }
         Effect::JointCoupling { .. } => named(&[("factor", Unit::Ratio)]),
-        Effect::LinkBending { .. } => named(&[("flexibility", Unit::Flexibility)]),
+        Effect::LinkBending { .. } | Effect::SlideBending { .. } => named(&[("flexibility", Unit::Flexibility)]),
+        Effect::TwistBending { .. } => named(&[("about_y", Unit::Flexibility), ("about_z", Unit::Flexibility)]),
         Effect::LinkThermalBending { .. } => {
             named(&[("about_y", Unit::CurvaturePerDegree), ("about_z", Unit::CurvaturePerDegree)])
         }

@@ -1,9 +1,9 @@
 //! A link as segments of rigid parts and springs.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::Rig;
-use super::build::softness;
+use super::build::{Part, softness};
 use super::chain::{Chain, Force, Hinge};
 use crate::problem::{Beam, Effect, Joint, PoseConditions};
 
@@ -73,6 +73,28 @@ impl Rig {
         }
     }
 
+    /// The slide of a joint, `length` \[m\] along z, negative along −z: segments with two hinges each, or one rigid piece.
+    pub(super) fn slide(&self, number: usize, length: f64, chain: &mut Chain) {
+        let bends = |part: Part<'_>| match part {
+            (Effect::SlideBending { joint }, &[flexibility]) if *joint == number => flexibility,
+            _ => 0.0,
+        };
+        let flexibility: f64 = self.parts().map(bends).sum();
+        if flexibility == 0.0 {
+            return chain.end().translate_z(length);
+        }
+        let segment = length / self.segments as f64;
+        let across = flexibility * segment.abs() / 2.0;
+        let hinge = Hinge { compliance: Vector3::new(across, across, 0.0), ..Hinge::default() };
+        for _ in 0..self.segments {
+            chain.end().translate_z(OUTER * segment);
+            chain.hinge(hinge);
+            chain.end().translate_z((1.0 - 2.0 * OUTER) * segment);
+            chain.hinge(hinge);
+            chain.end().translate_z(OUTER * segment);
+        }
+    }
+
     /// The hinge that stands for `length` \[m\] of a link, which is negative along −x.
     fn hinge(&self, beam: Option<&Beam>, number: usize, length: f64, conditions: &PoseConditions) -> Hinge {
         let mut hinge = Hinge::default();
@@ -87,6 +109,9 @@ impl Rig {
             match part {
                 (Effect::LinkBending { joint }, [flexibility]) if *joint == number => {
                     hinge.compliance += Vector3::new(0.0, *flexibility, *flexibility) * between;
+                }
+                (Effect::TwistBending { link }, [y, z]) if is_this(link) => {
+                    hinge.coupling += Vector2::new(*y, *z) * between;
                 }
                 (Effect::LinkThermalBending { link }, [y, z]) if is_this(link) => {
                     hinge.free_rotation += Vector3::new(0.0, *y, *z) * (self.warming(conditions) * length);

@@ -19,6 +19,7 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
         (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
         (Effect::JointCoupling { joint: 4, from: 3 }, vec![3e-4]),
         (Effect::LinkBending { joint: 2 }, vec![1e-5]),
+        (Effect::TwistBending { link: link() }, vec![2e-6, -3e-6]),
         (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
         (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
         (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),

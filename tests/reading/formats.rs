@@ -149,6 +149,8 @@ fn every_effect_has_its_arguments() {
         ("joint-thermal-drift = { joint = 1 }", Effect::JointThermalDrift { joint: 1 }),
         ("joint-coupling = { joint = 1, from = 2 }", Effect::JointCoupling { joint: 1, from: 2 }),
         ("link-bending = { joint = 1 }", Effect::LinkBending { joint: 1 }),
+        ("slide-bending = { joint = 3 }", Effect::SlideBending { joint: 3 }),
+        ("twist-bending = { link = 'A' }", Effect::TwistBending { link: "A".into() }),
         ("link-thermal-bending = { link = 'A' }", Effect::LinkThermalBending { link: "A".into() }),
         ("link-thermal-expansion = { link = 'A' }", Effect::LinkThermalExpansion { link: "A".into() }),
         ("unmodelled-mass = { link = 'A' }", Effect::UnmodelledMass { link: "A".into() }),
@@ -168,7 +170,7 @@ fn every_effect_has_its_arguments() {
     let tables: Vec<_> = effects.iter().map(|(line, _)| format!("[[effect]]\n{line}\n")).collect();
     let text = format!(
         "name = 'arm'\nstatics.equilibrium = 'undeflected'\ndata.reference_temperature_C = 20\n[[joint]]\na_m = 1\n\
-         beam.name = 'A'\nbeam.hoist.at_m = [0.5, 0, 0]\n[[joint]]\n{}",
+         beam.name = 'A'\nbeam.hoist.at_m = [0.5, 0, 0]\n[[joint]]\n[[joint]]\nkind = 'prismatic'\n{}",
         tables.concat()
     );
     let declared: Vec<_> = parse(&text).effects.into_iter().map(|declaration| declaration.effect).collect();

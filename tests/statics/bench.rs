@@ -14,7 +14,8 @@ use super::common::made::at_random;
 pub const GRAVITY: f64 = 9.81;
 pub const LENGTH: f64 = 1.6;
 /// A beam so stiff that its deflection is linear to eight digits.
-pub const STIFF: Flexibility<f64> = Flexibility { axial: 2e-9, about_y: 3e-7, about_z: 5e-7, twist: 7e-7 };
+pub const STIFF: Flexibility<f64> =
+    Flexibility { axial: 2e-9, about_y: 3e-7, about_z: 5e-7, twist: 7e-7, coupling: None };
 
 pub const TARGET: Vector3<f64> = Vector3::new(0.22, 0.05, -0.09);
 
@@ -22,6 +23,7 @@ pub fn joint(a: f64) -> Joint<f64> {
     Joint {
         nonlinear: None,
         lateral: None,
+        slide: None,
         kind: JointKind::Fixed,
         placement: None,
         alpha: Angle::new(0.0),
@@ -75,8 +77,7 @@ pub fn position(arm: &Arm<f64>, q: &[f64], target: &Vector3<f64>) -> Vector3<f64
 pub fn rigid(arm: &Arm<f64>) -> Arm<f64> {
     let mut arm = arm.clone();
     for joint in &mut arm.joints {
-        joint.flexibility = None;
-        joint.beam = None;
+        (joint.flexibility, joint.slide, joint.beam) = (None, None, None);
     }
     arm
 }

@@ -1,6 +1,7 @@
 //! Maxwell–Betti: what one force does to another's place is what the other does to its.
 
 use flexcal::mechanics::{Hoist, Joint};
+use flexcal::problem::JointKind;
 use nalgebra::Vector3;
 
 use super::bench::{TARGET, arms, frame, position, rigid, softer};
@@ -17,7 +18,10 @@ fn points_of_the_last_link_obey_reciprocity() {
             if let Some(beam) = &mut joint.beam {
                 (beam.mass, beam.hoist) = (0.0, None);
                 beam.masses.clear();
+                let all = &mut beam.flexibility;
+                all.coupling = Some([0.5 * all.twist, -0.4 * all.twist]);
             }
+            joint.slide = (joint.kind == JointKind::Prismatic).then_some(1e-9);
         }
         let displacement = |q: &[f64], load: Vector3<f64>, force: Vector3<f64>, point: &Vector3<f64>| {
             let mut arm = massless.clone();

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use flexcal::mechanics::{Angle, Arm, Flexibility, Hoist, Joint, PointMass};
+use flexcal::problem::JointKind;
 use nalgebra::Vector3;
 
 use super::bench::{GRAVITY, LENGTH, STIFF, arm, beam, frame, joint, position};
@@ -71,6 +72,43 @@ fn a_mass_beside_the_beam_twists_it() {
     (arm.payload_mass, arm.payload_at) = (mass, Vector3::new(0.0, lever, 0.0));
     let moved = position(&arm, &[], &Vector3::new(0.0, 0.0, height)).y;
     near(moved, mass * GRAVITY * lever * LENGTH * STIFF.twist * height, 1e-6, "twist");
+}
+
+#[test]
+fn twist_and_bending_are_coupled_both_ways() {
+    // A load W at the lever e beside the tip: M_x = −W e all along, M_y = W (L − x). About y the torsional moment adds −k_y W e to the
+    // curvature, about z −k_z W e; the bending moment turns the tip by k_y W L²/2 about x.
+    let (weight, lever, l, [k_y, k_z]) = (3.0 * GRAVITY, 0.4, LENGTH, [2e-7, -3e-7]);
+    for elements in [1, 4] {
+        for along in [1.0, -1.0] {
+            let coupled = Flexibility { axial: 0.0, coupling: Some([k_y, k_z]), ..STIFF };
+            let mut arm = arm(vec![beam(along * l, 0.0, coupled)]);
+            arm.beam_elements = elements;
+            (arm.payload_mass, arm.payload_at) = (3.0, Vector3::new(0.0, lever, 0.0));
+            let tip = frame(&arm, &[]).unwrap();
+            let torsion = weight * lever * l * l / 2.0;
+            near(-tip.origin.z, weight * l.powi(3) * STIFF.about_y / 3.0 - along * k_y * torsion, 1e-4, "sag");
+            near(tip.origin.y, -along * k_z * torsion, 1e-4, "sideways");
+            let twist = weight * (along * k_y * l * l / 2.0 - STIFF.twist * lever * l);
+            near(tip.axes[1].z, twist, 1e-4, "twist");
+        }
+    }
+}
+
+#[test]
+fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
+    // F L³/(3 EI) + M L²/(2 EI) with the slope F L²/(2 EI) + M L/(EI), L = |d + q|, whichever way it runs.
+    let (weight, lever, l, k) = (12.0 * GRAVITY, 0.3, LENGTH, 3e-7);
+    for (d, q) in [(l, 0.0), (0.2, l - 0.2), (-l, 0.0), (0.4, -l - 0.4)] {
+        let turned = Angle::new(FRAC_PI_2);
+        let slide = Joint { kind: JointKind::Prismatic, alpha: turned, d, slide: Some(k), ..joint(0.0) };
+        let mut arm = arm(vec![slide]);
+        let along = (d + q).signum();
+        (arm.payload_mass, arm.payload_at) = (12.0, Vector3::new(0.0, 0.0, lever * along));
+        let tip = frame(&arm, &[q]).unwrap();
+        near(-tip.origin.z, weight * k * l * l * (l / 3.0 + lever / 2.0), 1e-6, "sag");
+        near(-tip.axes[2].z * along, weight * k * l * (l / 2.0 + lever), 1e-6, "slope");
+    }
 }
 
 #[test]

@@ -7,14 +7,14 @@ use super::{
     backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
     hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance,
     joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending, link_thermal_bending,
-    link_thermal_expansion, payload_backlash, payload_mass, station_shift, tracker_drift, tracker_scale,
-    tracker_settling, unmodelled_mass,
+    link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_shift, tracker_drift, tracker_scale,
+    tracker_settling, twist_bending, unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 26] = [
+pub const FAMILIES: [&Family; 28] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &joint_wave::FAMILY,
@@ -26,6 +26,8 @@ pub const FAMILIES: [&Family; 26] = [
     &joint_thermal_drift::FAMILY,
     &joint_coupling::FAMILY,
     &link_bending::FAMILY,
+    &slide_bending::FAMILY,
+    &twist_bending::FAMILY,
     &link_thermal_bending::FAMILY,
     &link_thermal_expansion::FAMILY,
     &unmodelled_mass::FAMILY,

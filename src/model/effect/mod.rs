@@ -35,10 +35,12 @@ mod link_thermal_expansion;
 mod payload_backlash;
 mod payload_mass;
 mod place;
+mod slide_bending;
 mod station_shift;
 mod tracker_drift;
 mod tracker_scale;
 mod tracker_settling;
+mod twist_bending;
 mod unmodelled_mass;
 
 pub use catalogue::{FAMILIES, candidates, parameters};

@@ -88,6 +88,8 @@ pub enum JointField {
     LateralX,
     /// Flexibility about y before the joint turns [rad/(N·m)].
     LateralY,
+    /// Flexibility 1/EI of the slide [1/(N·m²)].
+    SlideFlexibility,
     /// Coordinates of a fixed joint's placement \[m\].
     X,
     Y,
@@ -116,6 +118,10 @@ pub enum BeamField {
     Anisotropy,
     /// Added to 1/EI about y and z [1/(N·m²)].
     Flexibility,
+    /// Coupling of twist with bending about y [1/(N·m²)].
+    CouplingY,
+    /// Coupling of twist with bending about z [1/(N·m²)].
+    CouplingZ,
     /// Curvature about y per degree [1/(m·K)].
     WarmingY,
     /// Curvature about z per degree [1/(m·K)].
@@ -193,6 +199,7 @@ impl JointField {
             Self::SlidingPlay => "sliding_play",
             Self::LateralX => "lateral_x",
             Self::LateralY => "lateral_y",
+            Self::SlideFlexibility => "slide_flexibility",
             Self::X => "x",
             Self::Y => "y",
             Self::Z => "z",
@@ -206,7 +213,13 @@ impl JointField {
 impl BeamField {
     /// Whether it says how a beam gives way to loads.
     pub fn is_rigidity(self) -> bool {
-        matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist | Self::Flexibility)
+        let of_effects = matches!(self, Self::Flexibility | Self::CouplingY | Self::CouplingZ);
+        of_effects || self.is_declared()
+    }
+
+    /// Whether it is a rigidity that a problem declares.
+    pub fn is_declared(self) -> bool {
+        matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist)
     }
 
     /// Name after the dot.
@@ -219,6 +232,8 @@ impl BeamField {
             Self::Twist => "GJ",
             Self::Anisotropy => "anisotropy",
             Self::Flexibility => "flexibility",
+            Self::CouplingY => "coupling_y",
+            Self::CouplingZ => "coupling_z",
             Self::WarmingY => "warming_y",
             Self::WarmingZ => "warming_z",
             Self::Expansion => "expansion",
@@ -254,6 +269,7 @@ impl Slot {
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
                 JointField::Cubic => Unit::CubicCompliance,
+                JointField::SlideFlexibility => Unit::Flexibility,
             },
             Self::Beam { field, .. } => match field {
                 BeamField::Axial => Unit::AxialRigidity,
@@ -261,7 +277,7 @@ impl Slot {
                     Unit::FlexuralRigidity
                 }
                 BeamField::Anisotropy => Unit::Ratio,
-                BeamField::Flexibility => Unit::Flexibility,
+                BeamField::Flexibility | BeamField::CouplingY | BeamField::CouplingZ => Unit::Flexibility,
                 BeamField::WarmingY | BeamField::WarmingZ => Unit::CurvaturePerDegree,
                 BeamField::Expansion => Unit::PerDegree,
                 BeamField::AddedMass => Unit::Mass,

@@ -182,7 +182,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 30] = [
+    let effects: [(&str, &[&str]); 34] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
@@ -207,6 +207,19 @@ fn effects() {
         ("joint-coupling = { joint = 1, from = 1 }", &[":4: effect[1].joint-coupling: ", "gear-ratio"]),
         ("station-shift = { at_time = 3 }", &[":4: effect[1].station-shift.at_time: a time needs a unit"]),
         ("link-bending = { joint = 1 }", &[":4: effect[1].link-bending: joint 1 has no link", "its a is 0"]),
+        (
+            "slide-bending = { joint = 1 }",
+            &[":4: effect[1].slide-bending.joint: joint 1 has no slide", "not prismatic"],
+        ),
+        (
+            "slide-bending = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].slide-bending.joint: joint 2 is fixed"],
+        ),
+        (
+            "slide-bending = { joint = 2 }\n[[joint]]\nkind = 'prismatic'\nmimic = { joint = 1 }",
+            &[":4: effect[1].slide-bending.joint: joint 2 is fixed"],
+        ),
+        ("twist-bending = { link = 'A' }", &[":4: effect[1].twist-bending.link: no beam is called \"A\""]),
         ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
         ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
         ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
