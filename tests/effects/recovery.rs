@@ -32,9 +32,14 @@ fn check(problem: &Problem, rows: &Measurements, truth: &DVector<f64>, found: &I
 
 #[test]
 fn every_effect_is_found_beside_the_arm_s_own_errors() {
-    let (mut arm, all) = lunar();
-    arm.data.position_sigma = Some(NOISE);
-    for (number, (effect, values)) in all.iter().enumerate() {
+    let (arm, all) = lunar();
+    // The lunar sampler has no slide.
+    let (with_slide, more) = odd();
+    let slides = more.iter().filter(|(effect, _)| matches!(effect, Effect::SlideBending { .. }));
+    let cases = all.iter().map(|strong| (&arm, strong)).chain(slides.map(|strong| (&with_slide, strong)));
+    for (number, (arm, (effect, values))) in cases.enumerate() {
+        let mut arm = arm.clone();
+        arm.data.position_sigma = Some(NOISE);
         let problem = declared(&arm, std::slice::from_ref(effect));
         let mut rng = ChaCha8Rng::seed_from_u64(100 + number as u64);
         let mut rows = poses(&problem, 36, true, &mut rng);

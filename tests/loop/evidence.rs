@@ -108,7 +108,7 @@ fn effects_of_a_heavy_arm_are_named() {
             // With a first joint that stands upright, its tilt is the base's.
             let aliases = ["base-compliance", "joint-lateral-compliance"];
             let is_it = |hypothesis: &Hypothesis| {
-                let own = hypothesis.effect().map(flexcal::problem::Effect::name);
+                let own = hypothesis.effect().map(Effect::name);
                 own == Some(wanted) || aliases.contains(&wanted) && own.is_some_and(|own| aliases.contains(&own))
             };
             assert!(evidence.probability(is_it) >= STATED, "{name}: {wanted} among {names:?}");
@@ -206,6 +206,41 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
         assert_eq!(drift.witness.as_ref().map(|witness| witness.says), says);
         assert_eq!((drift.is_named(STATED), closure.verdict == Verdict::Explained), (moves > 0.0, moves > 0.0));
         assert_eq!(own("gear-ratio").witness, None);
+    }
+}
+
+/// A column with a lift and a boom that carries a payload at its end; the boom runs along +z or −z.
+fn boom(turned: f64) -> Problem {
+    let text = format!(
+        "name = 'boom'\n[[joint]]\nd_m = 0.4\n[[joint]]\nkind = 'prismatic'\n[[joint]]\nkind = 'prismatic'\nalpha_deg = {turned}\n\
+         [[joint.body]]\nmass_kg = 9\ncom_m = [0, 0.05, 0.02]\n[[joint]]\na_m = 0.1\n\
+         [tool]\ntarget_m = [0.2, 0, 0.1]\npayload_at_m = [0.15, 0, 0.05]\n\
+         [data]\nfiles = ['measurements.csv']\nposition_sigma_mm = 0.03\n[parameters]\n'joint*.alpha' = {{ sigma_deg = 0.2 }}\n\
+         'joint*.theta' = {{ sigma_deg = 0.2 }}\n'joint4.a' = {{ sigma_mm = 1 }}\n'tool.*' = {{ sigma_mm = 2 }}\n"
+    );
+    Problem::parse(&text, Path::new("problem.toml")).unwrap()
+}
+
+#[test]
+fn a_slide_that_bends_as_it_goes_out_is_named() {
+    for (joint, strength, turned, out) in
+        [(3, 5e-6, 90.0, "[0.3, 1.3]"), (3, 5e-6, -90.0, "[-1.3, -0.3]"), (2, 2e-6, 90.0, "[0.3, 1.3]")]
+    {
+        let problem = boom(turned);
+        let text = format!(
+            "[random]\n'joint*.*' = {{ sigma_deg = 0.1, sigma_mm = 0.5 }}\n[[effect]]\nslide-bending = {{ joint = {joint} }}\n\
+             flexibility_per_N_m2 = {strength}\n[noise]\nposition_sigma_mm = 0.03\n[poses]\nq1_deg = [-150, 150]\n\
+             q2_m = [0.2, 1.0]\nq3_m = {out}\nq4_deg = [-150, 150]\npayload_kg = [0, 5]\n"
+        );
+        let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 60, 3).unwrap().rows;
+        let split = Split { identification: (0..42).collect(), held_out: (42..60).collect() };
+        let closure = close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
+        let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
+        assert_eq!(found.effect, Effect::SlideBending { joint });
+        assert!(found.is_named(STATED) && closure.verdict == Verdict::Explained, "{found:?}");
+        let own = &found.estimates[0];
+        assert!((own.estimate - strength).abs() < 4.0 * own.std_error.unwrap(), "{own:?}");
     }
 }
 

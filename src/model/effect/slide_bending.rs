@@ -28,7 +28,7 @@ pub(super) const FAMILY: Family = Family {
         commanded(problem).filter(|&joint| slides(problem, joint)).map(of).collect()
     },
     describe: |effect| match effect {
-        Effect::SlideBending { joint } => format!("the slide of joint {joint} bends, the more the further it is out"),
+        Effect::SlideBending { joint } => format!("the slide of joint {joint} bends"),
         _ => String::new(),
     },
     ..USUAL
