@@ -81,7 +81,9 @@ pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
             add(Segment::Joint(i), 1);
         }
         if joint.slide.is_some() {
-            SLIDE_TILTS.iter().for_each(|_| add(Segment::Joint(i), 2));
+            for _ in SLIDE_TILTS {
+                add(Segment::Joint(i), 2);
+            }
         }
     }
     lanes

@@ -228,7 +228,7 @@ fn a_slide_that_bends_as_it_goes_out_is_named() {
     {
         let problem = boom(turned);
         let text = format!(
-            "[random]\n'joint*.*' = {{ sigma_deg = 0.1, sigma_mm = 0.5 }}\n[[effect]]\nslide-bending = {{ joint = {joint} }}\n\
+            "[random]\n'joint*.alpha' = {{ sigma_deg = 0.1 }}\n'joint*.theta' = {{ sigma_deg = 0.1 }}\n'tool.*' = {{ sigma_mm = 1 }}\n[[effect]]\nslide-bending = {{ joint = {joint} }}\n\
              flexibility_per_N_m2 = {strength}\n[noise]\nposition_sigma_mm = 0.03\n[poses]\nq1_deg = [-150, 150]\n\
              q2_m = [0.2, 1.0]\nq3_m = {out}\nq4_deg = [-150, 150]\npayload_kg = [0, 5]\n"
         );
