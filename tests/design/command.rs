@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use flexcal::problem::OwnCovariate;
+use flexcal::problem::{JointKind, OwnCovariate};
 use serde_json::Value;
 
 /// A folder for results, and flexcal run in the package's folder.
@@ -178,6 +178,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
     let (mut problem, _) = super::bench::lunar();
     let (name, meaning) = ("oil_bar".to_owned(), String::new());
     problem.data.covariates.push(OwnCovariate { name, meaning, location: problem.data.location.clone() });
+    problem.joints[3].kind = JointKind::Prismatic;
     let read = |text: &str| problem.effect(text, Path::new("--separate"));
     let mut written = 0;
     for family in flexcal::model::effect::FAMILIES {
@@ -188,7 +189,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
-    assert_eq!(written, 16);
+    assert_eq!(written, 18);
 }
 
 #[test]
