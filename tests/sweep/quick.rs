@@ -51,6 +51,24 @@ fn one_effect_is_named() {
 }
 
 #[test]
+fn a_law_that_bends_the_fit_is_weighed_at_a_fit_of_its_own() {
+    // Linear about the fit without it, a function of the same command does better than the harmonic.
+    let harmonic = |sin| Lacking::new(Effect::JointHarmonic { joint: 2, orders: vec![3] }, &[sin, 0.0]);
+    let coupling = |factor| Lacking::new(Effect::JointCoupling { joint: 4, from: 3 }, &[factor]);
+    let kinds = [
+        (5199, vec![harmonic(5.39e-4), coupling(5.14e-4), Lacking::new(Effect::GearRatio { joint: 3 }, &[7.8e-4])]),
+        (5211, vec![coupling(5.97e-4), harmonic(6.38e-4), Lacking::new(Effect::LinkBending { joint: 4 }, &[])]),
+    ];
+    for (seed, kind) in kinds {
+        let judged = Judged::of(&kind, SMALL, seed);
+        let line = judged.line(&name(&kind), SMALL, seed);
+        let wave = Effect::JointHarmonic { joint: 2, orders: vec![3] };
+        assert!(judged.closure.effects.iter().any(|found| found.effect == wave), "{line}");
+        assert!(judged.after < 1.25 * judged.alike, "{line}");
+    }
+}
+
+#[test]
 fn two_effects_are_both_named() {
     let [shown, named, stated] = named_of(&pairs()[..2], 800);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");

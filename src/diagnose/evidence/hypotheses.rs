@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::columns::{Candidate, Columns, slots};
+use super::explanation::Explanation;
 use super::functions::{Known, Shape};
+use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
-use super::{Explanation, Hypothesis};
 use crate::diagnose::candidates::Candidates;
 use crate::diagnose::covariate::Covariate;
 use crate::diagnose::data::Data;

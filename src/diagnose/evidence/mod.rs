@@ -8,6 +8,7 @@
 
 mod block;
 mod columns;
+mod explanation;
 mod functions;
 mod hypotheses;
 mod hypothesis;
@@ -30,6 +31,7 @@ use crate::identify::Noise;
 use crate::problem::Effect;
 use block::Block;
 use columns::Candidate;
+pub use explanation::Explanation;
 pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
@@ -42,37 +44,13 @@ const FINEST: usize = 4;
 /// Probability below which an explanation is not looked at in fits to fewer poses.
 const WORTH_A_DRAW: f64 = 1e-3;
 
-/// Hypotheses that may be at work together.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
-    /// Which; none: what is left is noise.
-    pub hypotheses: Vec<Hypothesis>,
-    /// Its probability among all explanations that were looked at.
-    pub probability: f64,
-    /// For each which of its functions, and 1 σ of their coefficients.
-    functions: Vec<(usize, f64)>,
-}
-
-impl Explanation {
-    /// Its effects.
-    pub fn effects(&self) -> Vec<Effect> {
-        self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
-    }
-
-    /// Its functions without a law, each with which one of its hypothesis it is.
-    pub(super) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
-        let all = self.hypotheses.iter().zip(&self.functions).filter(|(own, _)| own.effect().is_none());
-        all.map(|(own, (variant, _))| (own.clone(), *variant)).collect()
-    }
-}
-
 /// All explanations of a residual that were looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Most probable first.
     pub explanations: Vec<Explanation>,
-    /// For effects of the sure explanation, others that do best in their place.
-    stand_ins: Vec<(Effect, Hypothesis)>,
+    /// For hypotheses of the sure explanation, effects that do best in their place.
+    stand_ins: Vec<(Hypothesis, Hypothesis)>,
 }
 
 /// What is claimed of a hypothesis, from the least to the most.
@@ -116,20 +94,21 @@ impl Evidence {
         (fewer.max(NEGLIGIBLE) / (1.0 - fewer).max(NEGLIGIBLE)).min(1.0)
     }
 
-    /// Explanations with an effect in the place of another of `best`: the most probable ones, and those that do best in the place of
-    /// each, which strong effects decide only at a fit of their own.
+    /// Explanations with an effect in the place of another hypothesis of `best`: the most probable ones, and those that do best in the place of
+    /// each, which strong effects decide only at a fit of their own; so do laws in the place of a function without one.
     pub(super) fn exchanged(&self, best: &Explanation, most: usize) -> Vec<Explanation> {
         let differ = |one: &Explanation, other: &Explanation| {
             let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
-            let new: Vec<&Hypothesis> = one.hypotheses.iter().filter(is_new).collect();
-            matches!(new.as_slice(), [only] if only.effect().is_some())
+            one.hypotheses.iter().filter(is_new).cloned().collect::<Vec<Hypothesis>>()
         };
         let is_exchange = |other: &&Explanation| {
-            other.hypotheses.len() == best.hypotheses.len() && differ(best, other) && differ(other, best)
+            other.hypotheses.len() == best.hypotheses.len()
+                && differ(best, other).len() == 1
+                && matches!(differ(other, best).as_slice(), [only] if only.effect().is_some())
         };
         let mut all: Vec<Explanation> = self.explanations.iter().filter(is_exchange).take(most).cloned().collect();
-        for (effect, other) in &self.stand_ins {
-            let Some(place) = best.hypotheses.iter().position(|own| own.effect() == Some(effect)) else { continue };
+        for (own, other) in &self.stand_ins {
+            let Some(place) = best.hypotheses.iter().position(|known| known == own) else { continue };
             let mut exchanged = Explanation { probability: 0.0, ..best.clone() };
             exchanged.hypotheses[place] = other.clone();
             exchanged.functions[place].0 = 0;
@@ -403,13 +382,14 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     Some(evidence)
 }
 
-/// For each effect of an explanation the few others, one of a family at each place, that do best in its place, if at least half as well.
+/// For each hypothesis of an explanation the few other effects, one of a family at each place, that do best in its place, if at least half as
+/// well.
 fn stand_ins(
     best: &Explanation,
     hypotheses: &Hypotheses,
     (blocks, target): (&[Block], &Target),
     rules: &SelectionRules,
-) -> Vec<(Effect, Hypothesis)> {
+) -> Vec<(Hypothesis, Hypothesis)> {
     let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
     let tried: Vec<usize> = (0..blocks.len()).filter(|&k| effect(k).is_some()).collect();
     let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
@@ -417,10 +397,11 @@ fn stand_ins(
     };
     let members: Vec<usize> = best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
     let mut all = Vec::new();
-    for &own in members.iter().filter(|&&k| effect(k).is_some()) {
+    for &own in &members {
         let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
         let mut gains = search::gains_beside(&others, &tried, (blocks, target), rules);
-        let least = gains.iter().find(|(k, ..)| *k == own).map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
+        let of_own = search::gains_beside(&others, &[own], (blocks, target), rules);
+        let least = of_own.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
         gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
@@ -428,7 +409,7 @@ fn stand_ins(
         for (k, ..) in gains {
             if !known.contains(&name(k)) && known.len() <= rules.stand_ins {
                 known.push(name(k));
-                all.extend(effect(own).map(|own| (own.clone(), hypotheses.all[k].hypothesis.clone())));
+                all.push((hypotheses.all[own].hypothesis.clone(), hypotheses.all[k].hypothesis.clone()));
             }
         }
     }

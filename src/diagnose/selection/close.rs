@@ -284,7 +284,7 @@ fn is_held(explanation: &Explanation, added: &[Effect]) -> bool {
 fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evidence, Option<Fitted>), IdentifyError> {
     let (data, rules) = (rounds.data, rounds.data.rules);
     let added = rounds.added(fitted);
-    let held = evidence.sure(rules.sure).filter(|best| !added.is_empty() && is_held(best, &added));
+    let held = evidence.sure(rules.sure).filter(|best| !best.hypotheses.is_empty() && is_held(best, &added));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let functions = best.without_law();
     let Some(own) = ln_posterior(fitted, data, &added, (&functions, fitted.sigma)) else { return Ok((evidence, None)) };
@@ -295,13 +295,26 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     for (k, rival) in rivals.into_iter().enumerate() {
         rounds.tell(k + 1, count);
         let next = rounds.fit(fitted, &rival.effects())?;
+        let functions = rival.without_law();
         let Some(other) = ln_posterior(&next, data, &rounds.added(&next), (&functions, fitted.sigma)) else { continue };
+        // A law in the place of a function must be what its own fit speaks for: functions are never fitted but linear about another fit.
+        let is_law = functions.len() < best.without_law().len();
+        if is_law && other > own && !stands(&next, data, &rounds.added(&next), functions.len()) {
+            continue;
+        }
         odds.push((rival, other - own));
         if other > own && better.as_ref().is_none_or(|(most, _)| other > *most) {
             better = Some((other, next));
         }
     }
     Ok((evidence.corrected(&best, &odds), better.map(|(_, fitted)| fitted)))
+}
+
+/// Whether what explains the residual of a fit is what was added, and no more functions than these.
+fn stands(fitted: &Fitted, data: &Data, added: &[Effect], functions: usize) -> bool {
+    let evidence = weigh(fitted, data, added);
+    let best = evidence.as_ref().and_then(|evidence| evidence.sure(data.rules.sure));
+    best.is_some_and(|best| is_held(best, added) && best.without_law().len() <= functions)
 }
 
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
