@@ -66,7 +66,7 @@ pub struct SelectionRules {
     pub looked_at: usize,
     /// Largest principal angle \[rad\] at which two effects are look-alikes: 20°.
     pub alike: f64,
-    /// Other effects that are fitted in the place of each that is found.
+    /// Other effects that are fitted in the place of each that is found, or of a function without a law.
     pub stand_ins: usize,
     /// Poses among which one is sought that tells two look-alikes apart.
     pub telling_poses: usize,
