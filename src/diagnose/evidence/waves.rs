@@ -5,9 +5,11 @@
 //! the rest of such an explanation becomes a hypothesis like all others. One that the data cannot tell from a whole number is the harmonic of
 //! that order.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::block::{Block, Design};
 use super::columns::{Candidate, even, turning};
@@ -23,12 +25,16 @@ use crate::problem::{Effect, JointKind, Problem};
 
 /// Probability of an explanation from which on waves are looked for in the place of its functions.
 const WORTH_A_LOOK: f64 = 0.01;
-/// Explanations whose functions waves may stand for, the most probable ones.
-const MOST: usize = 12;
+/// Explanations whose functions waves of a joint may stand for, the most probable ones.
+const MOST: usize = 6;
 /// Steps between orders, as phases \[rad\] from one end of the joint's range to the other: of the first look, and of the second one.
 const STEPS: [f64; 2] = [0.5, 0.02];
 /// Orders of the first look about which there is a second.
 const LOOKED_AT: usize = 3;
+/// Orders that a row has at most: of a joint of many turns the highest are not looked for.
+const MOST_ORDERS: usize = 4000;
+/// Orders whose columns are kept at once.
+const TOGETHER: usize = 256;
 
 /// The joint, from 0, at which a hypothesis is a function of that joint's own command, or of nothing that is known.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
@@ -44,9 +50,9 @@ fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     (turns && is_own).then_some(joint)
 }
 
-/// Sets in which a wave of a joint may stand: explanations without one function of that joint's command, and without any.
-fn places(hypotheses: &Hypotheses, weighted: &[Weighted], problem: &Problem) -> Vec<(usize, Vec<usize>)> {
-    let mut all: Vec<(usize, Vec<usize>)> = Vec::new();
+/// For joints, from 0, the sets in which a wave may stand: explanations without one function of the joint's command, and without any.
+fn places(hypotheses: &Hypotheses, weighted: &[Weighted], problem: &Problem) -> BTreeMap<usize, Vec<Vec<usize>>> {
+    let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
     let of = |member: usize| own_function(&hypotheses.all[member].hypothesis, problem);
     for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
         for &member in &set.members {
@@ -56,9 +62,10 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], problem: &Problem) -> 
                 rest.sort_unstable();
                 rest
             };
+            let own = all.entry(joint).or_default();
             for rest in [without(&|other| other == member), without(&|other| of(other) == Some(joint))] {
-                if !all.contains(&(joint, rest.clone())) && all.len() < MOST {
-                    all.push((joint, rest));
+                if !own.contains(&rest) && own.len() < MOST {
+                    own.push(rest);
                 }
             }
         }
@@ -72,9 +79,10 @@ fn is_free(effect: &Effect, problem: &Problem) -> bool {
     !holds_all(problem, &parameters) && !refuses(problem, &parameters)
 }
 
-/// Orders from `low` to `high` in steps.
+/// Orders from `low` to `high` in steps, so many at most.
 fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
-    std::iter::successors(Some(low), |order| Some(order + step)).take_while(|order| *order <= high).collect()
+    let all = std::iter::successors(Some(low), |order| Some(order + step));
+    all.take_while(|order| *order <= high).take(MOST_ORDERS).collect()
 }
 
 /// Waves of any order that do better than those known in the place of functions of `weighted` explanations.
@@ -82,77 +90,79 @@ pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
     (blocks, target): (&mut Vec<Block>, &Target),
-    block: impl Fn(&Candidate) -> Block,
+    block: impl Fn(&Candidate) -> Block + Sync,
     (problem, rules): (&Problem, &SelectionRules),
 ) -> Vec<Candidate> {
     let known = blocks.len();
     let mut found: Vec<Candidate> = Vec::new();
-    for (joint, rest) in places(hypotheses, weighted, problem) {
+    for (joint, rests) in places(hypotheses, weighted, problem) {
         let Some((low, high)) = hypotheses.known(&Covariate::Command(joint)).map(|own| own.range) else { continue };
         if !is_free(&Effect::JointWave { joint: joint + 1, order: rules.wave_orders }, problem) {
             continue;
         }
-        // Best first, with ln of the odds to the rest alone.
-        let mut tried = |orders: &[f64]| {
-            let waves = orders.iter().filter_map(|&order| {
-                let effect = Effect::JointWave { joint: joint + 1, order };
-                Some((order, hypotheses.wave(&effect, order, problem, rules)?))
-            });
-            let (orders, waves): (Vec<f64>, Vec<Candidate>) = waves.unzip();
-            blocks.extend(waves.iter().map(&block));
-            let all: Vec<usize> = (known..blocks.len()).collect();
-            let gains = gains_beside(&rest, &all, (blocks, target), rules);
-            blocks.truncate(known);
-            let mut gains: Vec<(f64, f64)> = gains.into_iter().map(|(k, gain, _)| (orders[k - known], gain)).collect();
-            gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        // For each of the sets the orders, best first, with ln of their odds to the set alone.
+        let mut tried = |orders: &[f64], rests: &[Vec<usize>]| {
+            let mut gains: Vec<Vec<(f64, f64)>> = vec![Vec::new(); rests.len()];
+            for some in orders.chunks(TOGETHER) {
+                let wave = |&order: &f64| {
+                    let effect = Effect::JointWave { joint: joint + 1, order };
+                    Some((order, block(&hypotheses.wave(&effect, order, problem, rules)?)))
+                };
+                let (orders, waves): (Vec<f64>, Vec<Block>) = some.par_iter().filter_map(wave).unzip();
+                blocks.extend(waves);
+                let all: Vec<usize> = (known..blocks.len()).collect();
+                for (rest, own) in rests.iter().zip(&mut gains) {
+                    let of = gains_beside(rest, &all, (blocks, target), rules);
+                    own.extend(of.into_iter().map(|(k, gain, _)| (orders[k - known], gain)));
+                }
+                blocks.truncate(known);
+            }
+            for own in &mut gains {
+                own.sort_by(|a, b| b.1.total_cmp(&a.1));
+            }
             gains
         };
         let [step, finer] = STEPS.map(|phase| phase / (high - low));
         // A wave of which less than one cycle is seen is none.
-        let first = tried(&row(TAU / (high - low), rules.wave_orders, step));
+        let first = tried(&row(TAU / (high - low), rules.wave_orders, step), &rests);
         let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
         let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
         let taken = hypotheses.orders(joint);
-        let mut second = taken.clone();
-        for (order, _) in first.into_iter().take(LOOKED_AT) {
-            second.extend(row(order - step, order + step, finer).into_iter().map(|order| written(order, digits)));
-            second.extend([order.floor(), order.ceil()]);
-        }
-        second.retain(|order| *order > 0.0);
-        second.sort_by(f64::total_cmp);
-        second.dedup();
-        let gains = tried(&second);
-        let Some(&(best, most)) = gains.first() else { continue };
-        // What is known already, or is a whole number, unless another order does much better.
-        let alike = |of: &dyn Fn(f64) -> bool| {
-            gains
-                .iter()
-                .take_while(|(_, gain)| *gain > most - rules.another_order)
-                .map(|(order, _)| *order)
-                .find(|order| of(*order))
-        };
-        let whole = alike(&|order| order.fract() == 0.0);
-        let is_listed = |order: f64| order <= f64::from(rules.near_orders) || taken.contains(&order);
-        if most <= rules.another_order
-            || alike(&|order| taken.contains(&order)).is_some()
-            || whole.is_some_and(is_listed)
-        {
-            continue;
-        }
-        let effect = match whole {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a whole number up to the highest"
-            )]
-            Some(order) => Effect::JointHarmonic { joint: joint + 1, orders: vec![order as u32] },
-            None => Effect::JointWave { joint: joint + 1, order: best },
-        };
-        if is_free(&effect, problem) && !found.iter().any(|known| known.hypothesis.effect() == Some(&effect)) {
-            found.extend(hypotheses.wave(&effect, whole.unwrap_or(best), problem, rules));
+        for (rest, first) in rests.iter().zip(first) {
+            let mut second = taken.clone();
+            for (order, _) in first.into_iter().take(LOOKED_AT) {
+                let near = row(order - step, order + step, finer);
+                second.extend(near.into_iter().map(|order| written(order, digits)));
+                second.extend([order.floor(), order.ceil()]);
+            }
+            second.retain(|order| *order > 0.0);
+            second.sort_by(f64::total_cmp);
+            second.dedup();
+            let gains = tried(&second, std::slice::from_ref(rest)).concat();
+            let Some((effect, order)) = another(joint, &gains, &taken, rules) else { continue };
+            if is_free(&effect, problem) && !found.iter().any(|known| known.hypothesis.effect() == Some(&effect)) {
+                found.extend(hypotheses.wave(&effect, order, problem, rules));
+            }
         }
     }
     found
+}
+
+/// The wave of orders, best first, with ln of their odds, that is neither known already nor a whole number that is listed: of a whole number
+/// that does as well it is the harmonic.
+fn another(joint: usize, gains: &[(f64, f64)], taken: &[f64], rules: &SelectionRules) -> Option<(Effect, f64)> {
+    let &(best, most) = gains.first().filter(|(_, most)| *most > rules.another_order)?;
+    let as_good = || gains.iter().take_while(|(_, gain)| *gain > most - rules.another_order).map(|(order, _)| *order);
+    if as_good().any(|order| taken.contains(&order)) {
+        return None;
+    }
+    let joint = joint + 1;
+    match as_good().find(|order| order.fract() == 0.0) {
+        Some(order) if order <= f64::from(rules.near_orders) => None,
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number up to the highest")]
+        Some(order) => Some((Effect::JointHarmonic { joint, orders: vec![order as u32] }, order)),
+        None => Some((Effect::JointWave { joint, order: best }, best)),
+    }
 }
 
 /// As written with so many digits, not as a product has it.
