@@ -26,6 +26,8 @@ pub(super) struct Candidate {
     pub coefficients: Coefficients,
 }
 
+const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
+
 /// Slots whose columns the hypotheses need beside those of effects.
 pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
     let mut slots: Vec<Slot> = places(problem).collect();
@@ -92,8 +94,6 @@ pub(super) fn is_wave(effect: &Effect) -> bool {
 pub(super) fn turning(problem: &Problem) -> f64 {
     problem.joints.iter().filter(|joint| joint.commanded() == JointKind::Revolute).count().max(1) as f64
 }
-
-const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
 
 /// Everything that may explain a residual.
 pub(super) struct Columns<'a, 'l> {

@@ -344,6 +344,9 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
     let mut weighted = search(&blocks, &target, data.rules, &present);
+    if data.stop.is_requested() {
+        return None;
+    }
     let of_wave = |wave: &Candidate| block(wave, (fitted, &target.fit), &[]);
     let how = (&fitted.problem, data.rules);
     let waves = waves::promising(&hypotheses, &weighted, (&mut blocks, &target), of_wave, how);

@@ -103,7 +103,7 @@ pub(super) fn promising(
         // For each of the sets the orders, best first, with ln of their odds to the set alone.
         let mut tried = |orders: &[f64], rests: &[Vec<usize>]| {
             let mut gains: Vec<Vec<(f64, f64)>> = vec![Vec::new(); rests.len()];
-            for some in orders.chunks(TOGETHER) {
+            for some in orders.chunks(TOGETHER).take_while(|_| !target.stop.is_requested()) {
                 let wave = |&order: &f64| {
                     let effect = Effect::JointWave { joint: joint + 1, order };
                     Some((order, block(&hypotheses.wave(&effect, order, problem, rules)?)))

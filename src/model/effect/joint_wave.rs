@@ -22,7 +22,7 @@ pub(super) const FAMILY: Family = Family {
     },
     describe: |effect| match effect {
         Effect::JointWave { joint, order } => {
-            format!("angle of joint {joint} errs with {order} cycles a revolution, as of a stage of its gear")
+            format!("angle of joint {joint} errs with {order} cycles a revolution")
         }
         _ => String::new(),
     },
