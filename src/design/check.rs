@@ -157,7 +157,7 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
         names: words.names.clone(),
         of_row: (0..drawn.len()).map(|row| words.of_row[row % table.len()]).collect(),
     };
-    Measurements { session: spread(&table.session), target: table.target.as_ref().map(spread), ..drawn }
+    Measurements { session: spread(&table.session), target: table.target.as_ref().map(spread), ..drawn.clone() }
 }
 
 impl Check {

@@ -197,6 +197,8 @@ pub enum InputErrorKind {
     NoLink { joint: usize },
     #[error("joint {joint} has no slide that could bend: it is not prismatic")]
     NoSlide { joint: usize },
+    #[error("joint {joint} does not turn: it is not revolute")]
+    NotRevolute { joint: usize },
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
     #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]

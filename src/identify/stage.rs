@@ -140,8 +140,18 @@ impl<'a> Stage<'a> {
         let mut put = |value: f64| digest.write_u64(value.to_bits());
         others.iter().copied().for_each(&mut put);
         for pose in &self.poses {
-            let PoseView { configuration, payload, hoist, temperature, time, elapsed, approach, covariates } =
-                &pose.setup;
+            let PoseView {
+                configuration,
+                payload,
+                hoist,
+                temperature,
+                time,
+                elapsed,
+                approach,
+                covariates,
+                past,
+                strains: _,
+            } = &pose.setup;
             let columns = configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
             columns.chain(&pose.measured).copied().for_each(&mut put);
             [*payload, *hoist, *temperature].map(|own| own.unwrap_or(f64::NAN)).into_iter().for_each(&mut put);
@@ -149,6 +159,8 @@ impl<'a> Stage<'a> {
             put(pose.orientation.map_or(0.0, |own| own.sigma));
             put(pose.base as f64);
             put(pose.target as f64);
+            // What was before stands in the table, which is the same in all fits that share a memory.
+            put(past.times.len() as f64);
         }
         self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
         digest.finish()

@@ -21,6 +21,7 @@ mod lines;
 mod mapped;
 #[deny(clippy::indexing_slicing)]
 mod observed;
+mod order;
 #[deny(clippy::indexing_slicing)]
 mod orientation;
 #[deny(clippy::indexing_slicing)]
@@ -40,11 +41,12 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
-use crate::problem::{Observation, PoseConditions, PoseView, Problem};
+use crate::problem::{Observation, Past, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
+pub use order::RowOrder;
 pub(crate) use repeats::different;
 pub use split::Split;
 
@@ -104,6 +106,8 @@ pub struct Measurements {
     pub command_columns: Vec<CommandColumn>,
     /// What was passed over in the files, for reports.
     pub warnings: Vec<Warning>,
+    /// In which order the rows were measured: found when it is first asked for, so rows change before that or in a copy.
+    pub order: RowOrder,
 }
 
 /// A fixed point that was measured again, to see whether the instrument stayed.
@@ -222,10 +226,11 @@ impl Measurements {
         self.setup(row, self.first_time()).to_owned()
     }
 
-    /// The same of every row.
+    /// The same of every row, without what was before it, which the other rows say.
     pub fn all_conditions(&self) -> Vec<PoseConditions> {
         let first = self.first_time();
-        (0..self.len()).map(|row| self.setup(row, first).to_owned()).collect()
+        let alone = |row| PoseView { past: Past::default(), ..self.setup(row, first) }.to_owned();
+        (0..self.len()).map(alone).collect()
     }
 
     /// Time of the first pose \[s\].
@@ -245,6 +250,8 @@ impl Measurements {
             elapsed: self.time[row] - first,
             approach: self.approach.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
+            past: self.past(row),
+            strains: &[],
         }
     }
 
@@ -307,6 +314,7 @@ impl Measurements {
             marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
             command_columns: self.command_columns.clone(),
             warnings: self.warnings.clone(),
+            order: RowOrder::default(),
         }
     }
 

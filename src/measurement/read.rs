@@ -12,7 +12,7 @@ use super::observed::{self, Observed};
 use super::orientation::Cells;
 use super::role::Role;
 use super::table::Table;
-use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading};
+use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading, RowOrder};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::files::same_file;
 use crate::problem::{JointSource, Missing, Problem, RotationKind};
@@ -283,6 +283,7 @@ impl Builder {
             marked_held_out: columns.marked.map(|_| Vec::new()),
             command_columns: columns.read.iter().filter_map(|column| command(column, table)).collect(),
             warnings: Vec::new(),
+            order: RowOrder::default(),
         };
         let poses = PoseNames::of(columns.has(Role::Pose));
         let columns = columns.read.iter().map(|column| (*column, columns.name_of(column).to_owned())).collect();

@@ -35,8 +35,6 @@ pub struct Arm<S> {
     pub mounting: Option<[S; 2]>,
     /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics are undeflected.
     pub mixing: Option<S>,
-    /// Temperature without thermal effects [°C].
-    pub reference_temperature: f64,
 }
 
 impl Arm<f64> {
@@ -55,7 +53,6 @@ impl Arm<f64> {
             rope: None,
             mounting: None,
             mixing: None,
-            reference_temperature: problem.data.reference_temperature.unwrap_or(0.0),
         }
     }
 
@@ -74,7 +71,6 @@ impl Arm<f64> {
             rope: self.rope.as_ref().map(Rope::lift),
             mounting: self.mounting.map(|mounting| mounting.map(S::from)),
             mixing: self.mixing.map(S::from),
-            reference_temperature: self.reference_temperature,
         }
     }
 }
@@ -86,11 +82,6 @@ impl<S: Scalar> Arm<S> {
             joint.turns() || joint.lateral.is_some() || joint.slide.is_some() || joint.beam.is_some()
         };
         self.mounting.is_some() || self.joints.iter().any(gives)
-    }
-
-    /// Degrees above the reference \[K\]; 0 where the temperature is not known.
-    pub(super) fn warming(&self, setup: &PoseView) -> f64 {
-        setup.temperature.map_or(0.0, |temperature| temperature - self.reference_temperature)
     }
 
     /// Index of the last joint.

@@ -269,7 +269,8 @@ impl<S: Scalar> Arm<S> {
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
-        let strain = beam.thermal.as_ref().map(|thermal| thermal.strain(self.warming(walk.setup)));
+        let of_pose = walk.setup.strains.chunks_exact(3).nth(link).and_then(|own| own.try_into().ok());
+        let strain = beam.strain.as_ref().map(|strain| strain.and(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
             let further = link_loads.iter().filter(|load| load.element > number).map(|load| load.force);

@@ -19,15 +19,6 @@ pub struct Nonlinear<S> {
     pub play: S,
 }
 
-/// How a link changes with temperature.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Thermal<S> {
-    /// Curvature about y and z per degree, turning per metre of +x [1/(m·K)].
-    pub curvature: [S; 2],
-    /// Strain per degree [1/K].
-    pub expansion: S,
-}
-
 /// A mass on a link's axis that nobody declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AddedMass<S> {
@@ -62,20 +53,20 @@ fn tanh<S: Scalar>(x: S) -> S {
     if x.re().abs() < FLAT { x.tanh() } else { S::from(x.re().signum()) }
 }
 
-impl<S: Scalar> Thermal<S> {
-    /// Strain and curvatures at a warming of `degrees` \[K\].
-    pub(super) fn strain(&self, degrees: f64) -> Strain<S> {
-        Strain { axial: self.expansion * degrees, curvature: self.curvature.map(|k| k * degrees) }
-    }
-}
-
-/// Strain of a beam without load.
+/// Strain of a beam without load, as of one that is warm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strain<S> {
     /// Elongation per length.
     pub axial: S,
-    /// Curvature about y and z [1/m].
+    /// Curvature about y and z, turning per metre of +x [1/m].
     pub curvature: [S; 2],
+}
+
+impl<S: Scalar> Strain<S> {
+    /// With that of one pose: elongation, then curvatures.
+    pub(super) fn and(&self, [axial, y, z]: [f64; 3]) -> Self {
+        Self { axial: self.axial + axial, curvature: [self.curvature[0] + y, self.curvature[1] + z] }
+    }
 }
 
 impl<S: Scalar> Rope<S> {
@@ -96,10 +87,10 @@ impl Nonlinear<f64> {
     }
 }
 
-impl Thermal<f64> {
+impl Strain<f64> {
     /// The same as constants of another scalar.
-    pub(super) fn lift<S: Scalar>(&self) -> Thermal<S> {
-        Thermal { curvature: self.curvature.map(S::from), expansion: S::from(self.expansion) }
+    pub(super) fn lift<S: Scalar>(&self) -> Strain<S> {
+        Strain { axial: S::from(self.axial), curvature: self.curvature.map(S::from) }
     }
 }
 

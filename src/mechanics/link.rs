@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Flexibility;
-use super::imperfection::{AddedMass, Thermal};
+use super::imperfection::{AddedMass, Strain};
 use crate::problem;
 use crate::scalar::Scalar;
 
@@ -38,8 +38,8 @@ pub struct Beam<S> {
     pub masses: Vec<PointMass>,
     /// Suspension.
     pub hoist: Option<Hoist>,
-    /// Change with temperature.
-    pub thermal: Option<Thermal<S>>,
+    /// Strain without load, beside that of each pose; `None`: it has none in any pose.
+    pub strain: Option<Strain<S>>,
     /// A mass that nobody declared.
     pub added: Option<AddedMass<S>>,
 }
@@ -67,7 +67,7 @@ impl Beam<f64> {
                 force: hoist.force,
                 direction: hoist.direction,
             }),
-            thermal: None,
+            strain: None,
             added: None,
         }
     }
@@ -85,7 +85,7 @@ impl Beam<f64> {
             },
             masses: self.masses.clone(),
             hoist: self.hoist,
-            thermal: self.thermal.as_ref().map(Thermal::lift),
+            strain: self.strain.as_ref().map(Strain::lift),
             added: self.added.as_ref().map(AddedMass::lift),
         }
     }

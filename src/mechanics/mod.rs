@@ -20,7 +20,7 @@ mod workspace;
 
 pub use arm::Arm;
 pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
-pub use imperfection::{AddedMass, Nonlinear, Rope, Strain, Thermal};
+pub use imperfection::{AddedMass, Nonlinear, Rope, Strain};
 pub use joint::{Angle, Coordinates, Joint, Placement};
 pub use link::{Beam, Hoist, PointMass};
 pub use segment::Segment;

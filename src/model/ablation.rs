@@ -67,7 +67,7 @@ impl Model {
                 (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);
             }
             // A rigid link that changes with temperature is still walked along.
-            if ablation == Ablation::Rigid && joint.beam.as_ref().is_some_and(|beam| beam.thermal.is_none()) {
+            if ablation == Ablation::Rigid && joint.beam.as_ref().is_some_and(|beam| beam.strain.is_none()) {
                 joint.beam = None;
             }
             let Some(beam) = &mut joint.beam else { continue };

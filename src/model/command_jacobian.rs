@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::driven::Place;
 use super::{Model, Pose, PoseResiduals};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::problem::Problem;
@@ -41,9 +42,11 @@ impl Model {
                 }
                 let mut jacobian = turned.clone();
                 for driven in &arm.driven {
+                    // No command drives the strain of a beam.
+                    let Place::Joint(follows) = driven.place else { continue };
                     for &joint in &moving {
                         let slope = driven.value * driven.driver.slope(&pose.setup, joint);
-                        jacobian.column_mut(joint).axpy(slope, &turned.column(driven.joint), 1.0);
+                        jacobian.column_mut(joint).axpy(slope, &turned.column(follows), 1.0);
                     }
                 }
                 for &joint in &moving {

@@ -1,14 +1,23 @@
-//! What adds to the joints' commands, pose by pose.
+//! What adds to the joints' commands and to the strains of beams, pose by pose.
 
-use crate::model::parameter::{Driver, JointField, Parameter, Slot, Waves};
+use crate::model::parameter::{BeamField, Driver, JointField, Parameter, Slot, Waves};
 use crate::problem::{Mimic, PoseView, Problem};
 
-/// A known addition to a joint's coordinate: value × driver.
+/// What is added to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// The coordinate of a joint.
+    Joint(usize),
+    /// A number in the list of all beams' strains.
+    Strain(usize),
+}
+
+/// A known addition: value × driver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Driven {
-    pub joint: usize,
+    pub place: Place,
     pub driver: Driver,
-    /// \[rad\] or \[m\] per unit of the driver.
+    /// \[rad\], \[m\], \[1/m\] or 1 per unit of the driver.
     pub value: f64,
 }
 
@@ -18,27 +27,30 @@ impl Driven {
         let joints = problem.joints.iter().enumerate();
         let driven = joints.filter_map(|(joint, own)| {
             let Mimic { joint: other, ratio } = own.mimic?;
-            Some(Self { joint, driver: Driver::command(problem, other + 1), value: ratio })
+            Some(Self { place: Place::Joint(joint), driver: Driver::command(problem, other + 1), value: ratio })
         });
         driven.collect()
     }
 
-    /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate.
+    /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate or a beam's strain.
     fn of(slot: Slot, driver: Driver, x: f64) -> Option<Self> {
-        match slot {
-            Slot::Joint { joint, field: JointField::Theta | JointField::D } if !driver.is_constant() => {
-                Some(Self { joint, driver, value: x })
+        let place = match slot {
+            Slot::Joint { joint, field: JointField::Theta | JointField::D } => Place::Joint(joint),
+            Slot::Beam { joint, field } => {
+                Place::Strain(3 * joint + BeamField::STRAINS.iter().position(|own| *own == field)?)
             }
-            _ => None,
-        }
+            _ => return None,
+        };
+        (!driver.is_constant()).then_some(Self { place, driver, value: x })
     }
 }
 
-/// Configurations with what drives them added, one pose at a time.
+/// Poses with what drives them added, one at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Commands {
     all: Vec<Driven>,
     configuration: Vec<f64>,
+    strains: Vec<f64>,
 }
 
 impl Commands {
@@ -47,7 +59,7 @@ impl Commands {
         let free = parameters.iter().zip(x);
         let mut all = known.to_vec();
         all.extend(free.filter_map(|(parameter, &x)| Driven::of(parameter.slot, parameter.driver, x)));
-        Self { all, configuration: Vec::new() }
+        Self { all, ..Self::default() }
     }
 
     /// Everything that is added.
@@ -55,7 +67,7 @@ impl Commands {
         self.all
     }
 
-    /// The pose as the joints take it.
+    /// The pose as the joints and beams take it.
     #[inline]
     pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
         if self.all.is_empty() {
@@ -63,10 +75,18 @@ impl Commands {
         }
         self.configuration.clear();
         self.configuration.extend_from_slice(setup.configuration);
+        self.strains.clear();
         let mut waves = Waves::default();
         for driven in &self.all {
-            self.configuration[driven.joint] += driven.value * waves.value(driven.driver, setup);
+            let added = driven.value * waves.value(driven.driver, setup);
+            match driven.place {
+                Place::Joint(joint) => self.configuration[joint] += added,
+                Place::Strain(number) => {
+                    self.strains.resize(3 * self.configuration.len(), 0.0);
+                    self.strains[number] += added;
+                }
+            }
         }
-        PoseView { configuration: &self.configuration, ..*setup }
+        PoseView { configuration: &self.configuration, strains: &self.strains, ..*setup }
     }
 }

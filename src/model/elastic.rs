@@ -7,6 +7,7 @@ use nalgebra::{DVector, Vector3};
 use num_dual::Dual64;
 
 use super::Model;
+use super::enter::enter;
 use super::inputs::Input;
 use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Equilibrated, Response, Segment, Sensitivity, Workspace};
@@ -110,17 +111,21 @@ fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Segment> {
 pub(super) fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
     let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
-    for input in inputs {
-        if let (None, Slot::Joint { joint, field }) = (input.parameter, input.slot) {
-            let seed = Dual64::from(0.0).derivative();
-            let joint = &mut arm.joints[joint];
-            match field {
-                JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
-                JointField::A => joint.a += seed,
-                JointField::D => joint.d += seed,
-                JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
-                _ => joint.theta += seed,
+    let seed = Dual64::from(0.0).derivative();
+    for input in inputs.iter().filter(|input| input.parameter.is_none()) {
+        match input.slot {
+            Slot::Joint { joint, field } => {
+                let joint = &mut arm.joints[joint];
+                match field {
+                    JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
+                    JointField::A => joint.a += seed,
+                    JointField::D => joint.d += seed,
+                    JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
+                    _ => joint.theta += seed,
+                }
             }
+            Slot::Beam { .. } => enter(&mut arm, input.slot, 0.0, seed, &mut [seed; 2]),
+            _ => {}
         }
     }
     arm

@@ -1,6 +1,6 @@
 //! How a parameter enters the arm, by its slot.
 
-use crate::mechanics::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Thermal};
+use crate::mechanics::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Strain};
 use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
@@ -24,8 +24,8 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
         Slot::Beam { joint, field } => {
             let beam = arm.joints[joint].beam.get_or_insert_with(weightless);
             match field {
-                BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion => {
-                    beam.thermal.get_or_insert(Thermal { curvature: [0.0; 2], expansion: 0.0 });
+                BeamField::BowY | BeamField::BowZ | BeamField::Stretch => {
+                    beam.strain.get_or_insert(Strain { curvature: [0.0; 2], axial: 0.0 });
                 }
                 BeamField::CouplingY | BeamField::CouplingZ => {
                     beam.flexibility.coupling.get_or_insert([0.0; 2]);
@@ -59,7 +59,7 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
 
 /// A link that was declared rigid, ready to bend.
 fn weightless() -> Beam<f64> {
-    Beam { mass: 0.0, flexibility: Flexibility::RIGID, masses: Vec::new(), hoist: None, thermal: None, added: None }
+    Beam { mass: 0.0, flexibility: Flexibility::RIGID, masses: Vec::new(), hoist: None, strain: None, added: None }
 }
 
 /// Turns gravity by the rotation vector (x, y, 0) \[rad\].
@@ -115,7 +115,7 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
 fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
     let all = &mut beam.flexibility;
     let flexibility = (-x).exp() / nominal;
-    match (field, &mut beam.thermal, &mut beam.added) {
+    match (field, &mut beam.strain, &mut beam.added) {
         (BeamField::Axial, ..) => all.axial = flexibility,
         (BeamField::Bending, ..) => (all.about_y, all.about_z) = (flexibility, flexibility),
         (BeamField::BendingY, ..) => all.about_y = flexibility,
@@ -128,12 +128,12 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
         }
         (BeamField::CouplingY, ..) => all.coupling = all.coupling.map(|[y, z]| [y + x, z]),
         (BeamField::CouplingZ, ..) => all.coupling = all.coupling.map(|[y, z]| [y, z + x]),
-        (BeamField::WarmingY, Some(thermal), _) => thermal.curvature[0] += x,
-        (BeamField::WarmingZ, Some(thermal), _) => thermal.curvature[1] += x,
-        (BeamField::Expansion, Some(thermal), _) => thermal.expansion += x,
+        (BeamField::BowY, Some(strain), _) => strain.curvature[0] += x,
+        (BeamField::BowZ, Some(strain), _) => strain.curvature[1] += x,
+        (BeamField::Stretch, Some(strain), _) => strain.axial += x,
         (BeamField::AddedMass, _, Some(added)) => added.mass += x,
         (BeamField::AddedAt, _, Some(added)) => added.at += x,
-        (BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion, None, _)
+        (BeamField::BowY | BeamField::BowZ | BeamField::Stretch, None, _)
         | (BeamField::AddedMass | BeamField::AddedAt, _, None) => {}
     }
 }

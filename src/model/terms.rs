@@ -69,7 +69,7 @@ fn check(
         if is_declared(parameter.slot) || others.iter().any(same) {
             return Err(InputErrorKind::Occupied { name: name() });
         }
-    } else if !is_drivable(problem, parameter.slot) {
+    } else if !is_drivable(problem, parameter.slot, parameter.driver) {
         return Err(InputErrorKind::NotDrivable { name: name() });
     }
     let twin = |other: &EffectParameter| other.name == parameter.name;
@@ -86,6 +86,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
         | Driver::Wave { joint, .. }
+        | Driver::Dragged { joint, .. }
         | Driver::Spline { of: Quantity::Command(joint), .. }
         | Driver::Bump { of: Quantity::Command(joint), .. }
         | Driver::Step { of: Quantity::Command(joint), .. } => joint < joints,
@@ -95,6 +96,7 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Driver::Constant
         | Driver::Unit
         | Driver::Warming { .. }
+        | Driver::Lagging { .. }
         | Driver::Elapsed
         | Driver::Since(_)
         | Driver::Settling(_) => true,
@@ -129,13 +131,14 @@ fn is_declared(slot: Slot) -> bool {
 }
 
 /// Whether the model can tell the quantity anew for every pose.
-fn is_drivable(problem: &Problem, slot: Slot) -> bool {
+fn is_drivable(problem: &Problem, slot: Slot, driver: Driver) -> bool {
     match slot {
         Slot::Joint { joint, field } => match problem.joints[joint].kind {
             JointKind::Revolute => field == JointField::Theta,
             JointKind::Prismatic => field == JointField::D,
             JointKind::Fixed => false,
         },
+        Slot::Beam { field, .. } => field.is_strain() && !driver.follows_commands(),
         Slot::Shift { .. } | Slot::Turn { .. } => true,
         _ => false,
     }

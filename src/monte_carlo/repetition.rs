@@ -91,7 +91,9 @@ fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec
 /// Positions on the virtual test rig \[m\].
 fn by_rig(arm: Problem, effects: Vec<TrueEffect>, segments: usize, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     let rig = Rig::new(arm, effects).with_segments(segments);
-    rows.iter().map(|row| Some(rig.pose_of(&row.target, &row.conditions).ok()?.0)).collect()
+    let table = table(rows);
+    let seen = |(k, row): (usize, &Row)| Some(rig.pose_of(&row.target, &table.conditions(k)).ok()?.0);
+    rows.iter().enumerate().map(seen).collect()
 }
 
 /// What the virtual test rig measured, as a table of measurements.

@@ -144,6 +144,16 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(joint)
     }
 
+    /// The number of a revolute joint that takes a command.
+    pub fn turning_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let joint = self.moving_joint(key)?;
+        let turns = self.joints.get(joint - 1).is_some_and(|own| own.kind == JointKind::Revolute);
+        match self.section.peek(key) {
+            Some(item) if !turns => Err(item.error(InputErrorKind::NotRevolute { joint })),
+            _ => Ok(joint),
+        }
+    }
+
     /// The number of a prismatic joint that takes a command.
     pub fn sliding_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let joint = self.moving_joint(key)?;
@@ -232,6 +242,13 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let found = self.section.positive(base, Unit::Time, |value| InputErrorKind::NotPositive { value })?;
         found.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
     }
+
+    /// An angle above zero \[rad\]; its key ends in the unit.
+    pub fn way(&mut self, key: &str) -> Result<f64, InputError> {
+        let base = key.strip_suffix("_rad").unwrap_or(key);
+        let found = self.section.positive(base, Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+        found.ok_or_else(|| self.section.missing(base, Unit::Angle.spelled(base)))
+    }
 }
 
 /// Examples of the same kinds on an arm, as TOML writes them.
@@ -264,6 +281,11 @@ impl<'s> Examples<'s> {
 
     pub fn other_joint(&self) -> String {
         self.moving().nth(1).unwrap_or(self.first() + 1).to_string()
+    }
+
+    pub fn turning_joint(&self) -> String {
+        let turns = |&number: &usize| self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Revolute);
+        self.moving().find(turns).unwrap_or(self.first()).to_string()
     }
 
     pub fn sliding_joint(&self) -> String {
@@ -301,6 +323,11 @@ impl<'s> Examples<'s> {
 
     pub fn duration(&self) -> String {
         self.time()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn way(&self) -> String {
+        "0.8".to_owned()
     }
 
     #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]

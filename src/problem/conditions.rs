@@ -1,5 +1,6 @@
 //! Under which conditions a pose is measured, and from which ranges poses are drawn.
 
+use super::past::Past;
 use super::{Effect, Problem};
 
 /// What the controller and the test bench set for one pose.
@@ -23,6 +24,10 @@ pub struct PoseConditions<V = Vec<f64>> {
     pub approach: Option<V>,
     /// Values of the problem's own covariates, in their order and units; empty: not known.
     pub covariates: V,
+    /// What was before.
+    pub past: Past<V>,
+    /// Strain of each beam without load, shape = (joints, 3): elongation, then curvatures about y and z [1/m]; empty: none.
+    pub strains: V,
 }
 
 /// Conditions of a pose whose numbers are kept elsewhere.
@@ -47,6 +52,8 @@ impl PoseView<'_> {
             elapsed: self.elapsed,
             approach: self.approach.map(<[f64]>::to_vec),
             covariates: self.covariates.to_vec(),
+            past: self.past.to_owned(),
+            strains: self.strains.to_vec(),
         }
     }
 }
@@ -63,6 +70,8 @@ impl PoseConditions {
             elapsed: self.elapsed,
             approach: self.approach.as_deref(),
             covariates: &self.covariates,
+            past: self.past.view(),
+            strains: &self.strains,
         }
     }
 }

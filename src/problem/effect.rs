@@ -104,12 +104,16 @@ effects! {
     Backlash "backlash" { joint: usize = moving_joint }
     /// Play that opens with the payload m: Δθ = (w m / 2)·approach.
     PayloadBacklash "payload-backlash" { joint: usize = moving_joint }
+    /// Friction pulls the joint back the way on which it came, Δθ = h z with dz/dθ = (g − z)/s, g = ±1 the side from which it comes.
+    JointHysteresis "joint-hysteresis" { joint: usize = turning_joint, distance: f64 = way as "distance_rad" }
     /// Δθ = c₃ `M_z`³ beyond the linear torsion.
     JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = any_joint }
     /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
     JointLateralCompliance "joint-lateral-compliance" { joint: usize = any_joint }
     /// Δθ = k (T − T₀).
     JointThermalDrift "joint-thermal-drift" { joint: usize = moving_joint }
+    /// Δθ = k (T̃ − T₀) with a temperature that lags, dT̃/dt = (T − T̃)/τ.
+    JointThermalDriftLag "joint-thermal-drift-lag" { joint: usize = moving_joint, time_constant: f64 = duration as "time_constant_s" }
     /// Δθ of one joint = k q of another.
     JointCoupling "joint-coupling" { joint: usize = moving_joint, from: usize = other_joint }
     /// Flexibility 1/EI of a link declared rigid.
@@ -122,6 +126,10 @@ effects! {
     LinkThermalBending "link-thermal-bending" { link: String = beam }
     /// Strain α (T − T₀) of a beam.
     LinkThermalExpansion "link-thermal-expansion" { link: String = beam }
+    /// Curvature (`k_y`, `k_z`)·(T̃ − T₀) along a beam whose temperature lags.
+    LinkThermalBendingLag "link-thermal-bending-lag" { link: String = beam, time_constant: f64 = duration as "time_constant_s" }
+    /// Strain α (T̃ − T₀) of a beam whose temperature lags.
+    LinkThermalExpansionLag "link-thermal-expansion-lag" { link: String = beam, time_constant: f64 = duration as "time_constant_s" }
     /// A mass m at s along a beam.
     UnmodelledMass "unmodelled-mass" { link: String = beam }
     /// The payload is heavier by m whenever one is carried.
@@ -186,6 +194,16 @@ impl Effect {
         matches!(
             self,
             Self::JointThermalDrift { .. } | Self::LinkThermalBending { .. } | Self::LinkThermalExpansion { .. }
+        ) || self.lags()
+    }
+
+    /// Whether it follows a temperature that lags.
+    fn lags(&self) -> bool {
+        matches!(
+            self,
+            Self::JointThermalDriftLag { .. }
+                | Self::LinkThermalBendingLag { .. }
+                | Self::LinkThermalExpansionLag { .. }
         )
     }
 
@@ -199,12 +217,18 @@ impl Effect {
 
     /// Whether it depends on the side from which joints come.
     pub fn has_sides(&self) -> bool {
-        matches!(self, Self::Backlash { .. } | Self::PayloadBacklash { .. })
+        matches!(self, Self::Backlash { .. } | Self::PayloadBacklash { .. } | Self::JointHysteresis { .. })
     }
 
-    /// Whether it follows time rather than what poses can be chosen for.
+    /// Whether it follows time, or the order of the poses, rather than what poses can be chosen for.
     pub fn follows_time(&self) -> bool {
-        matches!(self, Self::TrackerDrift | Self::StationShift { .. } | Self::TrackerSettling { .. })
+        let measured = matches!(self, Self::TrackerDrift | Self::StationShift { .. } | Self::TrackerSettling { .. });
+        measured || self.has_memory()
+    }
+
+    /// Whether it depends on the poses before.
+    pub fn has_memory(&self) -> bool {
+        self.lags() || matches!(self, Self::JointHysteresis { .. })
     }
 
     /// An order that this and another harmonic of one joint share.

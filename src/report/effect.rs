@@ -115,6 +115,21 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
     if let Effect::JointHarmonic { orders, .. } = effect { Some(orders) } else { None }
 }
 
+/// Effects of many time constants or distances, by their places alone.
+fn of_places(members: &[Effect]) -> String {
+    let mut places: Vec<String> = Vec::new();
+    for place in members.iter().filter_map(|effect| effect.arguments().first().and_then(|(_, own)| own.place())) {
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    let kind = match members[0].arguments().first() {
+        Some(("link", _)) => "link",
+        _ => "joint",
+    };
+    format!("{} of {kind}{} {}", code(members[0].name()), if places.len() > 1 { "s" } else { "" }, places.join(", "))
+}
+
 fn group(members: &[Effect]) -> String {
     let name = members[0].name();
     match (&members[0], members.len()) {
@@ -122,6 +137,7 @@ fn group(members: &[Effect]) -> String {
         (Effect::TrackerSettling { .. }, 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
+        (own, 2..) if own.has_memory() => return of_places(members),
         _ => {}
     }
     let place = |effect: &Effect| match effect {

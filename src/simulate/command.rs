@@ -43,6 +43,12 @@ impl Rig {
                     sides.map_or(0.0, |side| payload * width * side / 2.0)
                 }
                 (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => rate * self.warming(conditions),
+                (Effect::JointThermalDriftLag { joint, time_constant }, [rate]) if *joint == number => {
+                    rate * self.felt(conditions, *time_constant)
+                }
+                (Effect::JointHysteresis { joint, distance }, [amplitude]) if *joint == number => {
+                    amplitude * friction(conditions, number - 1, *distance)
+                }
                 (Effect::Covariate { joint: Mount::Joint(joint), of }, [rate]) if *joint == number => {
                     rate * self.covariate(of, conditions)
                 }
@@ -67,4 +73,52 @@ impl Rig {
             _ => 0.0,
         }
     }
+
+    /// T̃ − T₀ [°C] of what takes on the temperature within a time constant \[s\]: pose by pose, along straight lines between readings.
+    pub(super) fn felt(&self, conditions: &PoseConditions, time_constant: f64) -> f64 {
+        let past = &conditions.past;
+        let Some(now) = conditions.temperature else { return 0.0 };
+        let reference = self.arm.data.reference_temperature.unwrap_or(now);
+        let before = past.times.iter().copied().zip(past.temperatures.iter().copied());
+        let mut readings = before.chain([(conditions.time, now)]);
+        let Some((mut time, mut air)) = readings.next() else { return now - reference };
+        let mut felt = air;
+        for (next, reading) in readings {
+            let passed = next - time;
+            // Behind air that warms at a steady rate it stays by rate × τ.
+            let behind = if passed > 0.0 { (reading - air) / passed * time_constant } else { 0.0 };
+            let start = if passed > 0.0 { felt - air } else { felt - reading };
+            felt = reading - behind + (start + behind) * (-passed / time_constant).exp();
+            (time, air) = (next, reading);
+        }
+        felt - reference
+    }
+}
+
+/// z of the friction of a joint, counted from 0, pose by pose.                                            [Dahl 1968]
+fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
+    let past = &conditions.past;
+    let joints = conditions.configuration.len();
+    let nowhere = vec![0.0; joints];
+    let sides_now = conditions.approach.as_ref().unwrap_or(&nowhere);
+    let sides = past.approaches.chunks(joints).chain(std::iter::repeat(nowhere.as_slice())).take(past.times.len());
+    let earlier = past.configurations.chunks(joints).zip(sides);
+    let mut way: Option<(f64, f64)> = None;
+    for (configuration, sides) in earlier.chain([(conditions.configuration.as_slice(), sides_now.as_slice())]) {
+        let (q, side) = (configuration[joint], sides[joint]);
+        way = Some(match way {
+            None => (q, side),
+            Some((last, z)) => {
+                let step = q - last;
+                let towards = match side {
+                    0.0 if step > 0.0 => 1.0,
+                    0.0 => -1.0,
+                    side => side,
+                };
+                let kept = 1.0 / (step.abs() / distance).exp();
+                (q, towards * (1.0 - kept) + z * kept)
+            }
+        });
+    }
+    way.map_or(0.0, |(_, z)| z)
 }

@@ -10,7 +10,7 @@ use super::parameters::{self, TrueParameter};
 use super::truth::Truth;
 use super::{NoRest, Rig};
 use crate::problem::pattern::matches;
-use crate::problem::{Fixture, HeldOut, Joint, JointKind, Observation, PoseConditions, Problem};
+use crate::problem::{Fixture, HeldOut, Joint, JointKind, Observation, Past, PoseConditions, Problem};
 use crate::random::{normal, stream};
 
 /// Streams of random numbers of one seed, so that none shifts when another is used more.
@@ -166,7 +166,20 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
     let measure = |(row, stream_of): (&mut Row, u64)| rig.measure(row, truth, &mut stream(seed, stream_of));
-    let seen: Vec<_> = rows.par_iter_mut().zip((CONTACTS..).take(poses).collect::<Vec<_>>()).map(measure).collect();
+    let streams: Vec<u64> = (CONTACTS..).take(poses).collect();
+    let seen: Vec<_> = if truth.has_memory() {
+        let mut past = Past::default();
+        let after_those = |(row, stream_of): (&mut Row, u64)| {
+            row.conditions.past = std::mem::take(&mut past);
+            let seen = measure((row, stream_of));
+            past = std::mem::take(&mut row.conditions.past);
+            past.push(&row.conditions);
+            seen
+        };
+        rows.iter_mut().zip(streams).map(after_those).collect()
+    } else {
+        rows.par_iter_mut().zip(streams).map(measure).collect()
+    };
     for (index, seen) in seen.into_iter().enumerate() {
         let pose = index + 1;
         let found = seen.map_err(|source| SimulationError::NoRest { pose, source })?;

@@ -108,16 +108,19 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         }
         Effect::JointNonlinearStiffness { .. } => named(&[("cubic", Unit::CubicCompliance)]),
         Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => about_xy(Unit::Compliance),
-        Effect::JointThermalDrift { joint } => {
+        Effect::JointHysteresis { .. } => named(&[("amplitude", Unit::Angle)]),
+        Effect::JointThermalDrift { joint } | Effect::JointThermalDriftLag { joint, .. } => {
             named(&[("rate", if slides(joint) { Unit::LengthPerDegree } else { Unit::AnglePerDegree })])
         }
         Effect::JointCoupling { .. } => named(&[("factor", Unit::Ratio)]),
         Effect::LinkBending { .. } | Effect::SlideBending { .. } => named(&[("flexibility", Unit::Flexibility)]),
         Effect::TwistBending { .. } => named(&[("about_y", Unit::Flexibility), ("about_z", Unit::Flexibility)]),
-        Effect::LinkThermalBending { .. } => {
+        Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. } => {
             named(&[("about_y", Unit::CurvaturePerDegree), ("about_z", Unit::CurvaturePerDegree)])
         }
-        Effect::LinkThermalExpansion { .. } => named(&[("strain", Unit::PerDegree)]),
+        Effect::LinkThermalExpansion { .. } | Effect::LinkThermalExpansionLag { .. } => {
+            named(&[("strain", Unit::PerDegree)])
+        }
         Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
         Effect::PayloadMass => named(&[("mass", Unit::Mass)]),
         Effect::HoistDirection => {

@@ -116,8 +116,15 @@ impl Rig {
                 (Effect::LinkThermalBending { link }, [y, z]) if is_this(link) => {
                     hinge.free_rotation += Vector3::new(0.0, *y, *z) * (self.warming(conditions) * length);
                 }
+                (Effect::LinkThermalBendingLag { link, time_constant }, [y, z]) if is_this(link) => {
+                    let warm = self.felt(conditions, *time_constant);
+                    hinge.free_rotation += Vector3::new(0.0, *y, *z) * (warm * length);
+                }
                 (Effect::LinkThermalExpansion { link }, [strain]) if is_this(link) => {
                     hinge.free_stretch += strain * self.warming(conditions) * length;
+                }
+                (Effect::LinkThermalExpansionLag { link, time_constant }, [strain]) if is_this(link) => {
+                    hinge.free_stretch += strain * self.felt(conditions, *time_constant) * length;
                 }
                 _ => {}
             }

@@ -68,6 +68,11 @@ pub enum HeldOutRows {
 }
 
 impl Truth {
+    /// Whether something depends on the poses before.
+    pub(super) fn has_memory(&self) -> bool {
+        self.effects.iter().filter_map(TrueEffect::parts).any(|(effect, _)| effect.has_memory())
+    }
+
     /// What rows measure: first the positions, then one fixture or tilted frame after the other; positions alone where there are none.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
         let of = |(index, kind): (usize, FixtureKind)| match kind {

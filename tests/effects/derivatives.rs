@@ -146,6 +146,8 @@ fn what_drives_the_joints_of_a_rigid_arm() {
         (Effect::GearRatio { joint: 2 }, vec![4e-4]),
         (Effect::JointCoupling { joint: 5, from: 4 }, vec![3e-4]),
         (Effect::JointThermalDrift { joint: 1 }, vec![1e-5]),
+        (Effect::JointThermalDriftLag { joint: 2, time_constant: 300.0 }, vec![1e-5]),
+        (Effect::JointHysteresis { joint: 4, distance: 1.3 }, vec![2e-4]),
         (Effect::TrackerScale, vec![5e-5]),
         (Effect::FrameStrain, vec![2e-5, -1e-5, 0.0, 3e-5, 0.0, -2e-5]),
         (Effect::TrackerSettling { time_constant: 300.0 }, vec![2e-4, -1e-4, 3e-4]),

@@ -133,7 +133,10 @@ fn rules_that_do_not_fit_are_mistakes() {
             "\"hoist-force.*\" = { free = true }",
             "those of hoist-force are there once an [[effect]] declares it, as in hoist-force = true",
         ),
-        ("\"link-th*\" = { free = true }", "those of link-thermal-bending, link-thermal-expansion are there"),
+        (
+            "\"link-th*\" = { free = true }",
+            "those of link-thermal-bending, link-thermal-expansion, link-thermal-bending-lag, link-thermal-expansion-lag are there",
+        ),
         ("\"joint-com*[2].*\" = { free = true }", "declares it, as in joint-compliance = { joint = "),
     ] {
         let error = resolved(rule).unwrap_err();

@@ -47,15 +47,19 @@ fn stated(evidence: &Evidence) -> Vec<String> {
 
 /// Families that hold a cause of the cases outside the catalogue, switched off.
 const UNKNOWN: &str = "'frame-strain*' = { fixed = true }\n'payload-backlash*' = { fixed = true }\n'tracker-settling*' = { fixed = true }\n\
-                       'joint-wave*' = { fixed = true }\n'twist-bending*' = { fixed = true }\n";
+                       'joint-wave*' = { fixed = true }\n'twist-bending*' = { fixed = true }\n'*-lag*' = { fixed = true }\n\
+                       'joint-hysteresis*' = { fixed = true }\n";
 /// The causes that they hold.
-const BY_NOW: [(&str, &str); 5] = [
+const BY_NOW: [(&str, &str); 8] = [
     ("out-frame", "frame-strain"),
     ("out-payload", "payload-backlash"),
     ("out-settling", "tracker-settling"),
     // Beyond the harmonics that are listed.
     ("out-order-100", "joint-harmonic"),
     ("out-twist", "twist-bending"),
+    ("out-hysteresis", "joint-hysteresis"),
+    ("out-thermal-lag-0-12t-bending", "link-thermal-bending-lag"),
+    ("out-thermal-lag-0-12t-expansion", "link-thermal-expansion-lag"),
 ];
 
 #[test]

@@ -147,6 +147,19 @@ fn every_effect_has_its_arguments() {
         ("joint-nonlinear-stiffness = { joint = 1 }", Effect::JointNonlinearStiffness { joint: 1 }),
         ("joint-lateral-compliance = { joint = 1 }", Effect::JointLateralCompliance { joint: 1 }),
         ("joint-thermal-drift = { joint = 1 }", Effect::JointThermalDrift { joint: 1 }),
+        ("joint-hysteresis = { joint = 1, distance_rad = 0.5 }", Effect::JointHysteresis { joint: 1, distance: 0.5 }),
+        (
+            "joint-thermal-drift-lag = { joint = 1, time_constant_s = 90 }",
+            Effect::JointThermalDriftLag { joint: 1, time_constant: 90.0 },
+        ),
+        (
+            "link-thermal-bending-lag = { link = 'A', time_constant_s = 90 }",
+            Effect::LinkThermalBendingLag { link: "A".into(), time_constant: 90.0 },
+        ),
+        (
+            "link-thermal-expansion-lag = { link = 'A', time_constant_s = 90 }",
+            Effect::LinkThermalExpansionLag { link: "A".into(), time_constant: 90.0 },
+        ),
         ("joint-coupling = { joint = 1, from = 2 }", Effect::JointCoupling { joint: 1, from: 2 }),
         ("link-bending = { joint = 1 }", Effect::LinkBending { joint: 1 }),
         ("slide-bending = { joint = 3 }", Effect::SlideBending { joint: 3 }),

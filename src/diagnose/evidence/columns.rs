@@ -26,8 +26,6 @@ pub(super) struct Candidate {
     pub coefficients: Coefficients,
 }
 
-const WARMING: [BeamField; 3] = [BeamField::WarmingY, BeamField::WarmingZ, BeamField::Expansion];
-
 /// Slots whose columns the hypotheses need beside those of effects.
 pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
     let mut slots: Vec<Slot> = places(problem).collect();
@@ -35,7 +33,7 @@ pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
     for joint in 0..problem.joints.len() {
         slots.extend([JointField::Compliance, JointField::LateralX].map(|field| Slot::Joint { joint, field }));
         if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
-            slots.extend(WARMING.map(|field| Slot::Beam { joint, field }));
+            slots.extend(BeamField::STRAINS.map(|field| Slot::Beam { joint, field }));
         }
     }
     slots
@@ -415,23 +413,15 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Curvature and strain of beams by other functions than the temperature's multiple.
     fn warming(&mut self, known: &[Known]) {
-        let Some(reference) = self.problem.data.reference_temperature else { return };
-        let poses = self.linearised.poses();
-        let above: Vec<f64> = poses
-            .iter()
-            .map(|pose| pose.setup.temperature.map_or(0.0, |temperature| temperature - reference))
-            .collect();
+        if self.problem.data.reference_temperature.is_none() {
+            return;
+        }
         for joint in 0..self.problem.joints.len() {
-            for fields in [&WARMING[..2], &WARMING[2..]] {
-                let per_degree = |&field: &BeamField| {
-                    let mut column = self.linearised.place(Slot::Beam { joint, field })?;
-                    for (k, above) in above.iter().enumerate() {
-                        let factor = if above.abs() > 1e-9 { above.recip() } else { 0.0 };
-                        column.rows_mut(3 * k, 3).iter_mut().for_each(|value| *value *= factor);
-                    }
-                    (column.norm_squared() > 0.0).then_some(column)
+            for fields in [&BeamField::STRAINS[1..], &BeamField::STRAINS[..1]] {
+                let column = |&field: &BeamField| {
+                    self.linearised.place(Slot::Beam { joint, field }).filter(|column| column.norm_squared() > 0.0)
                 };
-                let columns: Vec<DVector<f64>> = fields.iter().filter_map(per_degree).collect();
+                let columns: Vec<DVector<f64>> = fields.iter().filter_map(column).collect();
                 if columns.is_empty() {
                     continue;
                 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::diagnose::covariate::Covariate;
-use crate::model::parameter::{BeamField, Driver, JointField, Quantity, Slot};
+use crate::model::parameter::{Driver, JointField, Quantity, Slot};
 use crate::problem::{Effect, Problem};
 
 /// A part of the arm or of its measurement; joints are counted from 0. Its `Display` is the name in files.
@@ -139,6 +139,8 @@ impl Hypothesis {
 fn covariates(slot: Slot, driver: Driver, problem: &Problem, known: (bool, bool)) -> Vec<Covariate> {
     match driver {
         Driver::LoadedSide { joint, .. } => vec![Covariate::Approach(joint), Covariate::Payload],
+        Driver::Lagging { .. } => vec![Covariate::Temperature, Covariate::of(Quantity::Elapsed, problem, known.1)],
+        Driver::Dragged { joint, .. } if known.0 => vec![Covariate::Command(joint), Covariate::Approach(joint)],
         _ => vec![covariate(slot, driver, problem, known)],
     }
 }
@@ -156,7 +158,8 @@ fn covariate(
         | Driver::Travel(joint)
         | Driver::Sine(joint, _)
         | Driver::Cosine(joint, _)
-        | Driver::Wave { joint, .. } => Covariate::Command(joint),
+        | Driver::Wave { joint, .. }
+        | Driver::Dragged { joint, .. } => Covariate::Command(joint),
         Driver::Warming { .. } => Covariate::Temperature,
         Driver::Elapsed | Driver::Since(_) | Driver::Settling(_) => time,
         Driver::Covariate(which) => Covariate::own(which, problem),
@@ -166,9 +169,6 @@ fn covariate(
         _ => match slot {
             Slot::Joint { joint, field: JointField::Play | JointField::SlidingPlay } if approach_known => {
                 Covariate::Approach(joint)
-            }
-            Slot::Beam { field: BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion, .. } => {
-                Covariate::Temperature
             }
             Slot::Arm(crate::model::parameter::ArmField::Payload) => Covariate::Payload,
             Slot::Scale | Slot::Strain { .. } => Covariate::Position,

@@ -5,31 +5,35 @@ use super::custom::custom;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::{
     backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
-    hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_lateral_compliance,
-    joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending, link_thermal_bending,
-    link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_shift, tracker_drift, tracker_scale,
-    tracker_settling, twist_bending, unmodelled_mass,
+    hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_hysteresis,
+    joint_lateral_compliance, joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending,
+    link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_shift,
+    thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending, unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 28] = [
+pub const FAMILIES: [&Family; 32] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &joint_wave::FAMILY,
     &gear_ratio::FAMILY,
     &backlash::FAMILY,
     &payload_backlash::FAMILY,
+    &joint_hysteresis::FAMILY,
     &joint_nonlinear_stiffness::FAMILY,
     &joint_lateral_compliance::FAMILY,
     &joint_thermal_drift::FAMILY,
+    &thermal_lag::JOINT,
     &joint_coupling::FAMILY,
     &link_bending::FAMILY,
     &slide_bending::FAMILY,
     &twist_bending::FAMILY,
     &link_thermal_bending::FAMILY,
     &link_thermal_expansion::FAMILY,
+    &thermal_lag::BENDING,
+    &thermal_lag::EXPANSION,
     &unmodelled_mass::FAMILY,
     &payload_mass::FAMILY,
     &hoist_force::FAMILY,

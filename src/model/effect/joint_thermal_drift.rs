@@ -2,8 +2,8 @@
 
 use super::coverage::{NO_TEMPERATURE, without_temperature};
 use super::family::{Candidate, Family, Term, USUAL};
-use super::place::commanded;
-use crate::model::parameter::{Driver, Slot};
+use super::place::{commanded, warming};
+use crate::model::parameter::Slot;
 use crate::problem::Effect;
 
 /// The family.
@@ -11,8 +11,7 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-thermal-drift",
     terms: |effect, problem| match effect {
         Effect::JointThermalDrift { joint } => {
-            let driver = Driver::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) };
-            vec![Term::driven("rate", Slot::coordinate(problem, *joint), driver, 1e-3)]
+            vec![Term::driven("rate", Slot::coordinate(problem, *joint), warming(problem), 1e-3)]
         }
         _ => Vec::new(),
     },

@@ -2,7 +2,7 @@
 
 use super::coverage::{NO_TEMPERATURE, without_temperature};
 use super::family::{Candidate, Family, Term, USUAL};
-use super::place::{carrier, links};
+use super::place::{carrier, links, warming};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -12,8 +12,8 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, problem| match effect {
         Effect::LinkThermalBending { link } => {
             let slots = |joint| {
-                [("about_y", BeamField::WarmingY), ("about_z", BeamField::WarmingZ)]
-                    .map(|(name, field)| Term::constant(name, Slot::Beam { joint, field }, 1e-3))
+                [("about_y", BeamField::BowY), ("about_z", BeamField::BowZ)]
+                    .map(|(name, field)| Term::driven(name, Slot::Beam { joint, field }, warming(problem), 1e-3))
             };
             carrier(problem, link).map_or_else(Vec::new, |joint| slots(joint).to_vec())
         }

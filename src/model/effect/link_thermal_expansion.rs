@@ -2,7 +2,7 @@
 
 use super::coverage::{NO_TEMPERATURE, without_temperature};
 use super::family::{Candidate, Family, Term, USUAL};
-use super::place::{carrier, links};
+use super::place::{carrier, links, warming};
 use crate::model::parameter::{BeamField, Slot};
 use crate::problem::Effect;
 
@@ -11,7 +11,8 @@ pub(super) const FAMILY: Family = Family {
     name: "link-thermal-expansion",
     terms: |effect, problem| match effect {
         Effect::LinkThermalExpansion { link } => {
-            let term = |joint| Term::constant("strain", Slot::Beam { joint, field: BeamField::Expansion }, 1e-3);
+            let slot = |joint| Slot::Beam { joint, field: BeamField::Stretch };
+            let term = |joint| Term::driven("strain", slot(joint), warming(problem), 1e-3);
             carrier(problem, link).map(term).into_iter().collect()
         }
         _ => Vec::new(),

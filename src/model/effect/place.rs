@@ -57,6 +57,11 @@ pub(super) fn carrier(problem: &Problem, link: &str) -> Option<usize> {
     problem.joints.iter().position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
 }
 
+/// T − T₀.
+pub(super) fn warming(problem: &Problem) -> Driver {
+    Driver::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) }
+}
+
 /// Names of all beams.
 pub(super) fn links(problem: &Problem) -> impl Iterator<Item = String> + '_ {
     problem.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone())

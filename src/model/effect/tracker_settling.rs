@@ -1,6 +1,6 @@
 //! `tracker-settling`: what measures settles, positions move by d (1 − exp(−(t − t_first)/τ)).
 
-use super::family::{Candidate, Family, Term, USUAL};
+use super::family::{Candidate, Family, Term, USUAL, to_three_digits};
 use crate::model::parameter::{Driver, Slot};
 use crate::problem::Effect;
 
@@ -27,7 +27,7 @@ pub(super) const FAMILY: Family = Family {
         let constants =
             std::iter::successors(Some(SHORTEST), |part| Some(part * STEP)).take_while(|part| *part <= LONGEST);
         constants
-            .filter_map(|part| rounded(part * time))
+            .filter_map(|part| to_three_digits(part * time))
             .map(|time_constant| Candidate::of(Effect::TrackerSettling { time_constant }))
             .collect()
     },
@@ -46,12 +46,3 @@ pub(super) const FAMILY: Family = Family {
     searched: Some("time_constant_s"),
     ..USUAL
 };
-
-/// To three digits; `None` where nothing is left.
-fn rounded(time: f64) -> Option<f64> {
-    let step = 10_f64.powf(time.log10().floor() - 2.0);
-    let rounded = (time / step).round() * step;
-    // As written with three digits, not as the product has it.
-    let written = if step < 1.0 { format!("{rounded:.6}").parse().ok()? } else { rounded.round() };
-    (written > 0.0).then_some(written)
-}

@@ -34,6 +34,20 @@ pub enum Driver {
         /// T₀ [°C].
         reference: f64,
     },
+    /// The same of what follows the temperature with a time constant.
+    Lagging {
+        /// T₀ [°C].
+        reference: f64,
+        /// τ \[s\].
+        time_constant: f64,
+    },
+    /// Which part of its friction pulls a joint back the way on which it came, −1 to 1 ([`Past::dragged`]).
+    Dragged {
+        /// The joint.
+        joint: usize,
+        /// The way on which that turns over, s \[rad\] or \[m\].
+        distance: f64,
+    },
     /// Time since the first pose \[s\].
     Elapsed,
     /// 1 from a time on \[s\], 0 before.
@@ -120,6 +134,13 @@ impl Driver {
             Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
             Self::Wave { joint, order, phase } => (order * setup.configuration[joint] + phase).sin(),
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
+            Self::Lagging { reference, time_constant } => setup
+                .temperature
+                .map_or(0.0, |temperature| setup.past.lagging((setup.time, temperature), time_constant) - reference),
+            Self::Dragged { joint, distance } => {
+                let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
+                setup.past.dragged(joint, (setup.configuration[joint], side), distance)
+            }
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
             Self::Settling(time_constant) => -(-setup.elapsed / time_constant).exp_m1(),
@@ -162,6 +183,10 @@ impl Driver {
             Self::Step { of: Quantity::Command(own), centre, width } if own == joint => {
                 (1.0 - ((setup.configuration[joint] - centre) / width).tanh().powi(2)) / width
             }
+            Self::Dragged { joint: own, distance } if own == joint => {
+                let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
+                setup.past.drag_slope(joint, (setup.configuration[joint], side), distance)
+            }
             _ => 0.0,
         }
     }
@@ -169,13 +194,19 @@ impl Driver {
     /// Whether it depends on what the joints are told.
     pub fn follows_commands(self) -> bool {
         match self {
-            Self::Command(_) | Self::Travel(_) | Self::Sine(..) | Self::Cosine(..) | Self::Wave { .. } => true,
+            Self::Command(_)
+            | Self::Travel(_)
+            | Self::Sine(..)
+            | Self::Cosine(..)
+            | Self::Wave { .. }
+            | Self::Dragged { .. } => true,
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
                 matches!(of, Quantity::Command(_))
             }
             Self::Constant
             | Self::Unit
             | Self::Warming { .. }
+            | Self::Lagging { .. }
             | Self::Elapsed
             | Self::Since(_)
             | Self::Settling(_)

@@ -66,8 +66,12 @@ impl Parameter {
 /// Kind of a quantity that is multiplied by `driver` before it enters at `slot`.
 pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
     match (driver, slot.unit()) {
-        (Driver::Warming { .. }, Unit::Angle) => Unit::AnglePerDegree,
-        (Driver::Warming { .. }, _) => Unit::LengthPerDegree,
+        (Driver::Warming { .. } | Driver::Lagging { .. }, of) => match of {
+            Unit::Angle => Unit::AnglePerDegree,
+            Unit::PerLength => Unit::CurvaturePerDegree,
+            Unit::Ratio => Unit::PerDegree,
+            _ => Unit::LengthPerDegree,
+        },
         (Driver::LoadedSide { .. }, Unit::Angle) => Unit::AnglePerMass,
         (Driver::LoadedSide { .. }, _) => Unit::LengthPerMass,
         (Driver::Elapsed, _) => Unit::Speed,

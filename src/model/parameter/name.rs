@@ -122,12 +122,12 @@ pub enum BeamField {
     CouplingY,
     /// Coupling of twist with bending about z [1/(N·m²)].
     CouplingZ,
-    /// Curvature about y per degree [1/(m·K)].
-    WarmingY,
-    /// Curvature about z per degree [1/(m·K)].
-    WarmingZ,
-    /// Strain per degree [1/K].
-    Expansion,
+    /// Curvature about y without load [1/m].
+    BowY,
+    /// Curvature about z without load [1/m].
+    BowZ,
+    /// Elongation per length without load.
+    Stretch,
     /// A mass on the beam's axis \[kg\].
     AddedMass,
     /// Where that mass is, from the root \[m\].
@@ -211,6 +211,14 @@ impl JointField {
 }
 
 impl BeamField {
+    /// The strains without load, in the order in which poses have them.
+    pub const STRAINS: [Self; 3] = [Self::Stretch, Self::BowY, Self::BowZ];
+
+    /// Whether it is a strain without load.
+    pub fn is_strain(self) -> bool {
+        Self::STRAINS.contains(&self)
+    }
+
     /// Whether it says how a beam gives way to loads.
     pub fn is_rigidity(self) -> bool {
         let of_effects = matches!(self, Self::Flexibility | Self::CouplingY | Self::CouplingZ);
@@ -234,9 +242,9 @@ impl BeamField {
             Self::Flexibility => "flexibility",
             Self::CouplingY => "coupling_y",
             Self::CouplingZ => "coupling_z",
-            Self::WarmingY => "warming_y",
-            Self::WarmingZ => "warming_z",
-            Self::Expansion => "expansion",
+            Self::BowY => "bow_y",
+            Self::BowZ => "bow_z",
+            Self::Stretch => "stretch",
             Self::AddedMass => "added_mass",
             Self::AddedAt => "added_at",
         }
@@ -276,10 +284,9 @@ impl Slot {
                 BeamField::Bending | BeamField::BendingY | BeamField::BendingZ | BeamField::Twist => {
                     Unit::FlexuralRigidity
                 }
-                BeamField::Anisotropy => Unit::Ratio,
+                BeamField::Anisotropy | BeamField::Stretch => Unit::Ratio,
                 BeamField::Flexibility | BeamField::CouplingY | BeamField::CouplingZ => Unit::Flexibility,
-                BeamField::WarmingY | BeamField::WarmingZ => Unit::CurvaturePerDegree,
-                BeamField::Expansion => Unit::PerDegree,
+                BeamField::BowY | BeamField::BowZ => Unit::PerLength,
                 BeamField::AddedMass => Unit::Mass,
                 BeamField::AddedAt => Unit::Length,
             },
@@ -305,9 +312,7 @@ impl Slot {
             Self::Joint { field, .. } => {
                 !field.is_geometry() && !matches!(field, JointField::Play | JointField::SlidingPlay)
             }
-            Self::Beam { field, .. } => {
-                !matches!(field, BeamField::WarmingY | BeamField::WarmingZ | BeamField::Expansion)
-            }
+            Self::Beam { field, .. } => !field.is_strain(),
             Self::Arm(_) => true,
             Self::Base { .. }
             | Self::Target { .. }

@@ -227,6 +227,18 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
             let sides = rows.poses.iter().map(|pose| driver.value(pose)).collect();
             (joint, across, sides, lever(joint), Box::new(move |side| first * side))
         }
+        Effect::JointHysteresis { joint, distance } => {
+            let across = Quantity::new(format!("part of its friction that pulls joint {joint} back [−1 … +1]"), 1.0);
+            let driver = Driver::Dragged { joint: joint - 1, distance };
+            let pulls = rows.poses.iter().map(|pose| driver.value(pose)).collect();
+            (joint, across, pulls, lever(joint), Box::new(move |pull| first * pull))
+        }
+        Effect::JointThermalDriftLag { joint, time_constant } => {
+            let reference = problem.data.reference_temperature.unwrap_or_default();
+            let across = Quantity::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0);
+            let felt = rows.felt(reference, time_constant);
+            (joint, across, felt, lever(joint), Box::new(move |felt| first * (felt - reference)))
+        }
         // Δθ = c M, c₃ M³: the moment follows from the law itself.
         Effect::JointCompliance { joint } => {
             let levers = lever(joint);
@@ -251,6 +263,12 @@ impl Rows<'_> {
     /// Σ value · driver.
     fn driven(&self, pose: &PoseView) -> f64 {
         self.parameters.iter().zip(self.values).map(|(own, value)| value * own.driver.value(pose)).sum()
+    }
+
+    /// Temperatures that lag.
+    fn felt(&self, reference: f64, time_constant: f64) -> Vec<f64> {
+        let driver = Driver::Lagging { reference, time_constant };
+        self.poses.iter().map(|pose| driver.value(pose) + reference).collect()
     }
 
     fn temperatures(&self) -> Vec<f64> {
@@ -285,20 +303,36 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
         reading: ALONG,
     };
     match found {
-        Effect::LinkThermalBending { link } | Effect::LinkThermalExpansion { link } => {
+        Effect::LinkThermalBending { link }
+        | Effect::LinkThermalExpansion { link }
+        | Effect::LinkThermalBendingLag { link, .. }
+        | Effect::LinkThermalExpansionLag { link, .. } => {
             let reference = problem.data.reference_temperature.unwrap_or_default();
-            let (bends, link) = (matches!(found, Effect::LinkThermalBending { .. }), link.clone());
+            let (across, felt) = match found {
+                Effect::LinkThermalBendingLag { time_constant, .. }
+                | Effect::LinkThermalExpansionLag { time_constant, .. } => {
+                    let name = format!("temperature that lags by {time_constant} s [°C]");
+                    (Quantity::new(name, 1.0), rows.felt(reference, *time_constant))
+                }
+                _ => (Quantity::temperature(), rows.temperatures()),
+            };
+            let bends = matches!(found, Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. });
+            let link = link.clone();
             // An expansion has one coefficient with a sign; a bending's two make one size.
             let size = if bends { norm } else { sum };
+            let lever = |(own, felt): (&Vector3<f64>, &f64)| match size * (felt - reference) {
+                0.0 => Vector3::zeros(),
+                size => own / size,
+            };
             View {
-                across: Quantity::temperature(),
+                across,
                 up: if bends {
                     Box::new(move |most| Quantity::small(&format!("curvature of link {link}"), "rad/m", most))
                 } else {
                     Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
                 },
-                x: rows.temperatures(),
-                levers: rows.over(|pose| size * (pose.temperature.unwrap_or(reference) - reference)),
+                levers: rows.own.iter().zip(&felt).map(lever).collect(),
+                x: felt,
                 law: Box::new(move |t| size * (t - reference)),
                 reading: SIZE,
             }

@@ -32,6 +32,7 @@ fn named(found: &Effect, trace: &Trace) -> String {
         Effect::StationShift { at_time } => format!("{name} row {}", at_time.ceil()),
         Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
         Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
+        own if own.has_memory() => own.name_and_place(),
         _ if place.is_empty() => name.to_owned(),
         _ => format!("{name} {place}{orders}"),
     }

@@ -1,0 +1,109 @@
+//! Rows in the order in which they were measured, session by session: what was before a pose.
+
+use std::sync::OnceLock;
+
+use super::Measurements;
+use crate::problem::Past;
+
+/// The order of a table's rows, found when it is first asked for; a copy finds its own, for its rows may change.
+#[derive(Debug, Default)]
+pub struct RowOrder(OnceLock<Found>);
+
+impl Clone for RowOrder {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for RowOrder {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// Of each row where its session begins and where it is itself, counted in order.
+#[derive(Debug)]
+struct Found {
+    places: Vec<(u32, u32)>,
+    /// The columns in order; `None` where the table is.
+    sorted: Option<Past>,
+}
+
+impl Found {
+    fn of(table: &Measurements) -> Self {
+        let session = |row: usize| table.session.of_row.get(row).copied().unwrap_or(0);
+        let mut rows: Vec<usize> = (0..table.len()).collect();
+        rows.sort_by(|&a, &b| session(a).cmp(&session(b)).then(table.time[a].total_cmp(&table.time[b])));
+        let mut places = vec![(0, 0); rows.len()];
+        let mut begin = 0_u32;
+        for ((&row, &before), at) in rows.iter().zip(rows.first().into_iter().chain(&rows)).zip(0..) {
+            if session(row) != session(before) {
+                begin = at;
+            }
+            places[row] = (begin, at);
+        }
+        let n = table.joints;
+        let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect();
+        let each = |column: &[f64]| rows.iter().flat_map(|&row| &column[row * n..(row + 1) * n]).copied().collect();
+        let sorted = (!rows.is_sorted()).then(|| Past {
+            times: one(&table.time),
+            temperatures: table.temperature.as_deref().map(one).unwrap_or_default(),
+            configurations: each(&table.configurations),
+            approaches: table.approach.as_deref().map(each).unwrap_or_default(),
+        });
+        Self { places, sorted }
+    }
+}
+
+impl Measurements {
+    /// What was measured before a row, in its session.
+    pub(super) fn past(&self, row: usize) -> Past<&[f64]> {
+        let Found { places, sorted } = self.order.0.get_or_init(|| Found::of(self));
+        let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize)) else {
+            return Past::default();
+        };
+        let n = self.joints;
+        let columns = match sorted {
+            Some(sorted) => sorted.view(),
+            None => Past {
+                times: self.time.as_slice(),
+                temperatures: self.temperature.as_deref().unwrap_or_default(),
+                configurations: &self.configurations,
+                approaches: self.approach.as_deref().unwrap_or_default(),
+            },
+        };
+        Past {
+            times: columns.times.get(begin..at).unwrap_or_default(),
+            temperatures: columns.temperatures.get(begin..at).unwrap_or_default(),
+            configurations: columns.configurations.get(begin * n..at * n).unwrap_or_default(),
+            approaches: columns.approaches.get(begin * n..at * n).unwrap_or_default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Labels;
+
+    #[test]
+    fn what_was_before_goes_by_time_within_a_session() {
+        let table = Measurements {
+            joints: 2,
+            origin: vec![(0, 0); 5],
+            positions: vec![nalgebra::Vector3::zeros(); 5],
+            configurations: (0..10).map(f64::from).collect(),
+            time: vec![5.0, 0.0, 3.0, 1.0, 4.0],
+            temperature: Some(vec![20.0, 21.0, 22.0, 23.0, 24.0]),
+            session: ["a", "a", "b", "b", "a"].into_iter().collect::<Labels>(),
+            ..Measurements::default()
+        };
+        let past = table.past(0);
+        assert_eq!((past.times, past.temperatures), ([0.0, 4.0].as_slice(), [21.0, 24.0].as_slice()));
+        assert_eq!((past.configurations, past.approaches), ([2.0, 3.0, 8.0, 9.0].as_slice(), [].as_slice()));
+        assert_eq!(table.past(2).times, [1.0]);
+        assert!(table.past(1).times.is_empty() && table.past(3).configurations.is_empty());
+        let in_order = table.select(&[1, 4, 0, 3, 2]);
+        assert_eq!((in_order.past(2).times, in_order.past(4).temperatures), (past.times, [23.0].as_slice()));
+    }
+}
