@@ -11,7 +11,7 @@ use rand_distr::{Distribution as _, StandardNormal, StudentT};
 use rayon::prelude::*;
 
 use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
-use crate::families::{Lacking, catalogue};
+use crate::families::{Lacking, catalogue, newest};
 use crate::full::sets;
 use crate::judged::{Judged, Place, is_the_same, name};
 
@@ -21,12 +21,13 @@ const STATED: f64 = 0.9;
 /// One statement: its probability, and whether it is true.
 type Statement = (f64, bool);
 
-/// One to three effects of the catalogue, at different parts.
-fn drawn(seed: u64) -> Vec<Lacking> {
+/// One to three effects of different families, the first one of those `first`, the others of the catalogue.
+fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let (all, count) = (catalogue(), rng.random_range(1..=3));
+    let (others, count) = (catalogue(), rng.random_range(1..=3));
     let mut chosen: Vec<Lacking> = Vec::new();
     while chosen.len() < count {
+        let all = if chosen.is_empty() { first } else { &others };
         let mut one = all[rng.random_range(0..all.len())].clone();
         // From half the size to twice it, where it has one.
         let factor = 2.0_f64.powf(rng.random_range(-1.0..1.0));
@@ -50,8 +51,8 @@ struct Set {
     close: [bool; 2],
 }
 
-fn judge(seed: u64) -> Set {
-    let lacking = drawn(seed);
+fn judge(first: &[Lacking], seed: u64) -> Set {
+    let lacking = drawn(first, seed);
     let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
     let judged = Judged::of(&lacking, size, seed);
     println!("{}", judged.line(&name(&lacking), size, seed));
@@ -89,8 +90,19 @@ fn judge(seed: u64) -> Set {
 #[test]
 #[ignore = "minutes"]
 fn what_is_stated_is_as_true_as_it_is_probable() {
-    let first = std::env::var("FLEXCAL_FIRST").map_or(5000, |seed| seed.parse().unwrap());
-    let all: Vec<Set> = (first..first + sets(300)).into_par_iter().map(judge).collect();
+    calibrated(&catalogue(), 5000, 300);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn what_is_stated_of_the_newest_effects() {
+    calibrated(&newest(), 7000, 120);
+}
+
+/// Judges so many sets from a seed on, and prints how true and how probable statements are.
+fn calibrated(first: &[Lacking], seed: u64, count: u64) {
+    let begin = std::env::var("FLEXCAL_FIRST").map_or(seed, |seed| seed.parse().unwrap());
+    let all: Vec<Set> = (begin..begin + sets(count)).into_par_iter().map(|seed| judge(first, seed)).collect();
     let count = |of: &dyn Fn(&Set) -> usize| all.iter().map(of).sum::<usize>();
     let bins = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)];
     for (what, statements) in [

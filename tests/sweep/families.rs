@@ -123,6 +123,28 @@ pub fn catalogue() -> Vec<Lacking> {
     all
 }
 
+/// Effects with an argument that is searched, and a section that couples: what the catalogue took in last.
+pub fn newest() -> Vec<Lacking> {
+    let link = |name: &str| name.to_owned();
+    let mut all = Vec::new();
+    for (joint, order) in [(1, 2.43), (2, 7.37), (3, 4.6), (4, 11.5), (2, 100.5)] {
+        all.push(Lacking::new(Effect::JointWave { joint, order }, &[0.016 * DEGREE, 0.012 * DEGREE]));
+    }
+    for (joint, distance) in [(2, 1.0), (3, 0.5), (1, 1.5)] {
+        all.push(Lacking::new(Effect::JointHysteresis { joint, distance }, &[0.03 * DEGREE]));
+    }
+    for (name, part) in [("A", 1.0), ("B", 3.0)] {
+        let time_constant = 400.0 * part;
+        all.push(Lacking::new(Effect::LinkThermalBendingLag { link: link(name), time_constant }, &[3e-5, -2e-5]));
+        all.push(Lacking::new(Effect::LinkThermalExpansionLag { link: link(name), time_constant }, &[4e-5]));
+        all.push(Lacking::new(Effect::TwistBending { link: link(name) }, &[5e-6, -3e-6]));
+    }
+    for joint in [2, 3] {
+        all.push(Lacking::new(Effect::JointThermalDriftLag { joint, time_constant: 600.0 }, &[6e-5]));
+    }
+    all
+}
+
 /// Two effects at once.
 pub fn pairs() -> Vec<Vec<Lacking>> {
     let per_hour = 1e-3 / 3600.0;

@@ -170,16 +170,35 @@ fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
     problem
 }
 
-/// Whether an effect that was named is the true one: family and place, orders among others, times within a few poses, time constants within a
-/// factor of two.
+/// Whether an effect that was named is the true one: family and place, orders among others, orders of waves within a third of a cycle, times
+/// within a few poses, time constants and distances within a factor of two.
 pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
+    let within_two = |one: &f64, other: &f64| (one / other).ln().abs() < std::f64::consts::LN_2;
     match (named, truth) {
+        (Effect::JointWave { joint, order }, Effect::JointWave { joint: own, order: wanted }) => {
+            joint == own && (order - wanted).abs() < 1.0 / 3.0
+        }
+        (Effect::JointHysteresis { joint, distance }, Effect::JointHysteresis { joint: own, distance: wanted }) => {
+            joint == own && within_two(distance, wanted)
+        }
+        (
+            Effect::JointThermalDriftLag { joint, time_constant },
+            Effect::JointThermalDriftLag { joint: own, time_constant: wanted },
+        ) => joint == own && within_two(time_constant, wanted),
+        (
+            Effect::LinkThermalBendingLag { link, time_constant },
+            Effect::LinkThermalBendingLag { link: own, time_constant: wanted },
+        )
+        | (
+            Effect::LinkThermalExpansionLag { link, time_constant },
+            Effect::LinkThermalExpansionLag { link: own, time_constant: wanted },
+        ) => link == own && within_two(time_constant, wanted),
         (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
             joint == own && wanted.iter().all(|order| orders.contains(order))
         }
         (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => (at_time - own).abs() < 900.0,
         (Effect::TrackerSettling { time_constant }, Effect::TrackerSettling { time_constant: own }) => {
-            (time_constant / own).ln().abs() < std::f64::consts::LN_2
+            within_two(time_constant, own)
         }
         _ => named == truth,
     }
