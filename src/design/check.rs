@@ -9,7 +9,7 @@ use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Si
 use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
 use crate::identify::Placement;
-use crate::measurement::{Dataset, Labels, Measurements, different};
+use crate::measurement::{Dataset, Labels, Measurements, RowOrder, different};
 use crate::problem::{Observation, PoseRanges, Problem};
 
 /// Poses in which predictions are judged.
@@ -157,7 +157,12 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
         names: words.names.clone(),
         of_row: (0..drawn.len()).map(|row| words.of_row[row % table.len()]).collect(),
     };
-    Measurements { session: spread(&table.session), target: table.target.as_ref().map(spread), ..drawn.clone() }
+    Measurements {
+        session: spread(&table.session),
+        target: table.target.as_ref().map(spread),
+        order: RowOrder::default(),
+        ..drawn
+    }
 }
 
 impl Check {

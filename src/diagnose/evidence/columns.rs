@@ -16,6 +16,7 @@ use crate::model::parameter::{BeamField, Driver, JointField, Slot};
 use crate::problem::{Effect, JointKind, Observation, Problem};
 
 /// A hypothesis with its columns and the logarithm of its prior probability.
+#[derive(Clone)]
 pub(super) struct Candidate {
     pub hypothesis: Hypothesis,
     /// Which of the functions of that hypothesis, counted from 0.

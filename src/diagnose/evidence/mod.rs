@@ -9,6 +9,7 @@
 mod block;
 mod columns;
 mod explanation;
+mod finer;
 mod functions;
 mod hypotheses;
 mod hypothesis;
@@ -353,6 +354,12 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     if !waves.is_empty() {
         blocks.extend(waves.iter().map(of_wave));
         hypotheses.all.extend(waves);
+        weighted = search(&blocks, &target, data.rules, &present);
+    }
+    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), of_wave, how);
+    if !finer.is_empty() {
+        blocks.extend(finer.iter().map(of_wave));
+        hypotheses.all.extend(finer);
         weighted = search(&blocks, &target, data.rules, &present);
     }
     let of = |k: usize| &hypotheses.all[k].hypothesis;

@@ -117,6 +117,11 @@ impl Effect {
         self.family().searched.is_some()
     }
 
+    /// The same with its searched argument multiplied; `None` where values between those of the candidates tell nothing.
+    pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
+        (self.family().scaled)(self, factor)
+    }
+
     /// How often chance has a try at it: one over the share of its family's chance, whose `members` are the candidates.
     pub fn tries(&self, members: &[&Self]) -> f64 {
         (self.family().tries)(self, members)

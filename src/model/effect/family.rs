@@ -33,6 +33,8 @@ pub struct Family {
     /// The key of an argument that is searched, as a time: those of the family that differ in nothing else are one effect that is not yet
     /// found.
     pub searched: Option<&'static str>,
+    /// The same effect with that argument multiplied, to three digits, where values between those of the candidates tell.
+    pub scaled: fn(&Effect, f64) -> Option<Effect>,
 }
 
 /// A family about which there is nothing special to say.
@@ -49,6 +51,7 @@ pub(super) const USUAL: Family = Family {
     function_of: |_| None,
     missing_column: |_, _, _| None,
     searched: None,
+    scaled: |_, _| None,
 };
 
 /// A parameter of an effect.

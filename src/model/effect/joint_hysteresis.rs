@@ -40,5 +40,12 @@ pub(super) const FAMILY: Family = Family {
         _ => String::new(),
     },
     searched: Some("distance_rad"),
+    scaled: |effect, factor| match effect {
+        Effect::JointHysteresis { joint, distance } => {
+            let distance = to_three_digits(factor * distance)?;
+            Some(Effect::JointHysteresis { joint: *joint, distance })
+        }
+        _ => None,
+    },
     ..USUAL
 };

@@ -41,6 +41,13 @@ pub(super) const JOINT: Family = Family {
     },
     missing_column: without_temperature,
     searched: Some(SEARCHED),
+    scaled: |effect, factor| match effect {
+        Effect::JointThermalDriftLag { joint, time_constant } => {
+            let time_constant = to_three_digits(factor * time_constant)?;
+            Some(Effect::JointThermalDriftLag { joint: *joint, time_constant })
+        }
+        _ => None,
+    },
     ..USUAL
 };
 
@@ -77,6 +84,13 @@ pub(super) const BENDING: Family = Family {
     },
     missing_column: without_temperature,
     searched: Some(SEARCHED),
+    scaled: |effect, factor| match effect {
+        Effect::LinkThermalBendingLag { link, time_constant } => {
+            let time_constant = to_three_digits(factor * time_constant)?;
+            Some(Effect::LinkThermalBendingLag { link: link.clone(), time_constant })
+        }
+        _ => None,
+    },
     ..USUAL
 };
 
@@ -110,6 +124,13 @@ pub(super) const EXPANSION: Family = Family {
     },
     missing_column: without_temperature,
     searched: Some(SEARCHED),
+    scaled: |effect, factor| match effect {
+        Effect::LinkThermalExpansionLag { link, time_constant } => {
+            let time_constant = to_three_digits(factor * time_constant)?;
+            Some(Effect::LinkThermalExpansionLag { link: link.clone(), time_constant })
+        }
+        _ => None,
+    },
     ..USUAL
 };
 

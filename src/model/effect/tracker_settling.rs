@@ -44,5 +44,11 @@ pub(super) const FAMILY: Family = Family {
         _ => None,
     },
     searched: Some("time_constant_s"),
+    scaled: |effect, factor| match effect {
+        Effect::TrackerSettling { time_constant } => {
+            Some(Effect::TrackerSettling { time_constant: to_three_digits(factor * time_constant)? })
+        }
+        _ => None,
+    },
     ..USUAL
 };

@@ -1,0 +1,91 @@
+//! Values of a searched argument between those that are listed, as a time constant: about the effects that explanations hold, the value that
+//! does best beside the rest becomes a hypothesis like all others. A strong effect of a value hardly off would else leave structure.
+
+use rayon::prelude::*;
+
+use super::block::{Block, Design};
+use super::columns::{Candidate, even};
+use super::hypotheses::Hypotheses;
+use super::hypothesis::{Hypothesis, Law};
+use super::marginal::Coefficients;
+use super::search::{Target, Weighted, gains_beside};
+use crate::diagnose::rules::SelectionRules;
+use crate::problem::{Effect, Problem};
+
+/// Probability of an explanation from which on its arguments are looked at.
+const WORTH_A_LOOK: f64 = 0.01;
+/// Explanations that are looked at, the most probable ones.
+const MOST: usize = 6;
+/// Values to either side.
+const STEPS: i32 = 8;
+/// How far the last of them is off: listed ones are closer; then as far as from one to the next.
+const FARTHEST: [f64; 2] = [1.4, 1.043];
+/// ln of the odds by which another value has to do better.
+const BETTER: f64 = 0.5;
+
+/// Effects of finer arguments than those known that do better in their places in `weighted` explanations.
+pub(super) fn finer(
+    hypotheses: &Hypotheses,
+    weighted: &[Weighted],
+    (blocks, target): (&mut Vec<Block>, &Target),
+    block: impl Fn(&Candidate) -> Block + Sync,
+    (problem, rules): (&Problem, &SelectionRules),
+) -> Vec<Candidate> {
+    let known = blocks.len();
+    let mut found: Vec<Candidate> = Vec::new();
+    for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK).take(MOST) {
+        for &member in &set.members {
+            let own = &hypotheses.all[member];
+            // Beside everything else, and beside what is no such effect of that place: one may do for two.
+            let place = |k: usize| hypotheses.all[k].hypothesis.effect().map(Effect::name_and_place);
+            let without_own = set.members.iter().copied().filter(|&other| other != member).collect();
+            let without_alike = set.members.iter().copied().filter(|&other| place(other) != place(member)).collect();
+            let mut rests: Vec<Vec<usize>> = vec![without_own, without_alike];
+            rests.dedup();
+            for rest in &rests {
+                let mut best: Option<Candidate> = None;
+                let mut least = f64::NEG_INFINITY;
+                for farthest in FARTHEST {
+                    let near = hypotheses.near(best.as_ref().unwrap_or(own), farthest, problem, rules);
+                    if near.is_empty() || target.stop.is_requested() {
+                        break;
+                    }
+                    blocks.par_extend(near.par_iter().map(&block));
+                    let all: Vec<usize> = std::iter::once(member).chain(known..blocks.len()).collect();
+                    let mut gains = gains_beside(rest, &all, (blocks, target), rules);
+                    blocks.truncate(known);
+                    gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+                    let of_own = gains.iter().find(|(k, ..)| *k == member).map_or(least, |(_, gain, _)| gain + BETTER);
+                    least = least.max(of_own);
+                    if let Some(&(k, gain, _)) = gains.first().filter(|(k, gain, _)| *k != member && *gain > least) {
+                        (best, least) = (near.into_iter().nth(k - known), gain);
+                    }
+                }
+                found.extend(best.filter(|best| !found.iter().any(|other| other.hypothesis == best.hypothesis)));
+            }
+        }
+    }
+    found
+}
+
+impl Hypotheses<'_> {
+    /// The same hypothesis with other values of its searched argument that no candidate has.
+    fn near(&self, own: &Candidate, farthest: f64, problem: &Problem, rules: &SelectionRules) -> Vec<Candidate> {
+        let Some(effect) = own.hypothesis.effect() else { return Vec::new() };
+        let factors =
+            (-STEPS..=STEPS).filter(|step| *step != 0).map(|step| farthest.powf(f64::from(step) / f64::from(STEPS)));
+        let others = factors.filter_map(|factor| effect.scaled(factor));
+        let is_new = |effect: &Effect| !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect));
+        others.filter(is_new).filter_map(|effect| self.like(own, effect, problem, rules)).collect()
+    }
+
+    /// A hypothesis like another one with an effect of another argument.
+    fn like(&self, own: &Candidate, effect: Effect, problem: &Problem, rules: &SelectionRules) -> Option<Candidate> {
+        let columns = self.linearised.columns(&effect);
+        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
+        let design = Design::Dense(columns).scaled(self.weighed)?;
+        let coefficients = Coefficients { largest, ..own.coefficients.clone() };
+        let hypothesis = Hypothesis { law: Law::Effect(effect), ..own.hypothesis.clone() };
+        Some(Candidate { hypothesis, variant: 0, design, ln_prior: own.ln_prior, coefficients })
+    }
+}
