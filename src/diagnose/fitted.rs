@@ -1,11 +1,13 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::data::Data;
 use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
-use crate::model::parameter::{BeamField, Slot};
+use crate::model::parameter::{BeamField, EffectParameter, Slot};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
@@ -71,18 +73,24 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// Fits on until it converges, if it was stopped before that.
+    /// Fits on until it converges, if it was stopped before that or fitted in passing.
     pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
-        if self.found.termination.converged() {
+        if self.found.termination.converged() && !self.found.in_passing {
             return Ok(self);
         }
-        Self::new(self.problem.clone(), data, &self.onwards(options))
+        let onwards = if self.found.in_passing { self.succeeding(options, true) } else { self.onwards(options) };
+        Self::new(self.problem.clone(), data, &onwards)
     }
 
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
     pub fn onwards(&self, options: &Options) -> Options {
         let values = self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         Options { start: values.collect(), ..options.clone() }
+    }
+
+    /// The same, with what need not be found anew: the registered nominal arm, and of a fit that is `alike` the σ that this one took.
+    pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
+        Options { predecessor: Some(Arc::new(self.found.predecessor(alike))), ..self.onwards(options) }
     }
 
     /// The same problem with other effects declared.
@@ -191,6 +199,15 @@ impl Fitted {
             columns.columns_mut(first, added).copy_from(more);
         }
         LinearNeighbourhood::new(&columns, &residual, &unknowns, linearised.empty())
+    }
+
+    /// 1 σ of the priors of an effect's parameters in a problem with other effects than this one; `None` where one of them is not free.
+    pub fn priors_in(&self, problem: &Problem, data: &Data, effect: &Effect) -> Option<Vec<Option<f64>>> {
+        let placement = Placement::of(data.measurements);
+        let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+        let model = self.found.strategy.model(model);
+        let sigma = |own: EffectParameter| model.parameters.iter().find(|k| k.name == own.name).map(|k| k.sigma);
+        effect.parameters(problem).into_iter().map(sigma).collect()
     }
 
     /// Numbers of an effect's parameters among the unknowns.

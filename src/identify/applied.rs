@@ -9,7 +9,7 @@ use super::predict::{Residual, in_space};
 use super::registration::register;
 use super::saved::{SavedEstimate, SavedEstimateError};
 use super::spread::{PointSpread, spreads};
-use super::stage::{Stage, StageError};
+use super::stage::{COST_TOLERANCE, Stage, StageError};
 use super::surroundings::locate;
 use super::{ErrorSummary, Placement, SolverChoice};
 use crate::error::InputError;
@@ -240,6 +240,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         unknowns: missing.to_vec(),
         solver: SolverChoice::Auto.decide(model),
         max_steps: Settings::default().max_iterations,
+        cost_tolerance: COST_TOLERANCE,
         loss: Loss::Squares,
         counts_fixed: true,
         memory: &memory,

@@ -8,7 +8,7 @@ use super::noise_model::NoiseModel;
 use super::placement::HeldOutOnly;
 use super::registration::register;
 use super::spread::{PointSpread, spreads};
-use super::stage::{Gauge, Stage, StageEnd, StageError};
+use super::stage::{COST_TOLERANCE, Gauge, Stage, StageEnd, StageError};
 use super::surroundings::locate;
 use super::{ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::least_squares::solver::{AtBound, Settings, Termination};
@@ -24,6 +24,9 @@ const MAX_SWEEPS: usize = 500;
 const SWEEP_SETTLED: f64 = 1e-7;
 /// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage changes are wasted.
 const SWEEP_STEPS: u64 = 2;
+
+/// Change of ν ln(squares), by which effects are judged, that a step of a fit in passing must be worth: thousandths of what decides.
+const PASSING: f64 = 0.01;
 
 /// What all fits of an identification share.
 pub(super) struct Fitting<'a> {
@@ -41,6 +44,8 @@ pub(super) struct Fitting<'a> {
     pub stop: Option<&'a Stop>,
     /// Steps after which a stage of the strategy is stopped.
     pub max_steps: Option<u64>,
+    /// Whether another fit follows.
+    pub in_passing: bool,
     /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
     pub sigma: f64,
     /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
@@ -124,6 +129,7 @@ impl<'a> Fitting<'a> {
             unknowns,
             solver: self.solver,
             max_steps: Settings::default().max_iterations,
+            cost_tolerance: COST_TOLERANCE,
             loss: Loss::Squares,
             counts_fixed: false,
             memory: self.memory,
@@ -142,7 +148,9 @@ impl<'a> Fitting<'a> {
     /// A stage of the strategy: on the identification rows, with the problem's loss.
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
-        Stage { loss: self.loss, max_steps: self.max_steps.unwrap_or(stage.max_steps), ..stage }
+        let max_steps = self.max_steps.unwrap_or(stage.max_steps);
+        let cost_tolerance = if self.in_passing { PASSING / stage.count().max(1) as f64 } else { stage.cost_tolerance };
+        Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 
     /// Everything that the strategy varies, as one stage on the identification rows.

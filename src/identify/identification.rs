@@ -1,9 +1,9 @@
 //! From measurements to estimates with their errors.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::active::ActiveConstraint;
 use super::covariance::Collected;
@@ -14,10 +14,11 @@ use super::noise_model::{LEAST_NOISE, NoiseModel};
 use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
 use super::pose_sufficiency::PoseSufficiency;
+use super::predecessor::Predecessor;
 use super::quality::QualityFlag;
 use super::stage::StageError;
 use super::statistics::Statistics;
-use super::{Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
+use super::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
@@ -46,6 +47,10 @@ pub struct Options {
     /// Effects that trace and loop look for besides those of the catalogue: effects of one's own ([`Effect::custom`]). A fit
     /// alone does not use them.
     pub candidates: Vec<Effect>,
+    /// What a fit of the same problem with other effects to the same data leaves to this one.
+    pub(crate) predecessor: Option<Arc<Predecessor>>,
+    /// Whether another fit follows, so that nobody asks of this one what it can be trusted in.
+    pub(crate) in_passing: bool,
 }
 
 impl Options {
@@ -247,6 +252,7 @@ pub fn identify_model(
         progress: options.progress.as_ref(),
         stop: options.stop.as_ref(),
         max_steps: options.max_steps,
+        in_passing: options.in_passing,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         noise_model: NoiseModel::DECLARED,
@@ -254,11 +260,7 @@ pub fn identify_model(
         memory: &memory,
     };
     let unknowns = fitted_parameters(&fitting)?;
-    let start = fitting.registered()?;
-    let registered = fitting.errors(&start);
-    if !noise_is_declared {
-        fitting.sigma = (registered.identification.rms.norm / measurements.leading().root()).max(LEAST_NOISE);
-    }
+    let (start, registered) = prepared(&mut fitting, options.predecessor.as_deref(), noise_is_declared)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
     let judged = enough.too_few.is_none() && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
@@ -285,14 +287,17 @@ pub fn identify_model(
         whole: &whole,
         noise_is_declared,
     };
-    let quality_flag = judgement.flag(enough.flag, not_converged, enough.poses);
-    let cautions = judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
+    let asked = !options.in_passing;
+    let quality_flag = if asked { judgement.flag(enough.flag, not_converged, enough.poses) } else { not_converged };
+    let cautions = || judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
+    let sight = if asked { whole.data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     Ok(Identification {
+        in_passing: options.in_passing,
         quality_flag,
         too_few_poses: enough.too_few,
         poses: enough.poses,
         several_targets: enough.several_targets,
-        cautions,
+        cautions: if asked { cautions() } else { Vec::new() },
         strategy,
         solver,
         solver_reason: options.solver.reason(model),
@@ -308,12 +313,13 @@ pub fn identify_model(
         noise_factor,
         sigma_taken,
         sigma_scale: fitting.noise_model.scale.min(1.0),
+        noise_models: (fitting.noise_model, fitting.turn_noise_model),
         kinds: fitting.errors_by_kind(&start, &end.x),
         spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
         weak: end.gauge.weak.clone(),
         orientation: fitting.orientation(&start, &end.x),
         coordinates: whole.count(),
-        sight: (fitting.whole().data_triangle(&start), OnceLock::new()),
+        sight: (sight, OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
@@ -325,6 +331,27 @@ pub fn identify_model(
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// The full parameter vector of the registered nominal arm and its errors; the fit begins with the σ that it takes from there, or from its
+/// predecessor.
+fn prepared(
+    fitting: &mut Fitting,
+    predecessor: Option<&Predecessor>,
+    noise_is_declared: bool,
+) -> Result<(DVector<f64>, Errors), StageError> {
+    let (start, registered) = match predecessor {
+        Some(known) => (known.registered(fitting.model), known.errors),
+        None => fitting.registered().map(|start| (start.clone(), fitting.errors(&start)))?,
+    };
+    if !noise_is_declared {
+        let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
+        fitting.sigma = scatter.max(LEAST_NOISE);
+    }
+    if let Some(noise) = predecessor.and_then(|known| known.noise) {
+        (fitting.noise_model, fitting.turn_noise_model) = noise;
+    }
+    Ok((start, registered))
 }
 
 /// What the strategy varies; a row without equilibrium and a strategy that varies nothing of its own are mistakes.

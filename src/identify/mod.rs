@@ -25,6 +25,7 @@ mod outcome;
 mod outliers;
 mod placement;
 mod pose_sufficiency;
+mod predecessor;
 mod predict;
 mod prices;
 mod procedure;

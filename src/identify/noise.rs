@@ -23,9 +23,17 @@ const SCALE_SETTLED: f64 = 0.01;
 const FIRST_STEPS: u64 = 30;
 /// Fits after which the search for σ stops.
 const MAX_NOISE_FITS: usize = 20;
+/// Both σ as declared.
+const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
+/// What an earlier fit took contradicts a declared σ beyond doubt where twice the logarithm of the likelihood ratio is so many times what
+/// chance gives.
+const BEYOND_DOUBT: f64 = 10.0;
+
 /// Runs the strategy until the σ that it takes is the one declared or, where residual and priors contradict that, the one they
 /// speak for; where none is declared, until the scatter about the fit is the σ assumed. `judged` says whether the poses are
 /// enough to contradict a σ.
+///
+/// A fit may begin with what an earlier one took in the place of a declared σ, as long as that contradicts the declared one beyond doubt.
 pub(super) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,
@@ -33,20 +41,26 @@ pub(super) fn fitted(
 ) -> Result<(FitEnd, Statistics, Noise), StageError> {
     let mut fits = 0;
     let mut begin = start.clone();
+    let mut taken_over = (fitting.noise_model, fitting.turn_noise_model) != AS_DECLARED;
     loop {
         fits += 1;
         let limit = fitting.max_steps;
-        let first = fits == 1 && noise_is_declared && judged && fitting.strategy.stages().len() == 1;
+        let assumed = (fitting.noise_model, fitting.turn_noise_model);
+        let single = fitting.strategy.stages().len() == 1;
+        let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
         if first {
             fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
         }
         let end = fitting.run(&begin)?;
         fitting.max_steps = limit;
         let whole = fitting.whole();
-        let statistics = Statistics::of(&whole, &end, noise_is_declared.then_some(fitting.noise_model))?;
         if noise_is_declared {
-            let assumed = (fitting.noise_model, fitting.turn_noise_model);
-            let next = if judged { contradicted(&whole, &end, &statistics, assumed)? } else { None };
+            if taken_over && !(judged && is_beyond_doubt(&whole)) {
+                (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                (taken_over, fits, begin) = (false, 0, end.x);
+                continue;
+            }
+            let next = if judged { contradicted(&whole, &end, assumed)? } else { None };
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
@@ -55,10 +69,14 @@ pub(super) fn fitted(
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
                 }
                 None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => begin = end.x,
-                None => return Ok((end, statistics, Noise::Declared)),
+                None => {
+                    let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;
+                    return Ok((end, statistics, Noise::Declared));
+                }
             }
             continue;
         }
+        let statistics = Statistics::of(&whole, &end, None)?;
         let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
         let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
         if settled || fits == MAX_NOISE_FITS {
@@ -72,6 +90,20 @@ pub(super) fn fitted(
     }
 }
 
+/// Twice the logarithm of the likelihood ratio that chance gives with the probability of what is improbable.
+fn by_chance() -> f64 {
+    ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE))
+}
+
+/// Whether the variance that a stage took, r times the declared one, contradicts that beyond doubt: N (r − 1 − ln r) of N numbers less
+/// unknowns is twice the logarithm of the likelihood ratio.
+fn is_beyond_doubt(stage: &Stage) -> bool {
+    let ratios = stage.poses.iter().zip(&stage.declared).map(|(pose, declared)| (pose.sigma / declared).powi(2));
+    let ratio = ratios.sum::<f64>() / stage.poses.len().max(1) as f64;
+    let freedom = stage.count().saturating_sub(stage.unknowns.len()) as f64;
+    freedom * (ratio - 1.0 - ratio.ln()) > BEYOND_DOUBT * by_chance()
+}
+
 /// What to assume instead, if what is assumed is contradicted or has not settled; poses that a robust loss sets aside as
 /// outliers do not count.
 ///
@@ -80,10 +112,11 @@ pub(super) fn fitted(
 fn contradicted(
     stage: &Stage,
     end: &FitEnd,
-    statistics: &Statistics,
     assumed: (NoiseModel, NoiseModel),
 ) -> Result<Option<(NoiseModel, NoiseModel)>, StageError> {
-    let counts = |place: &usize| stage.loss == Loss::Squares || statistics.lengths.outlying(*place).is_none();
+    let of_fit = || Statistics::of(stage, end, Some(assumed.0));
+    let robust = if stage.loss == Loss::Squares { None } else { Some(of_fit()?) };
+    let counts = |place: &usize| robust.as_ref().is_none_or(|own| own.lengths.outlying(*place).is_none());
     let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
     let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
     let several_kinds = poses.iter().any(|pose| pose.observation.kind() != poses[0].observation.kind());
@@ -101,11 +134,11 @@ fn contradicted(
     if !ratio.is_finite() {
         return Ok(None);
     }
-    let first = assumed == (NoiseModel::DECLARED, NoiseModel::DECLARED);
+    let first = assumed == AS_DECLARED;
     let shares = shares(&residual_vector(&residuals, &x), stage.coordinates(), [count - turned, turned]);
     // Positions and orientations settle each by themselves.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
-    let chance = ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE));
+    let chance = by_chance();
     if (first && gain <= chance) || (!first && settled) {
         return Ok(None);
     }

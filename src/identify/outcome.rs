@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariance::{Collected, Correlations, Covariance};
 use super::fitting::FitEnd;
+use super::noise_model::NoiseModel;
 use super::stage::Stage;
 use super::statistics::Statistics;
 use super::{
@@ -122,6 +123,10 @@ pub struct Identification {
     pub unknowns: Vec<String>,
     /// Triangular factor of their whitened Jacobian, data alone, at the registered nominal arm, and what it tells once that was asked.
     pub(super) sight: (DMatrix<f64>, OnceLock<Identifiability>),
+    /// Whether it was fitted in passing: it has neither that factor nor cautions, and nobody judged whether it is to be trusted.
+    pub(crate) in_passing: bool,
+    /// What the fit made of the σ of positions, and of orientations.
+    pub(super) noise_models: (NoiseModel, NoiseModel),
     /// Every free parameter.
     pub estimates: Vec<Estimate>,
     /// Covariance of the estimates.

@@ -60,6 +60,8 @@ pub(super) struct Stage<'a> {
     pub solver: SolverChoice,
     /// Steps after which the solver is stopped.
     pub max_steps: u64,
+    /// Relative reduction of the cost below which a step is not worth it.
+    pub cost_tolerance: f64,
     /// How the residual of a pose counts.
     pub loss: Loss,
     /// Whether constraints count that also speak of free parameters which do not vary here.
@@ -313,7 +315,7 @@ impl<'a> Stage<'a> {
         let sizes = self.sizes();
         let fit = Steadied { objective: fit, sizes: &sizes };
         let settings =
-            Settings { max_iterations: self.max_steps, cost_tolerance: COST_TOLERANCE, ..Settings::default() };
+            Settings { max_iterations: self.max_steps, cost_tolerance: self.cost_tolerance, ..Settings::default() };
         let watched = self.progress.is_some() || self.stop.is_some();
         let reporter = watched.then(|| Reporter {
             sink: self.progress.map(Arc::clone),

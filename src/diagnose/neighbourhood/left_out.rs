@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::orthonormal::RANK;
+use crate::numeric::gram;
 
 /// JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
 struct Squares {
@@ -17,7 +18,7 @@ impl Squares {
     fn of(columns: &DMatrix<f64>, residual: &DVector<f64>, poses: &[usize]) -> Self {
         let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
         let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));
-        Self { gram: j.transpose() * &j, product: j.tr_mul(&r), residual: r.norm_squared(), rows: rows.len() }
+        Self { gram: gram(&j), product: j.tr_mul(&r), residual: r.norm_squared(), rows: rows.len() }
     }
 }
 

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
 use crate::numeric::product;
@@ -11,6 +12,9 @@ use crate::numeric::product;
 /// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
 /// the others say nothing of it.
 pub(in crate::diagnose) const LEAST_DECIDED: f64 = 1e-6;
+
+/// So many columns at most are projected out by one direction of the basis after the other: it is gone through once for all of them.
+const NARROW: usize = 4;
 
 /// The unknowns of a fit as it ended.
 #[derive(Debug, Clone, Default)]
@@ -116,12 +120,14 @@ impl LinearNeighbourhood {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         let mut along = DMatrix::zeros(first, k);
-        // Twice is enough [Giraud, Langou & Rozložník 2005].
         for _ in 0..2 {
             // The narrow side is transposed: this is the product that is fast.
             let more = product(&left.transpose(), &self.basis).transpose();
             left -= product(&self.basis, &more);
             along += more;
+            if most_is_left(&left, &lengths) {
+                break;
+            }
         }
         let (new, within) = orthonormal(&left, Some(&lengths));
         let rank = new.ncols();
@@ -144,6 +150,11 @@ impl LinearNeighbourhood {
         with
     }
 
+    /// The fit as its optimum and covariance.
+    pub fn estimated(&self) -> Estimated {
+        Estimated::new(&self.root, self.optimum.clone(), self.sums.squares)
+    }
+
     /// What is left in numbers.
     pub fn sums(&self) -> Sums {
         self.sums
@@ -153,6 +164,11 @@ impl LinearNeighbourhood {
     pub fn sums_without(&self, share: &Share) -> Sums {
         let freed = share.directions.rows(0, self.rows).norm_squared();
         Sums::of(&(&self.residual + &share.directions * &share.part), self.rows, self.sums.data_freedom + freed)
+    }
+
+    /// Number of unknowns, those of added columns among them.
+    pub fn unknowns(&self) -> usize {
+        self.root.nrows()
     }
 
     /// Data rows, 3 N.
@@ -204,12 +220,23 @@ impl LinearNeighbourhood {
     /// Columns of the data, shape = (3 N, k), with everything fitted projected out, shape = (3 N + priors, k).
     pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
-        // Twice is enough [Giraud, Langou & Rozložník 2005].
-        for _ in 0..2 {
-            // Of several columns the narrow side is transposed: this is the product that is fast.
-            let several = left.ncols() > 4;
-            let along = if several { (left.transpose() * &self.basis).transpose() } else { self.basis.tr_mul(&left) };
-            left.gemm(-1.0, &self.basis, &along, 1.0);
+        let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
+        // Below the data there is nothing at first.
+        for filled in [self.rows, self.residual.len()] {
+            if left.ncols() > NARROW {
+                // The narrow side is transposed: this is the product that is fast.
+                let along = (left.transpose() * &self.basis).transpose();
+                left.gemm(-1.0, &self.basis, &along, 1.0);
+            } else {
+                let along = self.basis.rows(0, filled).tr_mul(&left.rows(0, filled));
+                for (column, along) in self.basis.column_iter().zip(along.row_iter()) {
+                    let pairs = left.column_iter_mut().zip(along.iter());
+                    pairs.for_each(|(mut left, along)| left.axpy(-along, &column, 1.0));
+                }
+            }
+            if most_is_left(&left, &lengths) {
+                break;
+            }
         }
         left
     }
@@ -275,6 +302,12 @@ impl LinearNeighbourhood {
         let sum: f64 = sums.iter().sum();
         sum.is_finite().then_some(sum)
     }
+}
+
+/// Whether a tenth at least is left of every column: then what one projection leaves along a basis is rounding. Of less, two are enough
+/// [Giraud, Langou & Rozložník 2005].
+fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
+    left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= 0.1 * length)
 }
 
 /// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly 0.

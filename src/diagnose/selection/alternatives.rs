@@ -32,4 +32,15 @@ impl<'f, 'a> Replacements<'f, 'a> {
         let best = ranking.iter().find(|tried| !effect.covers(&self.scan.effects[tried.index]))?;
         (best.criterion < own - rules.beyond_doubt).then(|| self.scan.effects[best.index].clone())
     }
+
+    /// Unknowns of the fit.
+    pub fn unknowns(&self) -> usize {
+        self.fit.unknowns()
+    }
+
+    /// The fit with the columns of a candidate.
+    pub fn with(&self, candidate: &Effect) -> LinearNeighbourhood {
+        let index = self.scan.effects.iter().position(|known| known == candidate);
+        index.map_or_else(|| self.fit.clone(), |index| self.fit.with(&self.scan.columns(index)))
+    }
 }

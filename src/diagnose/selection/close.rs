@@ -328,7 +328,14 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     let replacements = Replacements::new(fitted, &linearised, &candidates, rounds.data);
     for effect in &added {
         if let Some(better) = replacements.better_than(effect) {
-            let kept: Vec<Effect> = added.iter().filter(|known| *known != effect).chain([&better]).cloned().collect();
+            let gone = std::slice::from_ref(effect);
+            let change = (gone, std::slice::from_ref(&better));
+            let staying = rounds.staying(fitted, change, replacements.unknowns(), || replacements.with(&better));
+            if staying.as_ref().is_some_and(|effects| rounds.was_fitted(effects)) {
+                continue;
+            }
+            let all = added.iter().filter(|known| *known != effect).chain([&better]);
+            let kept: Vec<Effect> = staying.unwrap_or_else(|| all.cloned().collect());
             let next = rounds.without_insignificant(rounds.fit(fitted, &kept)?)?;
             if rounds.enter(&next) {
                 return Ok(Some(next));

@@ -35,7 +35,7 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     let found = (squares / coefficients.len() as f64).sqrt();
     let first = rounds.fit_on(with_scale(dense.clone(), found), &fitted)?;
     let scale = best_scale(&first, rounds.data, found);
-    let mut filled = rounds.fit_whole(with_scale(dense, scale), &first)?;
+    let mut filled = rounds.fit_towards(with_scale(dense, scale), &first)?;
     // What more harmonics explain need not be explained by anything else.
     loop {
         let leaves = |tested: &Retested| {
@@ -44,11 +44,13 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
         let leaving: Vec<Effect> =
             rounds.tested(&filled).into_iter().filter(leaves).map(|tested| tested.effect).collect();
         if leaving.is_empty() {
-            return Ok((filled, Some(scale)));
+            let in_passing = filled.found.in_passing;
+            let whole = if in_passing { filled.settled(rounds.data, rounds.options)? } else { filled };
+            return Ok((whole, Some(scale)));
         }
         let kept = rounds.added(&filled).into_iter().filter(|own| !leaving.contains(own));
         let effects = kept.fold(rounds.declared.clone(), |all, own| joined(&all, &own));
-        filled = rounds.fit_whole(filled.with_effects(&effects), &filled)?;
+        filled = rounds.fit_towards(filled.with_effects(&effects), &filled)?;
     }
 }
 

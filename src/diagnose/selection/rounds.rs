@@ -6,7 +6,7 @@ use super::super::candidates::{Candidates, joined};
 use super::super::data::Data;
 use super::super::evidence::{Evidence, weigh};
 use super::super::fitted::Fitted;
-use super::super::neighbourhood::{Scan, tries};
+use super::super::neighbourhood::{LinearNeighbourhood, Scan, tries};
 use super::pick::{Pick, pick};
 use crate::identify::{ErrorSummary, IdentifyError, Options, Progress};
 use crate::problem::{Effect, Problem};
@@ -82,12 +82,19 @@ impl<'a> Rounds<'a> {
         while self.done.len() < self.data.rules.rounds {
             self.tell(0, 0);
             let candidates = Candidates::of(&fitted.problem, self.data);
-            let picks = {
+            let (picks, staying) = {
                 let linearised = fitted.linearised(self.data, &candidates.testable);
                 let fit = fitted.neighbourhood(&linearised);
+                let own = fit.unknowns();
                 let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
-                pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1)
+                let picks = pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1);
+                let picked: Vec<Effect> = picks.iter().map(|pick| pick.effect.clone()).collect();
+                let staying = self.staying(&fitted, (&[], &picked), own, || scan.linear.clone());
+                (picks, staying)
             };
+            if staying.is_some_and(|effects| self.was_fitted(&effects)) {
+                break;
+            }
             let Some(next) = self.with(&fitted, &picks)? else { break };
             let next = self.without_insignificant(next)?;
             if !self.enter(&next) {
@@ -106,16 +113,28 @@ impl<'a> Rounds<'a> {
         count.max(1)
     }
 
-    /// A problem fitted from where another fit ended.
-    pub fn fit_whole(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
+    /// A problem with the same effects but for few fitted from where another fit ended: in passing, and beginning with the σ that that one
+    /// took, where a round pays for one fit alone.
+    pub fn fit_towards(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
+        if self.affordable_fits(from) == 1 {
+            return self.fit_some_steps(problem, from, true);
+        }
         Fitted::new(problem, self.data, &from.onwards(self.options))
     }
 
     /// The same in as many steps as a round pays for.
     pub fn fit_on(&self, problem: Problem, from: &Fitted) -> Result<Fitted, IdentifyError> {
-        let paid = self.data.rules.few_steps * self.affordable_fits(from) as u64;
+        self.fit_some_steps(problem, from, false)
+    }
+
+    /// In passing where a round pays for one fit alone.
+    fn fit_some_steps(&self, problem: Problem, from: &Fitted, alike: bool) -> Result<Fitted, IdentifyError> {
+        let affordable = self.affordable_fits(from);
+        let paid = self.data.rules.few_steps * affordable as u64;
         let max_steps = Some(self.options.max_steps.map_or(paid, |most| most.min(paid)));
-        Fitted::new(problem, self.data, &Options { max_steps, ..from.onwards(self.options) })
+        let (single, plain) = (affordable == 1, from.onwards(self.options));
+        let options = if single { from.succeeding(self.options, alike) } else { plain };
+        Fitted::new(problem, self.data, &Options { max_steps, in_passing: single, ..options })
     }
 
     /// Enters a fit into the story, if its effects were not fitted together before.
@@ -139,18 +158,93 @@ impl<'a> Rounds<'a> {
     /// Whether these effects were not fitted together before.
     pub fn is_new(&mut self, fitted: &Fitted) -> bool {
         let effects = fitted.effects();
-        let is_same = |seen: &Vec<Effect>| seen.len() == effects.len() && effects.iter().all(|own| seen.contains(own));
-        let new = !self.seen.iter().any(is_same);
+        let new = !self.is_seen(&effects);
         if new {
             self.seen.push(effects);
         }
         new
     }
 
+    fn is_seen(&self, effects: &[Effect]) -> bool {
+        let is_same = |seen: &Vec<Effect>| seen.len() == effects.len() && effects.iter().all(|own| seen.contains(own));
+        self.seen.iter().any(is_same)
+    }
+
+    /// Whether the problem was fitted with these effects added.
+    pub fn was_fitted(&self, added: &[Effect]) -> bool {
+        self.is_seen(&self.with_declared(added))
+    }
+
+    fn with_declared(&self, added: &[Effect]) -> Vec<Effect> {
+        added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect))
+    }
+
     /// The problem fitted with these effects added.
     pub fn fit(&self, fitted: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
-        let effects = added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect));
-        self.fit_on(fitted.with_effects(&effects), fitted)
+        self.fit_on(fitted.with_effects(&self.with_declared(added)), fitted)
+    }
+
+    /// What stays of the effects of a fit, those that are `gone` left out, and of others beside them, in its linear neighbourhood `with` the
+    /// columns of those others behind those of its `first` unknowns: what would leave again at once needs no fit to show that.
+    ///
+    /// `None` where a round pays for several fits, or where that neighbourhood does not decide: of others that stay a fit has to show what is
+    /// significant beside them, unless they were fitted together before.
+    pub fn staying(
+        &self,
+        fitted: &Fitted,
+        (gone, others): (&[Effect], &[Effect]),
+        first: usize,
+        with: impl FnOnce() -> LinearNeighbourhood,
+    ) -> Option<Vec<Effect>> {
+        if self.affordable_fits(fitted) > 1 || others.is_empty() {
+            return None;
+        }
+        let kept = self.added(fitted).into_iter().flat_map(|effect| effect.parts());
+        let kept: Vec<Effect> = kept.filter(|part| !gone.iter().any(|own| own.covers(part))).collect();
+        let new: Vec<Effect> = others.iter().flat_map(Effect::parts).collect();
+        let problem_of = |parts: &[Effect]| fitted.with_effects(&self.with_declared(parts));
+        let whole = problem_of(&[kept.as_slice(), &new].concat());
+        let priors = new.iter().map(|effect| fitted.priors_in(&whole, self.data, effect));
+        let priors: Vec<Vec<Option<f64>>> = priors.collect::<Option<_>>()?;
+        let linear = with();
+        if linear.unknowns() != first + priors.iter().map(Vec::len).sum::<usize>() {
+            return None;
+        }
+        let freedom = linear.sums().freedom();
+        let mut estimated = linear.estimated();
+        let mut parts: Vec<(Effect, Vec<usize>)> =
+            kept.into_iter().map(|part| (part.clone(), fitted.unknowns_of(&part))).collect();
+        let mut place = first;
+        for (effect, priors) in new.into_iter().zip(priors) {
+            let own: Vec<usize> = (place..place + priors.len()).collect();
+            place += priors.len();
+            own.iter().zip(priors).filter_map(|(&k, sigma)| Some((k, sigma?))).for_each(|(k, sigma)| {
+                estimated.with_prior(k, sigma);
+            });
+            parts.push((effect, own));
+        }
+        for effect in gone {
+            estimated.leave_out(&fitted.unknowns_of(effect));
+        }
+        loop {
+            let effects: Vec<Effect> = parts.iter().map(|(part, _)| part.clone()).collect();
+            let tries = self.tries(&problem_of(&effects), &effects);
+            let left = (estimated.squares(), freedom);
+            let p = |((_, own), tries): (&(Effect, Vec<usize>), f64)| {
+                chance_of_loss(estimated.loss_without(own), own.len(), left, tries)
+            };
+            let worst = parts.iter().zip(tries).map(p).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+            match worst {
+                Some((least, p)) if p >= self.data.rules.leaving_level => {
+                    let (_, own) = parts.remove(least);
+                    estimated.leave_out(&own);
+                }
+                _ => break,
+            }
+        }
+        let effects = parts.iter().fold(Vec::new(), |all, (part, _)| joined(&all, part));
+        let none = !parts.iter().any(|(part, _)| others.iter().any(|other| other.covers(part)));
+        (none || self.was_fitted(&effects)).then_some(effects)
     }
 
     /// The problem fitted with what was picked; among the best of the rivals of a single pick the one that fits best.
@@ -222,21 +316,32 @@ impl<'a> Rounds<'a> {
     pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
         let linearised = fitted.linearised(self.data, &[]);
         let fit = fitted.neighbourhood(&linearised);
-        let mut everything = Candidates::of(&fitted.problem, self.data).testable;
+        let tries = self.tries(&fitted.problem, &own);
+        let left = (fit.sums().squares, fit.sums().freedom());
+        let test = |(effect, tries): (Effect, f64)| {
+            let lost = fit.loss_without(&fitted.unknowns_of(&effect));
+            let p = chance_of_loss(lost, fitted.parameters_of(&effect).len(), left, tries);
+            Retested { effect, p }
+        };
+        own.into_iter().zip(tries).map(test).collect()
+    }
+
+    /// How often chance has a try at each of some effects of a problem, in all families together.
+    fn tries(&self, problem: &Problem, own: &[Effect]) -> Vec<f64> {
+        let mut everything = Candidates::of(problem, self.data).testable;
         let first = everything.len();
         everything.extend(own.iter().flat_map(Effect::parts));
         let (all_tries, families) = tries(&everything);
         let mut all_tries = all_tries[first..].iter();
-        let freedom = fit.sums().freedom();
-        let test = |effect: Effect| {
-            let tries: f64 = all_tries.by_ref().take(effect.parts().len()).sum();
-            let k = fitted.parameters_of(&effect).len() as f64;
-            let lost = fit.loss_without(&fitted.unknowns_of(&effect));
-            let ratio = lost.map(|lost| lost / k / (fit.sums().squares / freedom)).filter(|ratio| !ratio.is_nan());
-            let chance = FisherSnedecor::new(k, freedom).ok().zip(ratio);
-            let chance = chance.map_or(1.0, |(chance, ratio)| chance.sf(ratio).max(f64::MIN_POSITIVE));
-            Retested { effect, p: (chance * tries * families as f64).min(1.0) }
-        };
-        own.into_iter().map(test).collect()
+        let sum = |effect: &Effect| all_tries.by_ref().take(effect.parts().len()).sum::<f64>() * families as f64;
+        own.iter().map(sum).collect()
     }
+}
+
+/// Probability that one of so many `tries` of chance would lose as much without k parameters; `left` are squares and degrees of freedom.
+fn chance_of_loss(lost: Option<f64>, k: usize, (squares, freedom): (f64, f64), tries: f64) -> f64 {
+    let ratio = lost.map(|lost| lost / k as f64 / (squares / freedom)).filter(|ratio| !ratio.is_nan());
+    let chance = FisherSnedecor::new(k as f64, freedom).ok().zip(ratio);
+    let chance = chance.map_or(1.0, |(chance, ratio)| chance.sf(ratio).max(f64::MIN_POSITIVE));
+    (chance * tries).min(1.0)
 }
