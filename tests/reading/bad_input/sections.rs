@@ -228,6 +228,14 @@ fn effects() {
             &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
         ),
         (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-wave = { joint = 1, order = 2 }",
+            &[":6: effect[2].joint-wave: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "joint-wave = { joint = 1, order = 2.0 }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
             "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
             &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
         ),
