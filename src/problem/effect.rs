@@ -219,7 +219,7 @@ impl Effect {
             | (Self::JointWave { joint: own, order }, Self::JointHarmonic { joint, orders })
                 if joint == own =>
             {
-                orders.iter().copied().find(|&whole| f64::from(whole) == *order)
+                orders.iter().copied().find(|&whole| f64::from(whole).total_cmp(order).is_eq())
             }
             _ => None,
         }

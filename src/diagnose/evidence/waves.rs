@@ -217,7 +217,7 @@ impl Waves<'_, '_> {
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let own = gains.iter().find(|(own, _)| *own == order).map_or(0.0, |(_, gain)| *gain);
+        let own = gains.iter().find(|(own, _)| own.total_cmp(&order).is_eq()).map_or(0.0, |(_, gain)| *gain);
         let weight = |gain: f64| (gain - own).min(0.0).exp();
         let between = |pair: &[(f64, f64)]| 0.5 * (weight(pair[0].1) + weight(pair[1].1)) * (pair[1].0 - pair[0].0);
         // An order that no neighbour comes near is told to a step.

@@ -182,7 +182,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 34] = [
+    let effects: [(&str, &[&str]); 36] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
