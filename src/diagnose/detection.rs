@@ -76,7 +76,7 @@ impl Size {
 pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
     let poses = timed(poses);
     let Candidates { testable, untestable } = candidates(problem, &poses);
-    let (tries, families) = tries(&testable);
+    let (tries, families) = tries(&testable, problem);
     let effects = with_linear(problem, &poses, &testable, |linearised, linear| {
         let sizes = |(effect, tries): (&Effect, f64)| Detectable {
             sizes: sizes(problem, linearised, linear, effect, tries * families as f64),

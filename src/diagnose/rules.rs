@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use crate::identify::IdentifyError;
+use crate::problem::HIGHEST_ORDER;
 
 /// What decides which effects are found and what is said of them.
 ///
@@ -132,7 +133,8 @@ pub struct SelectionRules {
     pub near_orders: u32,
     /// Highest order of a wave that is looked for, whole number or not: about the teeth of a strain-wave gear, twice its ratio.
     pub wave_orders: f64,
-    /// ln of the odds to a whole number, or to an order that was taken before, from which on the order of a wave is another one: 20 to 1.
+    /// ln of the odds to a whole number that is no candidate by itself, or to an order that was taken before, from which on the order of a
+    /// wave is another one: 20 to 1.
     pub another_order: f64,
     /// Seed of what is random: blocks, permutations, resamples, telling poses.
     pub seed: u64,
@@ -255,7 +257,7 @@ impl SelectionRules {
             ("smooth_lengths", self.smooth_lengths.iter().all(|&length| size(length))),
             ("surface_length", size(self.surface_length)),
             ("slow_length", size(self.slow_length)),
-            ("wave_orders", size(self.wave_orders)),
+            ("wave_orders", size(self.wave_orders) && self.wave_orders <= HIGHEST_ORDER),
             ("another_order", size(self.another_order)),
         ];
         rules.into_iter().find(|(_, holds)| !holds).map_or(Ok(()), |(rule, _)| Err(IdentifyError::Rule { rule }))

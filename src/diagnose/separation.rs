@@ -56,7 +56,7 @@ pub fn separation(
             testable.push(effect.clone());
         }
     }
-    let (tries, families) = tries(&testable);
+    let (tries, families) = tries(&testable, problem);
     let tries_of = |effect: &Effect| {
         let place = testable.iter().position(|known| known == effect);
         place.map_or(1.0, |place| tries[place] * families as f64)

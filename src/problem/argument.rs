@@ -11,7 +11,7 @@ use crate::quantity::Unit;
 /// Most orders of one effect.
 const MOST_ORDERS: usize = 100;
 /// Highest order of a wave: beyond it commands to a hundredth of a degree tell no phase.
-const HIGHEST_ORDER: f64 = 1e4;
+pub(crate) const HIGHEST_ORDER: f64 = 1e4;
 
 /// Where something of the arm moves with a covariate: a joint, from 1, or the base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -231,13 +231,19 @@ impl Effect {
         self.lags() || matches!(self, Self::JointHysteresis { .. })
     }
 
-    /// An order that this and another harmonic of one joint share.
+    /// An order that this and another harmonic of one joint share; a wave of a whole order is a harmonic.
     pub(super) fn shared_order(&self, other: &Self) -> Option<u32> {
         match (self, other) {
             (Self::JointHarmonic { joint, orders }, Self::JointHarmonic { joint: own, orders: more })
                 if joint == own =>
             {
                 more.iter().find(|order| orders.contains(order)).copied()
+            }
+            (Self::JointHarmonic { joint, orders }, Self::JointWave { joint: own, order })
+            | (Self::JointWave { joint: own, order }, Self::JointHarmonic { joint, orders })
+                if joint == own =>
+            {
+                orders.iter().copied().find(|&whole| f64::from(whole).total_cmp(order).is_eq())
             }
             _ => None,
         }

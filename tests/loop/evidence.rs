@@ -315,6 +315,36 @@ fn waves_are_named_with_their_orders_and_whole_numbers_are_harmonics() {
 }
 
 #[test]
+fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let truth = truth.split("[[effect]]").next().unwrap().replacen("q1_deg = [-90, 90]", "q1_deg = [-40, 40]", 1);
+    let evidence = |effect: &str, seed: u64| {
+        let truth =
+            Truth::parse(&format!("{truth}\n[[effect]]\n{effect}\n"), Path::new("TRUTH.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 40, seed).unwrap().rows;
+        let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+        trace(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap().evidence.unwrap()
+    };
+    let harmonic = |order: u32| Effect::JointHarmonic { joint: 1, orders: vec![order] };
+    let between = "joint-wave = { joint = 1, order = 11.5 }\nsin_deg = 0.003\ncos_deg = -0.002";
+    let whole = "joint-harmonic = { joint = 1, orders = [12] }\nsin12_deg = 0.003\ncos12_deg = -0.002";
+    for seed in 1..=12 {
+        let evidence = evidence(between, seed);
+        let law = |effect: Effect| evidence.claims_of(&effect).map_or(0.0, |claims| claims.law.1);
+        assert!(law(harmonic(11)) < STATED && law(harmonic(12)) < STATED, "{seed}: {:?}", evidence.explanations[0]);
+    }
+    // A whole number is the more common one, and a wave of no whole number is not ruled out beside it.
+    for seed in 1..=4 {
+        let evidence = evidence(whole, seed);
+        let wave = evidence.probability(|own| own.effect().is_some_and(|effect| effect.name() == "joint-wave"));
+        let law = evidence.claims_of(&harmonic(12)).unwrap().law.1;
+        assert!(law > wave && wave > 0.02, "{seed}: {law} {wave}");
+    }
+}
+
+#[test]
 fn an_outlier_among_few_poses_is_set_aside_and_named() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&cases.join("problem.toml")).unwrap();

@@ -29,7 +29,7 @@ type Change = fn(&mut SelectionRules);
 fn rules_that_make_no_sense_are_refused() {
     let problem = Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler")).unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
-    let change: [(&str, Change); 10] = [
+    let change: [(&str, Change); 11] = [
         ("resamples", |rules| rules.resamples = 0),
         ("blocks", |rules| rules.blocks = 0),
         ("level", |rules| rules.level = f64::NAN),
@@ -40,6 +40,7 @@ fn rules_that_make_no_sense_are_refused() {
         ("led_poses", |rules| rules.led_poses = 0),
         ("weighed_poses", |rules| rules.weighed_poses = 0),
         ("time_step", |rules| rules.time_step = f64::INFINITY),
+        ("wave_orders", |rules| rules.wave_orders = 1e5),
     ];
     assert!(SelectionRules::DEFAULT.check().is_ok());
     for (name, change) in change {

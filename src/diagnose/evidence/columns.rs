@@ -2,14 +2,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::block::Design;
+use super::block::{Block, Design};
 use super::functions::{Known, basis, goes_with, merge, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
 use crate::diagnose::data::{bits, number};
-use crate::diagnose::neighbourhood::{Linearised, tries};
+use crate::diagnose::fitted::Fitted;
+use crate::diagnose::neighbourhood::{LinearNeighbourhood, Linearised, tries};
 use crate::diagnose::rules::SelectionRules;
+use crate::identify::Noise;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, JointField, Slot};
@@ -25,6 +27,24 @@ pub(super) struct Candidate {
     pub design: Design,
     pub ln_prior: f64,
     pub coefficients: Coefficients,
+}
+
+impl Candidate {
+    /// Its columns with everything that is fitted projected out, some poses left out.
+    pub fn block(&self, (fitted, neighbourhood): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Block {
+        let design = self.design.clone().without(left_out);
+        let mut coefficients = self.coefficients.clone();
+        if fitted.found.noise != Noise::Declared {
+            // A σ from a residual that holds the effect says nothing of how large that is.
+            coefficients.largest.fill(f64::INFINITY);
+        }
+        Block::new(design, neighbourhood, self.ln_prior, coefficients)
+    }
+}
+
+/// Joint, from 0, and order of a wave of any order.
+pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
+    if let Effect::JointWave { joint, order } = effect { Some((joint - 1, *order)) } else { None }
 }
 
 /// Slots whose columns the hypotheses need beside those of effects.
@@ -82,16 +102,6 @@ pub(super) fn even(
         }
     }
     (columns, largest)
-}
-
-/// Whether it is a wave of any order: of that family no list holds all, so that each has its own chance, whichever others are looked at.
-pub(super) fn is_wave(effect: &Effect) -> bool {
-    matches!(effect, Effect::JointWave { .. })
-}
-
-/// Joints that a command turns.
-pub(super) fn turning(problem: &Problem) -> f64 {
-    problem.joints.iter().filter(|joint| joint.commanded() == JointKind::Revolute).count().max(1) as f64
 }
 
 /// Everything that may explain a residual.
@@ -164,7 +174,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
         let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
-        let (tries, _) = tries(&only);
+        let (tries, _) = tries(&only, self.problem);
         let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
         for ((effect, columns), tries) in effects.iter().zip(tries) {
             let terms = effect.terms(self.problem);
@@ -175,8 +185,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 alone: acts_along_axes(&terms),
                 largest,
             };
-            let joints = if is_wave(effect) { turning(self.problem) } else { 1.0 };
-            self.entered(effect.name(), 1.0 / (tries * joints), hypothesis, Design::Dense(columns), coefficients);
+            self.entered(effect.name(), 1.0 / tries, hypothesis, Design::Dense(columns), coefficients);
         }
     }
 
@@ -456,7 +465,6 @@ impl<'a, 'l> Columns<'a, 'l> {
         for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
             let own = families.iter().find(|(known, ..)| *known == family.as_str());
             let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
-            let sum = if candidate.hypothesis.effect().is_some_and(is_wave) { 1.0 } else { sum };
             candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
         }
         (candidates, self.covariates, -(2.0 * all.max(1.0)).ln())

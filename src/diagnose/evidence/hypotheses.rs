@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::columns::{Candidate, Columns, slots};
+use super::columns::{Candidate, Columns, even, order_of, slots};
 use super::explanation::Explanation;
 use super::functions::{Known, Shape};
 use super::hypothesis::Hypothesis;
@@ -13,8 +13,9 @@ use crate::diagnose::covariate::Covariate;
 use crate::diagnose::data::Data;
 use crate::diagnose::fitted::Fitted;
 use crate::diagnose::neighbourhood::Linearised;
+use crate::diagnose::rules::SelectionRules;
 use crate::model::parameter::Slot;
-use crate::problem::Effect;
+use crate::problem::{Effect, Problem};
 
 /// A fit linearised at some rows, with every hypothesis.
 pub(in crate::diagnose) struct Hypotheses<'a> {
@@ -41,11 +42,34 @@ impl<'a> Hypotheses<'a> {
         let linearised = fitted.linearised_with(data, rows, &candidates, &slots(&fitted.problem));
         let fit = linearised.fitted();
         let known = added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
+        // Of waves no list holds all: each has its own chance, whichever others are looked at.
+        let (waves, known): (Vec<_>, Vec<_>) = known.partition(|(effect, _)| order_of(effect).is_some());
         let new = candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
-        let effects: Vec<(Effect, DMatrix<f64>)> = known.chain(new).collect();
+        let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
         let how = (data.measurements.time_measured, data.rules, weighed);
         let (all, covariates, ln_family) = Columns::all(&fitted.problem, &linearised, how, &effects, None);
-        Self { linearised, added, unknowns, all, weighed, ln_family, covariates }
+        let mut own = Self { linearised, added, unknowns, all, weighed, ln_family, covariates };
+        let entered = |(effect, columns)| own.entered(&effect, columns, (&fitted.problem, data.rules));
+        let waves: Vec<Candidate> = waves.into_iter().filter_map(entered).collect();
+        own.all.extend(waves);
+        own
+    }
+
+    /// The hypothesis of an effect that no list has, with its columns.
+    pub(super) fn entered(
+        &self,
+        effect: &Effect,
+        columns: DMatrix<f64>,
+        (problem, rules): (&Problem, &SelectionRules),
+    ) -> Option<Candidate> {
+        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
+        let design = Design::Dense(columns).scaled(self.weighed)?;
+        let coefficients = Coefficients { largest, ..Coefficients::default() };
+        let family =
+            self.all.iter().filter_map(|own| own.hypothesis.effect()).filter(|own| own.name() == effect.name());
+        let ln_prior = self.ln_family - effect.tries(&family.collect::<Vec<_>>(), problem).ln();
+        let hypothesis = Hypothesis::of_effect(effect, problem, true, true);
+        Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 
     /// The functions of one hypothesis alone, about what the whole fit leaves.

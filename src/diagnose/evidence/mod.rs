@@ -26,7 +26,6 @@ use rayon::prelude::*;
 use super::covariate::Covariate;
 use super::data::{Data, bits, number};
 use super::fitted::Fitted;
-use super::neighbourhood::LinearNeighbourhood;
 use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
@@ -37,6 +36,7 @@ pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
 use search::{Target, Weighted, search};
+use waves::Waves;
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 const NEGLIGIBLE: f64 = 1e-10;
@@ -176,12 +176,17 @@ impl Evidence {
     }
 
     /// What is claimed of a hypothesis.
+    ///
+    /// Where its time or order is searched, another one counts for it, but not one that is beside it in the most probable explanation.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
+        let most = self.explanations.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
+        let is_beside = |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
         let place = self.probability(|other| other.part == of.part);
         let depends_on = self.probability(|other| other.part == of.part && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
             let unknown = |other: &Hypothesis| other.part == of.part && other.effect().is_none();
-            explanation.hypotheses.iter().any(|other| other.law.is_of(&of.law) && other.part == of.part)
+            let is_it = |other: &&Hypothesis| other.law.is_of(&of.law) && other.part == of.part;
+            explanation.hypotheses.iter().filter(is_it).any(|other| !is_beside(other))
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
         let law = self
@@ -307,9 +312,9 @@ fn blocks(
     }
     let is_declared = fitted.found.noise == Noise::Declared;
     let unless_stopped = |candidate: &&Candidate| {
-        (!data.stop.is_requested()).then(|| block(candidate, (fitted, &neighbourhood), left_out))
+        (!data.stop.is_requested()).then(|| candidate.block((fitted, &neighbourhood), left_out))
     };
-    let blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
+    let mut blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();
@@ -320,18 +325,15 @@ fn blocks(
         trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
         least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
     };
-    Some((blocks, Target { fit: neighbourhood, noise, stop: data.stop.clone() }))
-}
-
-/// A hypothesis with everything that is fitted projected out, some poses left out.
-fn block(candidate: &Candidate, (fitted, neighbourhood): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Block {
-    let design = candidate.design.clone().without(left_out);
-    let mut coefficients = candidate.coefficients.clone();
-    if fitted.found.noise != Noise::Declared {
-        // A σ from a residual that holds the effect says nothing of how large that is.
-        coefficients.largest.fill(f64::INFINITY);
+    let target = Target { fit: neighbourhood, noise, stop: data.stop.clone() };
+    let is_added = |&k: &usize| own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
+    let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
+    let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();
+    let waves = Waves { hypotheses, blocks: &blocks, target: &target, fitted, rules: data.rules, left_out };
+    for (k, ln_spread) in waves.spreads(&added, &effects) {
+        blocks[k].ln_prior += ln_spread;
     }
-    Block::new(design, neighbourhood, candidate.ln_prior, coefficients)
+    Some((blocks, target))
 }
 
 /// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.
@@ -348,17 +350,18 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     if data.stop.is_requested() {
         return None;
     }
-    let of_wave = |wave: &Candidate| block(wave, (fitted, &target.fit), &[]);
-    let how = (&fitted.problem, data.rules);
-    let waves = waves::promising(&hypotheses, &weighted, (&mut blocks, &target), of_wave, how);
+    let (own, rules) = (&hypotheses, data.rules);
+    let waves = Waves { hypotheses: own, blocks: &blocks, target: &target, fitted, rules, left_out: &[] };
+    let waves = waves.promising(&weighted);
     if !waves.is_empty() {
-        blocks.extend(waves.iter().map(of_wave));
+        blocks.extend(waves.iter().map(|wave| wave.block((fitted, &target.fit), &[])));
         hypotheses.all.extend(waves);
         weighted = search(&blocks, &target, data.rules, &present);
     }
-    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), of_wave, how);
+    let block = |own: &Candidate| own.block((fitted, &target.fit), &[]);
+    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), block, (&fitted.problem, data.rules));
     if !finer.is_empty() {
-        blocks.extend(finer.iter().map(of_wave));
+        blocks.extend(finer.iter().map(block));
         hypotheses.all.extend(finer);
         weighted = search(&blocks, &target, data.rules, &present);
     }
@@ -424,4 +427,31 @@ fn stand_ins(
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wave_is_as_sure_as_it_is_and_not_as_another_beside_it() {
+        let wave = |order: f64| Hypothesis {
+            law: Law::Effect(Effect::JointWave { joint: 1, order }),
+            part: Part::Joint(0),
+            slot: None,
+            depends_on: vec![Covariate::Command(0)],
+        };
+        let of = |orders: &[f64], probability: f64| Explanation {
+            hypotheses: orders.iter().copied().map(wave).collect(),
+            probability,
+            functions: vec![(0, 1.0); orders.len()],
+        };
+        let explanations =
+            vec![of(&[6.4, 1.5], 0.5), of(&[6.4], 0.25), of(&[6.41, 1.5], 0.125), of(&[1.6, 6.4], 0.125)];
+        let evidence = Evidence { explanations, stand_ins: Vec::new() };
+        let law = |order: f64| evidence.claims(&wave(order)).law.1;
+        // 6.41 stands for 6.4 and 1.6 for 1.5, but neither 6.4 for 1.5 nor the reverse.
+        assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));
+        assert!((law(1.5) - 0.75).abs() < 1e-12, "{}", law(1.5));
+    }
 }

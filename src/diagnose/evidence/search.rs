@@ -51,7 +51,7 @@ impl Set {
 
 /// What a set leaves of the residual: with A of its members scaled by their sizes and 1 + AᵀA = L Lᵀ, Z = L⁻¹AᵀC takes its part off
 /// other columns C.
-struct Conditioned {
+pub(super) struct Conditioned {
     /// L⁻¹Aᵀ, shape = (columns of the set, rows).
     within: DMatrix<f64>,
     /// L⁻¹Aᵀr.
@@ -79,6 +79,17 @@ impl Conditioned {
         let grid = target.noise.grid();
         let without = over_noise(squares, &grid);
         Some(Self { within, taken, squares, grid, without })
+    }
+
+    /// What a set with these members leaves.
+    pub fn on(members: &[usize], (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Option<Self> {
+        Self::new(&assembled(members, blocks, target, rules)?, blocks, target)
+    }
+
+    /// The gain of a block, its prior among it, and its most probable size.
+    pub fn odds(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
+        let (gain, size) = self.gain(block, target, rules);
+        (gain + block.ln_prior, size)
     }
 
     /// ln p(r | set and block) − ln p(r | set), and the block's most probable size.
@@ -171,11 +182,10 @@ pub(super) fn gains_beside(
     (blocks, target): (&[Block], &Target),
     rules: &SelectionRules,
 ) -> Vec<(usize, f64, f64)> {
-    let conditioned = assembled(others, blocks, target, rules).and_then(|set| Conditioned::new(&set, blocks, target));
-    let Some(conditioned) = conditioned else { return Vec::new() };
+    let Some(conditioned) = Conditioned::on(others, (blocks, target), rules) else { return Vec::new() };
     let gain = |&block: &usize| {
-        let (gain, size) = conditioned.gain(&blocks[block], target, rules);
-        (block, gain + blocks[block].ln_prior, size)
+        let (gain, size) = conditioned.odds(&blocks[block], target, rules);
+        (block, gain, size)
     };
     tried.par_iter().map(gain).collect()
 }

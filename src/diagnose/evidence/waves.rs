@@ -2,24 +2,29 @@
 //! command, at that joint.
 //!
 //! Orders have no end and neighbours hardly differ, so that no list holds them: along a fine row of orders the one that does best beside
-//! the rest of such an explanation becomes a hypothesis like all others. One that the data cannot tell from a whole number is the harmonic of
-//! that order.
+//! the rest of such an explanation becomes a hypothesis like all others. It stands for every order about it, integrated out:
+//!
+//! chance · Σ exp(gain(k) − gain(best)) Δk,
+//!
+//! with the chance of all orders in a unit together, that harmonics are beside it. So where data cannot tell an order from a whole number the
+//! harmonic is the more probable one, by as much as it is the more common and no surer.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::block::{Block, Design};
-use super::columns::{Candidate, even, turning};
+use super::block::Block;
+use super::columns::{Candidate, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law, Part};
-use super::marginal::Coefficients;
-use super::search::{Target, Weighted, gains_beside};
+use super::search::{Conditioned, Target, Weighted};
 use crate::diagnose::covariate::Covariate;
+use crate::diagnose::fitted::Fitted;
 use crate::diagnose::rules::SelectionRules;
+use crate::model::effect::HIGHEST_ORDER;
 use crate::model::parameter::{JointField, Slot, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
 
@@ -28,13 +33,13 @@ const WORTH_A_LOOK: f64 = 0.01;
 /// Explanations whose functions waves of a joint may stand for, the most probable ones.
 const MOST: usize = 6;
 /// Steps between orders, as phases \[rad\] from one end of the joint's range to the other: of the first look, and of the second one.
-const STEPS: [f64; 2] = [0.5, 0.02];
+const STEPS: [f64; 2] = [1.0, 0.02];
 /// Orders of the first look about which there is a second.
 const LOOKED_AT: usize = 3;
-/// Orders that a row has at most: of a joint of many turns the highest are not looked for.
-const MOST_ORDERS: usize = 4000;
-/// Orders whose columns are kept at once.
-const TOGETHER: usize = 256;
+/// Orders that a row has at most: of a joint that turns four times and more in the data the highest are not looked for.
+const MOST_ORDERS: usize = 8000;
+/// Of orders further and further from one over which its likelihood is integrated, each step over that before it.
+const WIDER: f64 = 1.3;
 
 /// The joint, from 0, at which a hypothesis is a function of that joint's own command, or of nothing that is known.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
@@ -50,29 +55,6 @@ fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     (turns && is_own).then_some(joint)
 }
 
-/// For joints, from 0, the sets in which a wave may stand: explanations without one function of the joint's command, and without any.
-fn places(hypotheses: &Hypotheses, weighted: &[Weighted], problem: &Problem) -> BTreeMap<usize, Vec<Vec<usize>>> {
-    let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
-    let of = |member: usize| own_function(&hypotheses.all[member].hypothesis, problem);
-    for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
-        for &member in &set.members {
-            let Some(joint) = of(member) else { continue };
-            let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> {
-                let mut rest: Vec<usize> = set.members.iter().copied().filter(|&other| !gone(other)).collect();
-                rest.sort_unstable();
-                rest
-            };
-            let own = all.entry(joint).or_default();
-            for rest in [without(&|other| other == member), without(&|other| of(other) == Some(joint))] {
-                if !own.contains(&rest) && own.len() < MOST {
-                    own.push(rest);
-                }
-            }
-        }
-    }
-    all
-}
-
 /// Whether the rules of the problem let an effect be looked for.
 fn is_free(effect: &Effect, problem: &Problem) -> bool {
     let parameters = effect.parameters(problem);
@@ -85,83 +67,161 @@ fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
     all.take_while(|order| *order <= high).take(MOST_ORDERS).collect()
 }
 
-/// Waves of any order that do better than those known in the place of functions of `weighted` explanations.
-pub(super) fn promising(
-    hypotheses: &Hypotheses,
-    weighted: &[Weighted],
-    (blocks, target): (&mut Vec<Block>, &Target),
-    block: impl Fn(&Candidate) -> Block + Sync,
-    (problem, rules): (&Problem, &SelectionRules),
-) -> Vec<Candidate> {
-    let known = blocks.len();
-    let mut found: Vec<Candidate> = Vec::new();
-    for (joint, rests) in places(hypotheses, weighted, problem) {
-        let Some((low, high)) = hypotheses.known(&Covariate::Command(joint)).map(|own| own.range) else { continue };
-        if !is_free(&Effect::JointWave { joint: joint + 1, order: rules.wave_orders }, problem) {
-            continue;
-        }
-        // For each of the sets the orders, best first, with ln of their odds to the set alone.
-        let mut tried = |orders: &[f64], rests: &[Vec<usize>]| {
-            let mut gains: Vec<Vec<(f64, f64)>> = vec![Vec::new(); rests.len()];
-            for some in orders.chunks(TOGETHER).take_while(|_| !target.stop.is_requested()) {
-                let wave = |&order: &f64| {
-                    let effect = Effect::JointWave { joint: joint + 1, order };
-                    Some((order, block(&hypotheses.wave(&effect, order, problem, rules)?)))
-                };
-                let (orders, waves): (Vec<f64>, Vec<Block>) = some.par_iter().filter_map(wave).unzip();
-                blocks.extend(waves);
-                let all: Vec<usize> = (known..blocks.len()).collect();
-                for (rest, own) in rests.iter().zip(&mut gains) {
-                    let of = gains_beside(rest, &all, (blocks, target), rules);
-                    own.extend(of.into_iter().map(|(k, gain, _)| (orders[k - known], gain)));
-                }
-                blocks.truncate(known);
-            }
-            for own in &mut gains {
-                own.sort_by(|a, b| b.1.total_cmp(&a.1));
-            }
-            gains
-        };
-        let [step, finer] = STEPS.map(|phase| phase / (high - low));
-        // A wave of which less than one cycle is seen is none.
-        let first = tried(&row(TAU / (high - low), rules.wave_orders, step), &rests);
-        let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
-        let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
-        let taken = hypotheses.orders(joint);
-        for (rest, first) in rests.iter().zip(first) {
-            let mut second = taken.clone();
-            for (order, _) in first.into_iter().take(LOOKED_AT) {
-                let near = row(order - step, order + step, finer);
-                second.extend(near.into_iter().map(|order| written(order, digits)));
-                second.extend([order.floor(), order.ceil()]);
-            }
-            second.retain(|order| *order > 0.0);
-            second.sort_by(f64::total_cmp);
-            second.dedup();
-            let gains = tried(&second, std::slice::from_ref(rest)).concat();
-            let Some((effect, order)) = another(joint, &gains, &taken, rules) else { continue };
-            if is_free(&effect, problem) && !found.iter().any(|known| known.hypothesis.effect() == Some(&effect)) {
-                found.extend(hypotheses.wave(&effect, order, problem, rules));
-            }
-        }
-    }
-    found
+/// Waves of any order beside the other hypotheses about what a fit leaves.
+#[derive(Clone, Copy)]
+pub(super) struct Waves<'w, 'h> {
+    pub hypotheses: &'w Hypotheses<'h>,
+    pub blocks: &'w [Block],
+    pub target: &'w Target,
+    pub fitted: &'w Fitted,
+    pub rules: &'w SelectionRules,
+    /// Poses that are left out.
+    pub left_out: &'w [usize],
 }
 
-/// The wave of orders, best first, with ln of their odds, that is neither known already nor a whole number that is listed: of a whole number
-/// that does as well it is the harmonic.
-fn another(joint: usize, gains: &[(f64, f64)], taken: &[f64], rules: &SelectionRules) -> Option<(Effect, f64)> {
-    let &(best, most) = gains.first().filter(|(_, most)| *most > rules.another_order)?;
-    let as_good = || gains.iter().take_while(|(_, gain)| *gain > most - rules.another_order).map(|(order, _)| *order);
-    if as_good().any(|order| taken.contains(&order)) {
-        return None;
+impl Waves<'_, '_> {
+    /// Waves of any order, and harmonics of orders that no list has, that may stand in the place of functions of `weighted` explanations.
+    pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
+        let mut found: Vec<Candidate> = Vec::new();
+        for (joint, rests) in self.places(weighted) {
+            let Some((low, high)) = self.range(joint) else { continue };
+            if !is_free(&Effect::JointWave { joint: joint + 1, order: self.rules.wave_orders }, &self.fitted.problem) {
+                continue;
+            }
+            let left: Vec<Conditioned> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
+            let [step, finer] = STEPS.map(|phase| phase / (high - low));
+            // A wave of which less than one cycle is seen is none.
+            let first = self.gains(joint, &row(TAU / (high - low), self.rules.wave_orders, step), &left);
+            let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
+            let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
+            for (left, first) in left.iter().zip(first) {
+                // One wave stands for all orders about it, whatever explanation it was found in.
+                let known = || self.hypotheses.all.iter().chain(&found).filter_map(|own| own.hypothesis.effect());
+                let taken = known().filter_map(order_of).filter(|(own, _)| *own == joint).map(|(_, order)| order);
+                let taken: Vec<f64> = taken.collect();
+                let mut second = taken.clone();
+                for (order, _) in first.into_iter().take(LOOKED_AT) {
+                    let near = row(order - step, order + step, finer);
+                    second.extend(near.into_iter().map(|order| written(order, digits)));
+                    second.extend([order.floor(), order.ceil()]);
+                }
+                second.retain(|order| *order > 0.0);
+                second.sort_by(f64::total_cmp);
+                second.dedup();
+                let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
+                let is_new = |effect: &Effect| known().all(|known| known != effect);
+                let new: Vec<Effect> = self.another(joint, &gains, &taken).into_iter().filter(is_new).collect();
+                for effect in new.into_iter().filter(|effect| is_free(effect, &self.fitted.problem)) {
+                    let spread = order_of(&effect).map_or(1.0, |(_, order)| self.spread(joint, order, left));
+                    let candidate = self.hypotheses.function_of(&effect, (&self.fitted.problem, self.rules));
+                    found.extend(candidate.map(|own| Candidate { ln_prior: own.ln_prior + spread.ln(), ..own }));
+                }
+            }
+        }
+        found
     }
-    let joint = joint + 1;
-    match as_good().find(|order| order.fract() == 0.0) {
-        Some(order) if order <= f64::from(rules.near_orders) => None,
+
+    /// ln of what the chance of a wave gains as it stands for every order about its own, for those of some hypotheses, by number, beside
+    /// the others of them.
+    pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
+        let one = |(&number, effect): (&usize, &&Effect)| {
+            let (joint, order) = order_of(effect)?;
+            let rest: Vec<usize> = numbers.iter().copied().filter(|&other| other != number).collect();
+            Some((number, self.spread(joint, order, &self.beside(&rest)?).ln()))
+        };
+        numbers.iter().zip(effects).filter_map(one).collect()
+    }
+
+    /// What some hypotheses leave.
+    fn beside(&self, rest: &[usize]) -> Option<Conditioned> {
+        Conditioned::on(rest, (self.blocks, self.target), self.rules)
+    }
+
+    /// Least and greatest command of a joint \[rad\].
+    fn range(&self, joint: usize) -> Option<(f64, f64)> {
+        self.hypotheses.known(&Covariate::Command(joint)).map(|own| own.range)
+    }
+
+    /// For joints, from 0, the sets in which a wave may stand: explanations without one function of the joint's command, and without any.
+    fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
+        let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
+        let of = |member: usize| own_function(&self.hypotheses.all[member].hypothesis, &self.fitted.problem);
+        for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
+            for &member in &set.members {
+                let Some(joint) = of(member) else { continue };
+                let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> {
+                    let mut rest: Vec<usize> = set.members.iter().copied().filter(|&other| !gone(other)).collect();
+                    rest.sort_unstable();
+                    rest
+                };
+                let own = all.entry(joint).or_default();
+                for rest in [without(&|other| other == member), without(&|other| of(other) == Some(joint))] {
+                    if !own.contains(&rest) && own.len() < MOST {
+                        own.push(rest);
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// For what each of some sets leaves the orders, best first, with ln of the odds of such a wave to the set alone.
+    fn gains(&self, joint: usize, orders: &[f64], left: &[Conditioned]) -> Vec<Vec<(f64, f64)>> {
+        let how = (&self.fitted.problem, self.rules);
+        let of = |&order: &f64| {
+            if self.target.stop.is_requested() {
+                return None;
+            }
+            let wave = self.hypotheses.function_of(&Effect::JointWave { joint: joint + 1, order }, how)?;
+            let block = wave.block((self.fitted, &self.target.fit), self.left_out);
+            let odds: Vec<f64> = left.iter().map(|left| left.odds(&block, self.target, self.rules).0).collect();
+            Some((order, odds))
+        };
+        let all: Vec<(f64, Vec<f64>)> = orders.par_iter().filter_map(of).collect();
+        let of_set = |k: usize| {
+            let mut own: Vec<(f64, f64)> = all.iter().map(|(order, odds)| (*order, odds[k])).collect();
+            own.sort_by(|a, b| b.1.total_cmp(&a.1));
+            own
+        };
+        (0..left.len()).map(of_set).collect()
+    }
+
+    /// Of orders, best first, with ln of their odds: the best that is no whole number, unless one does as well that was taken before; and
+    /// harmonics beyond those that are listed, where they do as well as the best.
+    fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
+        let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else { return Vec::new() };
+        let as_good = || {
+            let near = gains.iter().take_while(|(_, gain)| *gain > most - self.rules.another_order);
+            near.map(|(order, _)| *order)
+        };
+        let joint = joint + 1;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number up to the highest")]
-        Some(order) => Some((Effect::JointHarmonic { joint, orders: vec![order as u32] }, order)),
-        None => Some((Effect::JointWave { joint, order: best }, best)),
+        let harmonic = |order: f64| Effect::JointHarmonic { joint, orders: vec![order as u32] };
+        let is_beyond = |order: &f64| order.fract() == 0.0 && *order > f64::from(HIGHEST_ORDER);
+        let mut all: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
+        if !as_good().any(|order| taken.contains(&order)) {
+            let wave = gains.iter().find(|(order, _)| order.fract() != 0.0);
+            all.extend(wave.map(|&(order, _)| Effect::JointWave { joint, order }));
+        }
+        all
+    }
+
+    /// Orders about one, in units of orders, each by how well it does beside it: by the trapezoid rule, none more than it.
+    fn spread(&self, joint: usize, order: f64, left: &Conditioned) -> f64 {
+        let Some((low, high)) = self.range(joint) else { return 1.0 };
+        let range = high - low;
+        let away = std::iter::successors(Some(STEPS[1]), |phase| Some(phase * WIDER)).take_while(|phase| *phase < PI);
+        let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
+        let is_looked_for = |order: &f64| (TAU / range..=self.rules.wave_orders).contains(order);
+        let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
+        orders.sort_by(f64::total_cmp);
+        let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
+        gains.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let own = gains.iter().find(|(own, _)| own.total_cmp(&order).is_eq()).map_or(0.0, |(_, gain)| *gain);
+        let weight = |gain: f64| (gain - own).min(0.0).exp();
+        let between = |pair: &[(f64, f64)]| 0.5 * (weight(pair[0].1) + weight(pair[1].1)) * (pair[1].0 - pair[0].0);
+        // An order that no neighbour comes near is told to a step.
+        gains.windows(2).map(between).sum::<f64>().max(STEPS[1] / range)
     }
 }
 
@@ -171,33 +231,18 @@ fn written(order: f64, digits: usize) -> f64 {
 }
 
 impl Hypotheses<'_> {
-    /// Orders of the waves of a joint, counted from 0, that were taken before.
-    fn orders(&self, joint: usize) -> Vec<f64> {
-        let orders = |effect: &Effect| match effect {
-            Effect::JointWave { joint: own, order } if *own == joint + 1 => vec![*order],
-            Effect::JointHarmonic { joint: own, orders } if *own == joint + 1 => {
-                orders.iter().copied().map(f64::from).collect()
-            }
-            _ => Vec::new(),
+    /// The hypothesis of an effect that is a wave of the command of its joint.
+    fn function_of(&self, effect: &Effect, how: (&Problem, &SelectionRules)) -> Option<Candidate> {
+        let (joint, order) = match effect {
+            Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),
+            other => order_of(other)?,
         };
-        self.added.iter().flat_map(orders).collect()
-    }
-
-    /// The hypothesis of an effect that is a wave of an order.
-    fn wave(&self, effect: &Effect, order: f64, problem: &Problem, rules: &SelectionRules) -> Option<Candidate> {
-        let (joint, _) = effect.function_of()?;
-        let joint = joint - 1;
         let known = self.known(&Covariate::Command(joint))?;
         let at = self.linearised.place(Slot::Joint { joint, field: JointField::Theta })?;
         let waves = DMatrix::from_fn(known.values.len(), 2, |row, k| {
             let (sin, cos) = (order * known.values[row]).sin_cos();
             if k == 0 { sin } else { cos }
         });
-        let (columns, largest) = even(times(&[&at], &waves), &effect.terms(problem), self.weighed, rules);
-        let design = Design::Dense(columns).scaled(self.weighed)?;
-        let coefficients = Coefficients { largest, ..Coefficients::default() };
-        let ln_prior = self.ln_family - (effect.tries(&[]) * turning(problem)).ln();
-        let hypothesis = Hypothesis::of_effect(effect, problem, true, true);
-        Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
+        self.entered(effect, times(&[&at], &waves), how)
     }
 }

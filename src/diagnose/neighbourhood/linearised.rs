@@ -161,6 +161,11 @@ impl<'a> Linearised<'a> {
         driven.terms.par_iter().map(of_effect).collect()
     }
 
+    /// The problem that it is of.
+    pub fn problem(&self) -> &'a Problem {
+        self.problem
+    }
+
     /// For each of an effect's parameters, whether it is never negative.
     pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
         effect.terms(self.problem).iter().map(|term| term.never_negative).collect()

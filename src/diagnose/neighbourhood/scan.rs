@@ -9,7 +9,7 @@ use super::linear::{LinearNeighbourhood, Share};
 use super::linearised::{Driven, Linearised};
 use super::score::{Gain, Score, Sums};
 use crate::diagnose::rules::SelectionRules;
-use crate::problem::Effect;
+use crate::problem::{Effect, Problem};
 
 /// The candidates with what the residual says about each.
 pub(crate) struct Scan<'a, 'l> {
@@ -77,7 +77,7 @@ impl<'a, 'l> Scan<'a, 'l> {
             }
         }
         let driven = if refused.is_empty() { driven } else { Driven::of(linearised, &known) };
-        let (tries, families) = tries(&known);
+        let (tries, families) = tries(&known, linearised.problem());
         let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
         Self { linearised, linear, effects: known, driven, refused, scores, tries, families, never_negative, rules }
     }
@@ -149,11 +149,11 @@ impl<'a, 'l> Scan<'a, 'l> {
 }
 
 /// For each candidate how often chance has a try at it within its family, and the number of families.
-pub(crate) fn tries(effects: &[Effect]) -> (Vec<f64>, usize) {
+pub(crate) fn tries(effects: &[Effect], problem: &Problem) -> (Vec<f64>, usize) {
     let mut families: BTreeMap<&str, Vec<&Effect>> = BTreeMap::new();
     for effect in effects {
         families.entry(effect.name()).or_default().push(effect);
     }
-    let tries = effects.iter().map(|effect| effect.tries(&families[effect.name()])).collect();
+    let tries = effects.iter().map(|effect| effect.tries(&families[effect.name()], problem)).collect();
     (tries, families.len())
 }

@@ -24,7 +24,7 @@ impl<'f, 'a> Replacements<'f, 'a> {
         let rules = self.scan.rules;
         let share = self.fit.share(&self.fitted.unknowns_of(effect))?;
         let everything: Vec<Effect> = self.scan.effects.iter().chain([effect]).cloned().collect();
-        let (all_tries, families) = tries(&everything);
+        let (all_tries, families) = tries(&everything, &self.fitted.problem);
         let own_tries = all_tries.last().copied().unwrap_or(1.0) * families as f64;
         let own = self.fit.sums_without(&share).gain_of(share.part.norm_squared(), share.part.len(), rules);
         let own = own.map_or(0.0, |gain| gain.criterion + 2.0 * own_tries.ln());

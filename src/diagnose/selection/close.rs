@@ -2,7 +2,7 @@
 
 use super::super::candidates::Candidates;
 use super::super::data::Data;
-use super::super::evidence::{Claims, Evidence, Explanation, ln_posterior, stability, weigh};
+use super::super::evidence::{Claims, Evidence, Explanation, Hypothesis, ln_posterior, stability, weigh};
 use super::super::fitted::Fitted;
 use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
@@ -286,35 +286,49 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     let added = rounds.added(fitted);
     let held = evidence.sure(rules.sure).filter(|best| !best.hypotheses.is_empty() && is_held(best, &added));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
+    let odds_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
+        unless_stopped(data, || ln_posterior(fitted, data, &rounds.added(fitted), (functions, sigma)))
+    };
     let functions = best.without_law();
-    let Some(own) = ln_posterior(fitted, data, &added, (&functions, fitted.sigma)) else { return Ok((evidence, None)) };
+    let Some(own) = odds_of(fitted, &functions, fitted.sigma)? else { return Ok((evidence, None)) };
     let rivals = evidence.exchanged(&best, rules.rivals);
-    let mut odds: Vec<(Explanation, f64)> = Vec::new();
-    let mut better: Option<(f64, Fitted)> = None;
+    let mut tried: Vec<(Explanation, f64, Fitted)> = Vec::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
         rounds.tell(k + 1, count);
         let next = rounds.fit(fitted, &rival.effects())?;
-        let functions = rival.without_law();
-        let Some(other) = ln_posterior(&next, data, &rounds.added(&next), (&functions, fitted.sigma)) else { continue };
+        let other = odds_of(&next, &rival.without_law(), fitted.sigma)?;
+        tried.extend(other.map(|other| (rival, other - own, next)));
+    }
+    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut odds: Vec<(Explanation, f64)> = Vec::new();
+    let mut better: Option<Fitted> = None;
+    for (rival, ln_odds, next) in tried {
         // A law in the place of a function must be what its own fit speaks for: functions are never fitted but linear about another fit.
-        let is_law = functions.len() < best.without_law().len();
-        if is_law && other > own && !stands(&next, data, &rounds.added(&next), functions.len()) {
+        let left = rival.without_law().len();
+        let is_best = ln_odds > 0.0 && better.is_none();
+        if is_best && left < functions.len() && !stands(&next, data, &rounds.added(&next), left)? {
             continue;
         }
-        odds.push((rival, other - own));
-        if other > own && better.as_ref().is_none_or(|(most, _)| other > *most) {
-            better = Some((other, next));
+        odds.push((rival, ln_odds));
+        if is_best {
+            better = Some(next);
         }
     }
-    Ok((evidence.corrected(&best, &odds), better.map(|(_, fitted)| fitted)))
+    Ok((evidence.corrected(&best, &odds), better))
+}
+
+/// What evidence says, unless the wish to end made it say nothing.
+fn unless_stopped<T>(data: &Data, evidence: impl FnOnce() -> T) -> Result<T, IdentifyError> {
+    let said = evidence();
+    if data.stop.is_requested() { Err(IdentifyError::interrupted()) } else { Ok(said) }
 }
 
 /// Whether what explains the residual of a fit is what was added, and no more functions than these.
-fn stands(fitted: &Fitted, data: &Data, added: &[Effect], functions: usize) -> bool {
-    let evidence = weigh(fitted, data, added);
+fn stands(fitted: &Fitted, data: &Data, added: &[Effect], functions: usize) -> Result<bool, IdentifyError> {
+    let evidence = unless_stopped(data, || weigh(fitted, data, added))?;
     let best = evidence.as_ref().and_then(|evidence| evidence.sure(data.rules.sure));
-    best.is_some_and(|best| is_held(best, added) && best.without_law().len() <= functions)
+    Ok(best.is_some_and(|best| is_held(best, added) && best.without_law().len() <= functions))
 }
 
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.

@@ -281,7 +281,7 @@ impl<'a> Rounds<'a> {
         let fit = fitted.neighbourhood(&linearised);
         let candidates = Candidates::of(&fitted.problem, self.data).testable;
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
-        let tries = tries(&everything).0.last().copied().unwrap_or(1.0);
+        let tries = tries(&everything, &fitted.problem).0.last().copied().unwrap_or(1.0);
         let rows = fit.rows() as f64;
         let squares = fit.sums().squares.ln() + 2.0 * fitted.sigma.ln();
         rows * squares + fitted.unknowns.len() as f64 * rows.ln() + 2.0 * tries.ln()
@@ -331,7 +331,7 @@ impl<'a> Rounds<'a> {
         let mut everything = Candidates::of(problem, self.data).testable;
         let first = everything.len();
         everything.extend(own.iter().flat_map(Effect::parts));
-        let (all_tries, families) = tries(&everything);
+        let (all_tries, families) = tries(&everything, problem);
         let mut all_tries = all_tries[first..].iter();
         let sum = |effect: &Effect| all_tries.by_ref().take(effect.parts().len()).sum::<f64>() * families as f64;
         own.iter().map(sum).collect()

@@ -123,8 +123,8 @@ impl Effect {
     }
 
     /// How often chance has a try at it: one over the share of its family's chance, whose `members` are the candidates.
-    pub fn tries(&self, members: &[&Self]) -> f64 {
-        (self.family().tries)(self, members)
+    pub fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
+        (self.family().tries)(self, members, problem)
     }
 
     /// Parts that are tested one by one: a harmonic order by order.

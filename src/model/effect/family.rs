@@ -19,7 +19,7 @@ pub struct Family {
     /// The same where times were not measured and the order of the rows, counted from 1, stands for them; `None`: the same.
     pub describe_by_row: fn(&Effect) -> Option<String>,
     /// One over the share of a family's chance that falls to one of its members among the candidates.
-    pub tries: fn(&Effect, &[&Effect]) -> f64,
+    pub tries: fn(&Effect, &[&Effect], &Problem) -> f64,
     /// Parts that are tested one by one.
     pub parts: fn(&Effect) -> Vec<Effect>,
     /// The one effect that is two of them, where they are of one place.
@@ -44,7 +44,7 @@ pub(super) const USUAL: Family = Family {
     candidates: |_, _| Vec::new(),
     describe: |_| String::new(),
     describe_by_row: |_| None,
-    tries: |_, members| members.len().max(1) as f64,
+    tries: |_, members, _| members.len().max(1) as f64,
     parts: |effect| vec![effect.clone()],
     joined: |_, _| None,
     covers: |one, other| one == other,

@@ -7,8 +7,8 @@ use super::family::{Candidate, Family, Term, USUAL};
 use crate::model::parameter::{Driver, Slot};
 use crate::problem::{Effect, JointKind};
 
-/// Highest order that is looked for.
-const HIGHEST_ORDER: u32 = 60;
+/// Highest order that is a candidate by itself.
+pub(crate) const HIGHEST_ORDER: u32 = 60;
 
 /// The family.
 pub(super) const FAMILY: Family = Family {
@@ -43,7 +43,7 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => String::new(),
     },
-    tries: |effect, members| tries(effect, members),
+    tries: |effect, members, _| tries(effect, members),
     parts: |effect| match effect {
         Effect::JointHarmonic { joint, orders } => {
             orders.iter().map(|&order| Effect::JointHarmonic { joint: *joint, orders: vec![order] }).collect()

@@ -4,10 +4,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::family::{Family, Term, USUAL};
 use crate::model::parameter::{Driver, Slot};
-use crate::problem::Effect;
+use crate::problem::{Effect, Joint, JointKind};
 
-/// Waves whose orders differ by less are hardly told apart, whatever the range of the joint.
-const TOLD_APART: f64 = 0.2;
+/// Chance of all orders between a whole number and the next, over that of a harmonic of that order: gears have whole numbers of teeth, so
+/// that most errors repeat a whole number of times a revolution; a stage of a gear need not.
+const SHARE: f64 = 0.1;
 
 /// The family. Its orders have no end: none is a candidate by itself, the evidence looks for them where a joint errs with its command.
 pub(super) const FAMILY: Family = Family {
@@ -26,9 +27,13 @@ pub(super) const FAMILY: Family = Family {
         }
         _ => String::new(),
     },
-    tries: |effect, _| match effect {
-        // Of the same chance as a harmonic of that order, which has one try in a unit of orders.
-        Effect::JointWave { order, .. } => PI.powi(2) / 6.0 * order.max(1.0).powi(2) / TOLD_APART,
+    tries: |effect, _, problem| match effect {
+        // Of all orders in a unit together: those of a harmonic of that order of each joint that turns, over the share.
+        Effect::JointWave { order, .. } => {
+            let turns = |joint: &&Joint| joint.commanded() == JointKind::Revolute;
+            let joints = problem.joints.iter().filter(turns).count().max(1);
+            joints as f64 * PI.powi(2) / 6.0 * order.max(1.0).powi(2) / SHARE
+        }
         _ => 1.0,
     },
     function_of: |effect| match effect {

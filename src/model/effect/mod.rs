@@ -49,3 +49,4 @@ pub use catalogue::{FAMILIES, candidates, parameters};
 pub use coverage::{Columns, DataCoverage};
 pub use custom::CustomEffect;
 pub use family::{Candidate, Family, Term};
+pub(crate) use joint_harmonic::HIGHEST_ORDER;

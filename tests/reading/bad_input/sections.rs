@@ -182,7 +182,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 34] = [
+    let effects: [(&str, &[&str]); 36] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
@@ -225,6 +225,14 @@ fn effects() {
         ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
         (
             "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-wave = { joint = 1, order = 2 }",
+            &[":6: effect[2].joint-wave: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "joint-wave = { joint = 1, order = 2.0 }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }",
             &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
         ),
         (
