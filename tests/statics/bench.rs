@@ -38,7 +38,7 @@ pub fn joint(a: f64) -> Joint<f64> {
 }
 
 pub fn beam(a: f64, mass: f64, flexibility: Flexibility<f64>) -> Joint<f64> {
-    let beam = Beam { mass, flexibility, masses: Vec::new(), hoist: None, thermal: None, added: None };
+    let beam = Beam { mass, flexibility, masses: Vec::new(), hoist: None, strain: None, added: None };
     Joint { beam: Some(beam), ..joint(a) }
 }
 
@@ -49,7 +49,6 @@ pub fn arm(joints: Vec<Joint<f64>>) -> Arm<f64> {
         rope: None,
         mounting: None,
         mixing: None,
-        reference_temperature: 20.0,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         equilibrium: Equilibrium::Deflected,
         beam_elements: 1,
