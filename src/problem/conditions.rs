@@ -59,6 +59,14 @@ impl PoseView<'_> {
 }
 
 impl PoseConditions {
+    /// Enters the pose into the past of the next one. Temperatures and sides are those of all poses or of none.
+    pub(crate) fn enter(&self, past: &mut Past) {
+        past.times.push(self.time);
+        past.temperatures.extend(self.temperature);
+        past.configurations.extend(&self.configuration);
+        past.approaches.extend(self.approach.iter().flatten());
+    }
+
     /// The same for who only reads them.
     pub fn view(&self) -> PoseView<'_> {
         PoseView {

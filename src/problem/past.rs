@@ -1,7 +1,5 @@
 //! What was before a pose: effects with a memory know it.
 
-use super::PoseConditions;
-
 /// The poses of a session that were measured before one, from the first to the last; empty where none were, or none are known.
 ///
 /// V holds one number per pose, or one per pose and joint: a `Vec<f64>` or a `&[f64]`.
@@ -30,14 +28,6 @@ impl Past<&[f64]> {
 }
 
 impl Past {
-    /// One pose more. Temperatures and sides are those of all poses or of none.
-    pub(crate) fn push(&mut self, pose: &PoseConditions) {
-        self.times.push(pose.time);
-        self.temperatures.extend(pose.temperature);
-        self.configurations.extend(&pose.configuration);
-        self.approaches.extend(pose.approach.iter().flatten());
-    }
-
     /// The same for who only reads it.
     pub(crate) fn view(&self) -> Past<&[f64]> {
         Past {

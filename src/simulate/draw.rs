@@ -173,7 +173,7 @@ fn measured(problem: &Problem, truth: &Truth, draw: Draw, seed: u64) -> Result<S
             row.conditions.past = std::mem::take(&mut past);
             let seen = measure((row, stream_of));
             past = std::mem::take(&mut row.conditions.past);
-            past.push(&row.conditions);
+            row.conditions.enter(&mut past);
             seen
         };
         rows.iter_mut().zip(streams).map(after_those).collect()

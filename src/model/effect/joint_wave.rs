@@ -8,7 +8,7 @@ use crate::problem::{Effect, Joint, JointKind};
 
 /// Chance of all orders between a whole number and the next, over that of a harmonic of that order: gears have whole numbers of teeth, so
 /// that most errors repeat a whole number of times a revolution; a stage of a gear need not.
-const SHARE: f64 = 0.1;
+const SHARE: f64 = 0.2;
 
 /// The family. Its orders have no end: none is a candidate by itself, the evidence looks for them where a joint errs with its command.
 pub(super) const FAMILY: Family = Family {
