@@ -41,7 +41,7 @@ pub enum Driver {
         /// τ \[s\].
         time_constant: f64,
     },
-    /// Which part of its friction pulls a joint back the way on which it came, −1 to 1 ([`Past::dragged`]).
+    /// Which part of its friction pulls a joint back the way on which it came, −1 to 1 ([`dragged`](crate::problem::Past::dragged)).
     Dragged {
         /// The joint.
         joint: usize,
