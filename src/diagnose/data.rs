@@ -11,7 +11,7 @@ use super::residual_tests::CovariateValues;
 use super::rules::SelectionRules;
 use crate::identify::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
-use crate::model::effect::DataCoverage;
+use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
 use crate::problem::{Effect, JointKind, Problem};
 
 /// Measurements and which of their rows take part.
@@ -112,13 +112,19 @@ impl<'a> Data<'a> {
             measurements.approach.as_ref().is_some_and(came)
         };
         DataCoverage {
-            temperature: problem.data.reference_temperature.is_some() && temperature.is_some_and(varies),
+            no_temperature: match temperature {
+                Some(all) if varies(all.clone()) => {
+                    problem.data.reference_temperature.is_none().then_some(NO_REFERENCE)
+                }
+                _ => Some(NO_TEMPERATURE),
+            },
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
             payload: payload.map_or([problem.tool.payload_mass; 2].into(), |all| range(all.into_iter())),
             ranges: (0..n).map(column).collect(),
             covariates: self.own_covariates().map(varies).collect(),
             times: self.shift_times(),
+            clock: measurements.clock(),
             gravity: problem.gravity,
         }
     }

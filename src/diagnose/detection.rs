@@ -92,6 +92,7 @@ pub(super) fn timed(poses: &Measurements) -> Measurements {
     let mut poses = poses.clone();
     if !poses.time_measured {
         poses.time = (0_u32..).take(poses.len()).map(|row| f64::from(row) * RULES.time_step).collect();
+        poses.time_measured = true;
     }
     poses
 }

@@ -126,7 +126,9 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         };
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let own = &scan.effects[tried.index];
-        let pair = alike.first().zip(there.as_ref());
+        // Of what remembers the poses before none tells by itself.
+        let tells = |(other, _): &&(Effect, f64)| !own.has_memory() && !other.has_memory();
+        let pair = alike.first().filter(tells).zip(there.as_ref());
         let telling_pose =
             pair.and_then(|((other, _), there)| telling_pose(&scan.linear, [&linearised, there], &poses, (own, other)));
         Ranked {

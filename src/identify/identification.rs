@@ -211,6 +211,7 @@ fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> R
     let columns = Columns {
         temperature: measurements.temperature.is_some(),
         approach: measurements.approach.is_some(),
+        time: measurements.time_measured,
         covariates: measurements.covariates.len() == problem.data.covariates.len() * measurements.len(),
     };
     for EffectDeclaration { effect, location } in &problem.effects {

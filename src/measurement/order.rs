@@ -56,9 +56,28 @@ impl Found {
 }
 
 impl Measurements {
+    /// Median time between two poses of a session that differ in it, and that of the longest session from end to end \[s\]; `None` where
+    /// times were not measured, or none differ.
+    pub fn clock(&self) -> Option<(f64, f64)> {
+        let found = self.found();
+        let times = found.sorted.as_ref().map_or(self.time.as_slice(), |sorted| &sorted.times);
+        let (mut between, mut longest) = (Vec::new(), 0.0_f64);
+        for &(begin, at) in &found.places {
+            let (begin, at) = (begin as usize, at as usize);
+            longest = longest.max(times[at] - times[begin]);
+            between.extend((at > begin && times[at] > times[at - 1]).then(|| times[at] - times[at - 1]));
+        }
+        between.sort_by(f64::total_cmp);
+        between.get(between.len() / 2).filter(|_| self.time_measured).map(|median| (*median, longest))
+    }
+
+    fn found(&self) -> &Found {
+        self.order.0.get_or_init(|| Found::of(self))
+    }
+
     /// What was measured before a row, in its session.
     pub(super) fn past(&self, row: usize) -> Past<&[f64]> {
-        let Found { places, sorted } = self.order.0.get_or_init(|| Found::of(self));
+        let Found { places, sorted } = self.found();
         let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize)) else {
             return Past::default();
         };
@@ -74,7 +93,8 @@ impl Measurements {
         };
         Past {
             times: columns.times.get(begin..at).unwrap_or_default(),
-            temperatures: columns.temperatures.get(begin..at).unwrap_or_default(),
+            // Without times nobody knows how long ago it was so warm.
+            temperatures: columns.temperatures.get(begin..at).filter(|_| self.time_measured).unwrap_or_default(),
             configurations: columns.configurations.get(begin * n..at * n).unwrap_or_default(),
             approaches: columns.approaches.get(begin * n..at * n).unwrap_or_default(),
         }
@@ -94,10 +114,12 @@ mod tests {
             positions: vec![nalgebra::Vector3::zeros(); 5],
             configurations: (0..10).map(f64::from).collect(),
             time: vec![5.0, 0.0, 3.0, 1.0, 4.0],
+            time_measured: true,
             temperature: Some(vec![20.0, 21.0, 22.0, 23.0, 24.0]),
             session: ["a", "a", "b", "b", "a"].into_iter().collect::<Labels>(),
             ..Measurements::default()
         };
+        assert_eq!(table.clock(), Some((2.0, 5.0)));
         let past = table.past(0);
         assert_eq!((past.times, past.temperatures), ([0.0, 4.0].as_slice(), [21.0, 24.0].as_slice()));
         assert_eq!((past.configurations, past.approaches), ([2.0, 3.0, 8.0, 9.0].as_slice(), [].as_slice()));

@@ -80,7 +80,8 @@ pub(super) fn check(
     undeclared: impl FnOnce() -> InputError,
 ) -> Result<(), InputError> {
     let PoseRanges { temperature, approach, ref covariates, .. } = truth.poses;
-    let columns = Columns { temperature: temperature.is_some(), approach, covariates: !covariates.is_empty() };
+    let columns =
+        Columns { temperature: temperature.is_some(), approach, time: true, covariates: !covariates.is_empty() };
     for declared in &problem.effects {
         if declared.effect.is_thermal() && !columns.temperature {
             let write = "temperature_C = [from, to] in [poses] of the study";

@@ -40,6 +40,7 @@ pub use effect::{Custom, Effect, EffectDeclaration};
 pub use fixture::{Fixture, FixtureKind, KnownDistance, Observation};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
+pub(crate) use past::Lag;
 pub use past::Past;
 pub use robust::{Robust, RobustLoss};
 pub use target::{Target, Tool};

@@ -47,21 +47,9 @@ impl Past<&[f64]> {
     /// is measured [°C].
     ///
     /// T goes evenly from each reading to the next, and T̃ begins at the first of them.
-    pub fn lagging(&self, (time, temperature): (f64, f64), time_constant: f64) -> f64 {
-        let readings = self.times.iter().copied().zip(self.temperatures.iter().copied());
-        let (mut later, mut felt) = ((time, temperature), temperature);
-        // By parts, T̃ = T − Σ ΔT/Δt ∫ exp(−(t − s)/τ) ds over the times between two readings.
-        for reading in readings.rev() {
-            let age = (time - later.0) / time_constant;
-            if age > FORGOTTEN {
-                break;
-            }
-            let between = (later.0 - reading.0) / time_constant;
-            let change = later.1 - reading.1;
-            felt -= change * (-age).exp() * if between > 0.0 { -(-between).exp_m1() / between } else { 1.0 };
-            later = reading;
-        }
-        felt
+    pub fn lagging(&self, now: (f64, f64), time_constant: f64) -> f64 {
+        let first = self.times.partition_point(|time| *time < now.0 - FORGOTTEN * time_constant).saturating_sub(1);
+        Lag { time_constant, known: None }.felt_from(first, self, now)
     }
 
     /// Which part of its friction pulls a joint, counted from 0, back the way on which it came, −1 to 1: on a way Δq it follows the side g
@@ -100,6 +88,48 @@ impl Past<&[f64]> {
     }
 }
 
+/// What follows the temperature, pose after pose of a session in order: each from the one before.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lag {
+    time_constant: f64,
+    /// Where the poses of the session begin in memory, how many of them are behind, and T̃ at the last.
+    known: Option<(usize, usize, f64)>,
+}
+
+impl Lag {
+    /// With a time constant \[s\].
+    pub fn new(time_constant: f64) -> Self {
+        Self { time_constant, known: None }
+    }
+
+    /// T̃ [°C] at a time \[s\] at which T is measured [°C].
+    pub fn felt(&mut self, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
+        self.felt_from(0, past, now)
+    }
+
+    fn felt_from(&mut self, first: usize, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
+        let reading = |k: usize| Some((*past.times.get(k)?, *past.temperatures.get(k)?));
+        let session = past.times.as_ptr().addr();
+        let ahead = |(own, behind, _): &(usize, usize, f64)| *own == session && *behind <= past.times.len();
+        let begin = || Some((session, first + 1, reading(first)?.1));
+        let Some((_, mut behind, mut felt)) = self.known.filter(ahead).or_else(begin) else { return now.1 };
+        while let Some((before, next)) = reading(behind - 1).zip(reading(behind)) {
+            felt = self.after(felt, before, next);
+            behind += 1;
+        }
+        self.known = Some((session, behind, felt));
+        reading(behind - 1).map_or(now.1, |before| self.after(felt, before, now))
+    }
+
+    /// T̃ after T went evenly from one reading to the next: by the rate times τ it stays behind in the end,
+    /// T̃ = T − (1 − e) τ ΔT/Δt + (T̃' − T') e, e = exp(−Δt/τ).
+    fn after(&self, felt: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
+        let passed = (next.0 - before.0) / self.time_constant;
+        let behind = if passed > 0.0 { -(-passed).exp_m1() / passed } else { 1.0 };
+        next.1 - behind * (next.1 - before.1) + (felt - before.1) * (-passed).exp()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,6 +154,13 @@ mod tests {
         assert!((past.lagging((230.0, 30.0), 1e-3) - 30.0).abs() < 1e-3);
         assert!((past.lagging((230.0, 30.0), 1e9) - 20.0).abs() < 1e-5);
         assert_eq!(Past::default().lagging((5.0, 17.0), 30.0).to_bits(), 17_f64.to_bits());
+        let mut lag = Lag::new(tau);
+        for k in [0, 2, 3, 1] {
+            let past = Past { times: &TIMES[..k], temperatures: &temperatures[..k], ..Past::default() };
+            let (one_by_one, alone) =
+                (lag.felt(&past, (TIMES[k], temperatures[k])), past.lagging((TIMES[k], temperatures[k]), tau));
+            assert!((one_by_one - alone).abs() < 1e-12, "{k}: {one_by_one}, not {alone}");
+        }
     }
 
     #[test]

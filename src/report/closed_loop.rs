@@ -13,7 +13,7 @@ use super::noise::size;
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};
-use super::unexplained::{correction, size_alone, unexplained};
+use super::unexplained::{correction, not_looked_for, size_alone, unexplained};
 use super::{effect, findings, trace};
 use crate::diagnose::{ClosedLoop, Found, Round, SelectionRules, Verdict, Witness, WitnessVerdict};
 use crate::identify::{ErrorSummary, Errors, Identification};
@@ -51,6 +51,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
+    blocks.extend(not_looked_for(closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
@@ -87,6 +88,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
     blocks.extend(quality_flag(closure));
+    blocks.extend(not_looked_for(closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend(beware(after, plots));
     blocks.extend([
@@ -230,6 +232,11 @@ fn came_to(closure: &ClosedLoop) -> String {
         (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
         (_, false) => format!("{found}; whether structure is left could not be tested."),
+        (Verdict::NothingFound, true) if closure.findings.overstates_sigma() => {
+            "Nothing found, and little could be: the residual is smaller than the declared σ lets it be. No effect below that σ is looked for; \
+             declare that of the instrument, or none."
+                .to_owned()
+        }
         (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
         (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
     }
@@ -238,6 +245,9 @@ fn came_to(closure: &ClosedLoop) -> String {
 /// A cause whose law is not sure, how probable it is, and what it may be instead.
 fn probable(closure: &ClosedLoop, found: &Found) -> String {
     let own = closure.before.describe(&found.effect);
+    if let Some(claims) = found.claims.as_ref().filter(|claims| claims.law.1 < 0.5) {
+        return format!("something at {} whose law is not known, such as {own}", claims.place.0);
+    }
     let sure = found.claims.as_ref().map(|claims| format!(" ({} %)", number(claims.law.1 * 100.0, 0)));
     let rival = found.alternatives.first().map(|other| format!(", or else {}", closure.before.describe(other)));
     format!("{own}{}{}", sure.unwrap_or_default(), rival.unwrap_or_default())

@@ -40,7 +40,10 @@ object! {
 /// The hardest of each family, and what is not to be seen.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let seen = |own: &&Detectable| own.sizes.iter().any(Size::is_within_prior);
-    let (visible, hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
+    let (visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
+    // Of an argument that is searched, as a time, one that is seen is enough.
+    let places: Vec<String> = visible.iter().map(|own| own.effect.name_and_place()).collect();
+    hidden.retain(|own| !own.effect.is_searched() || !places.contains(&own.effect.name_and_place()));
     let mut families: Vec<&str> = Vec::new();
     for own in &visible {
         if !families.contains(&own.effect.name()) {

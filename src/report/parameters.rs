@@ -94,7 +94,8 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
         );
     }
     notes.push(
-        "identified: the share that the data gave; the rest is prior, bound, or choice within unidentifiable combinations"
+        "identified: by how much surer it is than its own prior, from data or priors of what goes with it; the rest is prior, \
+         bound, or choice within unidentifiable combinations"
             .to_owned(),
     );
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];

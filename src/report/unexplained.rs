@@ -6,6 +6,7 @@ use super::document::code;
 use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
 use crate::diagnose::{ClosedLoop, Correction, Covariate, HELD_FIXED, Law, Part, REFUSED, Unexplained};
+use crate::model::effect::NO_REFERENCE;
 use crate::problem::{JointKind, Problem};
 
 /// The correction of structure without a law, if there is one.
@@ -22,6 +23,13 @@ pub(super) fn size_alone(closure: &ClosedLoop) -> Option<f64> {
 /// Where structure is.
 pub(super) fn place(left: &Unexplained) -> String {
     left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
+}
+
+/// What of the table was of no use, and what makes it so.
+pub(super) fn not_looked_for(closure: &ClosedLoop) -> Option<String> {
+    let needs = closure.before.untestable.iter().any(|(_, reason)| *reason == NO_REFERENCE);
+    let why = "The table has temperatures, and no effect of them was looked for: declare";
+    needs.then(|| format!("{why} {}, at which the arm is as declared.", code("reference_temperature_C")))
 }
 
 /// Structure whose law is not known.

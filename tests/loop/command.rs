@@ -194,6 +194,24 @@ fn the_loop_tells_its_story() {
 }
 
 #[test]
+fn what_keeps_the_loop_from_finding_is_said() {
+    let bench = Bench::new(NONE);
+    bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
+    let told = bench.told(&["loop", "arm", "--out", "cold"]);
+    assert!(told.contains("no effect of them was looked for") && told.contains("reference_temperature_C"), "{told}");
+    bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 50"));
+    let told = bench.told(&["loop", "arm", "--out", "coarse"]);
+    assert!(told.contains("Nothing found, and little could be") && !told.contains("looks like noise"), "{told}");
+    bench.edit("arm/problem.toml", |text| {
+        format!("{text}\n[[effect]]\njoint-thermal-drift-lag = {{ joint = 1, time_constant_s = 600 }}\n")
+    });
+    bench.edit("arm/data.csv", |text| text.replace("time_s", "note"));
+    let refused = bench.run(&["identify", "arm", "--out", "untimed"]).code(2);
+    assert!(text(&refused.get_output().stderr).contains("a column time_s"), "{refused}");
+    assert!(!bench.path("untimed").exists());
+}
+
+#[test]
 fn the_trace_ranks_and_says_why_not() {
     let bench = Bench::new(THERMAL);
     let json = bench.json(&["trace", "arm"]);
@@ -217,7 +235,10 @@ fn the_trace_ranks_and_says_why_not() {
     let untestable = json["untestable"].as_array().unwrap();
     assert!(untestable.iter().any(|other| other["effect"] == "link-thermal-bending" && other["reason"].is_string()));
     let told = bench.told(&["trace", "arm"]);
-    assert!(told.contains("- joint-thermal-drift of joints 1, 2, 3, 4: no temperature"), "{told}");
+    assert!(
+        told.contains("- joint-thermal-drift of joints 1, 2, 3, 4: the problem declares no reference_temp"),
+        "{told}"
+    );
     let told = Bench::new(NONE).told(&["trace", "arm"]);
     assert!(told.contains("candidates stands out"), "{told}");
     let told = Bench::new(TWO).told(&["trace", "arm"]);

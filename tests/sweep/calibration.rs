@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
 use crate::families::{Lacking, catalogue, newest};
 use crate::full::sets;
-use crate::judged::{Judged, Place, is_the_same, name};
+use crate::judged::{Judged, Place, is_the_same, name, named};
 
 /// From this probability on an effect is named as found.
 const STATED: f64 = 0.9;
@@ -56,6 +56,12 @@ fn judge(first: &[Lacking], seed: u64) -> Set {
     let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
     let judged = Judged::of(&lacking, size, seed);
     println!("{}", judged.line(&name(&lacking), size, seed));
+    if std::env::var_os("FLEXCAL_FIRST").is_some() {
+        for found in &judged.closure.effects {
+            let others: Vec<String> = found.alternatives.iter().map(named).collect();
+            println!("  {} instead of {}: {:?}", named(&found.effect), others.join(", "), found.claims);
+        }
+    }
     if let Some(flag) = &judged.closure.after.quality_flag {
         println!("  {seed} is not to be trusted: {flag}");
     }

@@ -106,7 +106,7 @@ impl Judged {
             Verdict::Unexplained => "unexplained",
         };
         format!(
-            "{name};{};{seed};{:?};{};{};{verdict};{};{};{};{};{:.3};{:.3};{:.3};{:.2e};{:.1e}",
+            "{name};{};{seed};{:?};{};{};{verdict};{};{};{};{};{:.3};{:.3};{:.3};{:.3};{:.2e};{:.1e}",
             size.identification,
             self.places,
             u8::from(self.first),
@@ -118,6 +118,7 @@ impl Judged {
             self.before,
             self.after,
             self.best,
+            self.alike,
             best_p,
             closure.effects.iter().map(|found| found.p_value).fold(1.0, f64::max),
         )

@@ -94,6 +94,8 @@ pub(super) struct Block {
     normal: Normal,
     pub ln_prior: f64,
     coefficients: Coefficients,
+    /// Whether it is of a function of several covariates.
+    pub is_surface: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -114,7 +116,7 @@ impl Block {
                 // The narrow side is transposed: this is the product that is fast.
                 gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
                 let normal = Normal::Dense { product: columns.tr_mul(fit.residual()), gram };
-                Self { columns: Columns::Dense(columns), normal, ln_prior, coefficients }
+                Self { columns: Columns::Dense(columns), normal, ln_prior, coefficients, is_surface: false }
             }
             Design::Grouped { levers, groups } => {
                 let squares = levers.map(|value| value * value);
@@ -129,7 +131,7 @@ impl Block {
                         .into_owned(),
                 };
                 let normal = normal.whole_if_less_work();
-                Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, coefficients }
+                Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, coefficients, is_surface: false }
             }
         }
     }
@@ -159,15 +161,26 @@ impl Block {
         grid: &[(f64, f64)],
         rules: &SelectionRules,
     ) -> (f64, f64) {
+        let along = match &self.columns {
+            _ if within.nrows() == 0 => None,
+            Columns::Dense(columns) => Some(within * columns),
+            Columns::Grouped { levers, groups } => Some(along(within, levers, groups)),
+        };
+        self.gain_beside(along.as_ref().map(|along| (along, taken)), (left, without), grid, rules)
+    }
+
+    /// The same with Z A and Z r of the set, `None` for nothing.
+    pub fn gain_beside(
+        &self,
+        set: Option<(&DMatrix<f64>, &DVector<f64>)>,
+        (left, without): ((f64, f64), f64),
+        grid: &[(f64, f64)],
+        rules: &SelectionRules,
+    ) -> (f64, f64) {
         let prior = (&rules.displacements[..], &self.coefficients);
-        let (with, size) = if within.nrows() == 0 {
-            of_block(&self.normal, left, grid, prior)
-        } else {
-            let along = match &self.columns {
-                Columns::Dense(columns) => within * columns,
-                Columns::Grouped { levers, groups } => along(within, levers, groups),
-            };
-            of_block(&self.normal.beside(&along, taken), left, grid, prior)
+        let (with, size) = match set {
+            None => of_block(&self.normal, left, grid, prior),
+            Some((along, taken)) => of_block(&self.normal.beside(along, taken), left, grid, prior),
         };
         (with - without, size)
     }

@@ -38,7 +38,9 @@ impl Candidate {
             // A σ from a residual that holds the effect says nothing of how large that is.
             coefficients.largest.fill(f64::INFINITY);
         }
-        Block::new(design, neighbourhood, self.ln_prior, coefficients)
+        let mut block = Block::new(design, neighbourhood, self.ln_prior, coefficients);
+        block.is_surface = self.hypothesis.effect().is_none() && self.hypothesis.depends_on.len() > 1;
+        block
     }
 }
 

@@ -18,6 +18,9 @@ mod sag;
 mod search;
 mod waves;
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
@@ -146,8 +149,12 @@ impl Evidence {
     /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
     /// first.
     pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
+        // Of one that is searched any time or order is the same.
+        let is_same = |one: &Effect, other: &Effect| {
+            one == other || (one.is_searched() && one.name_and_place() == other.name_and_place())
+        };
         let has = |explanation: &Explanation, own: &Effect| {
-            explanation.hypotheses.iter().any(|hypothesis| hypothesis.effect() == Some(own))
+            explanation.hypotheses.iter().filter_map(Hypothesis::effect).any(|known| is_same(known, own))
         };
         let with: f64 =
             self.explanations.iter().filter(|known| has(known, effect)).map(|known| known.probability).sum();
@@ -369,22 +376,30 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     if data.stop.is_requested() {
         return None;
     }
+    // Functions of one covariate that change over other lengths are one hypothesis.
+    let (mut numbers, mut distinct): (BTreeMap<usize, usize>, Vec<usize>) = (BTreeMap::new(), Vec::new());
+    let mut number = |member: usize| {
+        *numbers.entry(member).or_insert_with(|| {
+            let known = distinct.iter().position(|&known| of(known).says(of(member)));
+            known.unwrap_or_else(|| {
+                distinct.push(member);
+                distinct.len() - 1
+            })
+        })
+    };
+    let mut places: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
     for Weighted { members, sizes, probability } in weighted.into_iter().filter(|set| set.probability > NEGLIGIBLE) {
-        let own: Vec<&Hypothesis> = members.iter().map(|&member| of(member)).collect();
-        // Functions of one covariate that change over other lengths are one hypothesis.
-        let is_same = |other: &&mut Explanation| {
-            let others = &other.hypotheses;
-            others.len() == own.len()
-                && own.iter().all(|own| others.iter().any(|other| own.says(other)))
-                && others.iter().all(|other| own.iter().any(|own| own.says(other)))
-        };
-        if let Some(known) = explanations.iter_mut().find(is_same) {
-            known.probability += probability;
-        } else {
-            let own = own.into_iter().cloned().collect();
-            let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
-            let functions = variants.zip(sizes).collect();
-            explanations.push(Explanation { hypotheses: own, probability, functions });
+        let mut own: Vec<usize> = members.iter().map(|&member| number(member)).collect();
+        own.sort_unstable();
+        match places.entry(own) {
+            Entry::Occupied(place) => explanations[*place.get()].probability += probability,
+            Entry::Vacant(place) => {
+                place.insert(explanations.len());
+                let own = members.iter().map(|&member| of(member).clone()).collect();
+                let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
+                let functions = variants.zip(sizes).collect();
+                explanations.push(Explanation { hypotheses: own, probability, functions });
+            }
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));

@@ -11,6 +11,13 @@ use super::block::Block;
 use super::marginal::{Noise, over_noise};
 use crate::identify::Stop;
 
+/// Passes over the sizes of a set until they are to one another as they stay.
+const SETTLING: usize = 4;
+/// Sets whose sizes are settled in the end, the most probable ones.
+const LIKELY: usize = 32;
+/// Sets in which a function of several covariates is taken apart, the most probable ones.
+const SPLIT: usize = 3;
+
 /// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
@@ -47,6 +54,102 @@ impl Set {
             ln_posterior: self.ln_posterior + gain + blocks[block].ln_prior,
         }
     }
+
+    /// The same with the size of each member beside all others, and its posterior at these sizes.
+    ///
+    /// Sizes are in units of the noise, which an effect that is not yet explained is taken for: what was taken first would be held too
+    /// tightly. ln p(r | set) = l + Σ (ln p(r | the others, k) − l), l at the sizes of all, of k summed over its own.
+    fn settled(mut self, (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Self {
+        if self.members.len() < 2 || self.members.iter().any(|&member| blocks[member].is_wide(rules)) {
+            return self;
+        }
+        let own = Products::of(&self.members, blocks, target);
+        let mut summed = vec![0.0; self.members.len()];
+        for _ in 0..SETTLING {
+            let mut changed = false;
+            for (k, &member) in self.members.iter().enumerate() {
+                let Some(others) = own.left(&self.sizes, Some(k)) else { return self };
+                let left = (others.squares, target.noise.freedom);
+                let set = Some((&others.along, &others.taken));
+                let (gain, size) = blocks[member].gain_beside(set, (left, others.without), &own.grid, rules);
+                changed |= size.to_bits() != self.sizes[k].to_bits();
+                self.sizes[k] = size;
+                summed[k] = others.ln_likelihood + gain;
+            }
+            if !changed {
+                break;
+            }
+        }
+        let Some(all) = own.left(&self.sizes, None) else { return self };
+        let prior: f64 = self.members.iter().map(|&member| blocks[member].ln_prior).sum();
+        let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood).sum();
+        self.ln_posterior = all.ln_likelihood + gains - over_noise(own.squares, &own.grid) + prior;
+        self
+    }
+}
+
+/// Products of the columns of a set with one another and with the residual: what sizes do to it is told by these alone.
+struct Products {
+    /// AᵀA and Aᵀr of all members, and where each begins among the columns.
+    gram: DMatrix<f64>,
+    product: DVector<f64>,
+    begins: Vec<usize>,
+    /// rᵀr.
+    squares: f64,
+    grid: Vec<(f64, f64)>,
+}
+
+/// What a set leaves, or a set but for one member.
+struct Left {
+    /// L⁻¹DG of the columns of that member and L⁻¹Db, with D of sizes and 1 + DGD = L Lᵀ.
+    along: DMatrix<f64>,
+    taken: DVector<f64>,
+    squares: f64,
+    /// ln of the density of what is left, and that less ln det L: ln p(r | set) at these sizes.
+    without: f64,
+    ln_likelihood: f64,
+}
+
+impl Products {
+    fn of(members: &[usize], blocks: &[Block], target: &Target) -> Self {
+        let residual = target.fit.residual();
+        let mut all = DMatrix::zeros(residual.len(), 0);
+        let mut begins = vec![0];
+        for &member in members {
+            let (columns, first) = (blocks[member].columns(&target.fit), all.ncols());
+            all = all.resize_horizontally(first + columns.ncols(), 0.0);
+            all.columns_mut(first, columns.ncols()).copy_from(&columns);
+            begins.push(all.ncols());
+        }
+        let mut gram = DMatrix::zeros(all.ncols(), all.ncols());
+        gram.gemm(1.0, &all.transpose(), &all, 0.0);
+        let product = all.tr_mul(residual);
+        Self { gram, product, begins, squares: residual.norm_squared(), grid: target.noise.grid() }
+    }
+
+    fn left(&self, sizes: &[f64], without: Option<usize>) -> Option<Left> {
+        let of = |k: usize| self.begins[k]..self.begins[k + 1];
+        let members = (0..sizes.len()).filter(|&k| Some(k) != without);
+        let scaled: Vec<(usize, f64)> = members.flat_map(|k| of(k).map(move |column| (column, sizes[k]))).collect();
+        let gone: Vec<usize> = without.map_or_else(Vec::new, |k| of(k).collect());
+        let n = scaled.len();
+        let inner = DMatrix::from_fn(n, n, |i, j| {
+            let ((a, one), (b, other)) = (scaled[i], scaled[j]);
+            one * self.gram[(a, b)] * other + if i == j { 1.0 } else { 0.0 }
+        });
+        let lower = inner.cholesky()?.l();
+        let beside = |column: usize| DVector::from_fn(n, |i, _| scaled[i].1 * self.gram[(scaled[i].0, column)]);
+        let mut along = DMatrix::zeros(n, gone.len());
+        for (k, &column) in gone.iter().enumerate() {
+            along.set_column(k, &lower.solve_lower_triangular(&beside(column))?);
+        }
+        let product = DVector::from_fn(n, |i, _| scaled[i].1 * self.product[scaled[i].0]);
+        let taken = lower.solve_lower_triangular(&product)?;
+        let squares = self.squares - taken.norm_squared();
+        let without = over_noise(squares, &self.grid);
+        let ln_likelihood = without - lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        Some(Left { along, taken, squares, without, ln_likelihood })
+    }
 }
 
 /// What a set leaves of the residual: with A of its members scaled by their sizes and 1 + AᵀA = L Lᵀ, Z = L⁻¹AᵀC takes its part off
@@ -57,7 +160,7 @@ pub(super) struct Conditioned {
     /// L⁻¹Aᵀr.
     taken: DVector<f64>,
     squares: f64,
-    /// Of the noise, and ln p(r | set) over it.
+    /// Of the noise, and ln of the density of what is left over it.
     grid: Vec<(f64, f64)>,
     without: f64,
 }
@@ -118,19 +221,12 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
         _ => (rules.together, known.values().cloned().collect()),
     };
     let (mut front, mut promising): (Vec<Set>, Option<Vec<usize>>) = (front, None);
+    let every: Vec<usize> = (0..blocks.len()).collect();
     for _ in 0..longer {
         let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
         for (place, set) in front.iter().enumerate() {
-            let Some(conditioned) = Conditioned::new(set, blocks, target) else { continue };
-            let all = || (0..blocks.len()).collect();
-            let tried: Vec<usize> = promising.as_ref().filter(|_| place > 0).map_or_else(all, Vec::clone);
-            let gains: Vec<(usize, (f64, f64))> = tried
-                .into_par_iter()
-                .filter(|block| !set.members.contains(block) && !target.stop.is_requested())
-                .map(|block| (block, conditioned.gain(&blocks[block], target, rules)))
-                .collect();
-            for (block, gain) in gains {
-                let longer = set.with(block, gain, blocks);
+            let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
+            for longer in extended(set, tried, (blocks, target), rules) {
                 let key = sorted(&longer.members);
                 let best = next.get(&key).or_else(|| known.get(&key));
                 if best.is_none_or(|other| longer.ln_posterior > other.ln_posterior) {
@@ -152,11 +248,20 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             promising
         });
         let has_wide = |set: &Set| set.members.iter().any(|&member| blocks[member].is_wide(rules));
-        front = sets.into_iter().filter(|set| !has_wide(set)).take(rules.extended).collect();
+        let best = sets.into_iter().filter(|set| !has_wide(set)).take(rules.extended).collect::<Vec<_>>();
+        front = best.into_par_iter().map(|set| set.settled((blocks, target), rules)).collect();
+        front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
             break;
         }
     }
+    split(&mut known, (blocks, target), rules);
+    let mut likely: Vec<&Set> = known.values().collect();
+    likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
+    let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled((blocks, target), rules)).collect();
+    known.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
     let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = known.values().map(|set| (set.ln_posterior - most).exp()).sum();
     let weighted = |Set { members, sizes, ln_posterior }| {
@@ -166,6 +271,48 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
     let mut all: Vec<Weighted> = known.into_values().map(weighted).collect();
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members)));
     all
+}
+
+/// A set with each of some further members.
+fn extended(set: &Set, tried: &[usize], (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Vec<Set> {
+    let Some(conditioned) = Conditioned::new(set, blocks, target) else { return Vec::new() };
+    let is_new = |block: &&usize| !set.members.contains(block) && !target.stop.is_requested();
+    let gain = |&block: &usize| (block, conditioned.gain(&blocks[block], target, rules));
+    let gains: Vec<(usize, (f64, f64))> = tried.par_iter().filter(is_new).map(gain).collect();
+    gains.into_iter().map(|(block, gain)| set.with(block, gain, blocks)).collect()
+}
+
+/// Where a likely set holds a function of several covariates, what acts there may be two things: adds the sets with two others in its
+/// place, which steps by one hypothesis lead to only past sets that explain less.
+fn split(known: &mut BTreeMap<Vec<usize>, Set>, (blocks, target): (&[Block], &Target), rules: &SelectionRules) {
+    let best = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let surface = |set: &Set| set.members.iter().copied().find(|&member| blocks[member].is_surface);
+    let mut likely: Vec<&Set> = known.values().filter(|set| set.ln_posterior > best - rules.hopeless).collect();
+    likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let laws: Vec<usize> = (0..blocks.len()).filter(|&block| !blocks[block].is_surface).collect();
+    let mut rests: Vec<Vec<usize>> = Vec::new();
+    for set in likely {
+        let Some(surface) = surface(set) else { continue };
+        let rest = set.members.iter().copied().filter(|&member| member != surface).collect::<Vec<_>>();
+        if rests.len() < SPLIT && !rests.iter().any(|known| sorted(known) == sorted(&rest)) {
+            rests.push(rest);
+        }
+    }
+    for rest in rests {
+        let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
+        let mut one = extended(&rest, &laws, (blocks, target), rules);
+        one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        let has_wide = |set: &Set| set.members.iter().any(|&member| blocks[member].is_wide(rules));
+        for set in one.iter().filter(|set| !has_wide(set)).take(rules.extended) {
+            let likely = |two: &Set| two.ln_posterior > best - rules.hopeless;
+            for two in extended(set, &laws, (blocks, target), rules).into_iter().filter(likely) {
+                let own = known.entry(sorted(&two.members)).or_insert_with(|| two.clone());
+                if two.ln_posterior > own.ln_posterior {
+                    *own = two;
+                }
+            }
+        }
+    }
 }
 
 /// ln p(r | all blocks) and of their prior.
@@ -197,11 +344,69 @@ fn assembled(members: &[usize], blocks: &[Block], target: &Target, rules: &Selec
         let gain = Conditioned::new(&set, blocks, target)?.gain(&blocks[member], target, rules);
         set = set.with(member, gain, blocks);
     }
-    Some(set)
+    Some(set.settled((blocks, target), rules))
 }
 
 fn sorted(members: &[usize]) -> Vec<usize> {
     let mut members = members.to_vec();
     members.sort_unstable();
     members
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::evidence::block::Design;
+    use crate::diagnose::evidence::marginal::Coefficients;
+    use crate::diagnose::neighbourhood::Unknowns;
+
+    /// Numbers without pattern, of root mean square 1 about.
+    fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| {
+            let value = ((12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43_758.545_3).fract();
+            2.0 * 3.0_f64.sqrt() * (value.abs() - 0.5)
+        })
+    }
+
+    /// Two strong effects and a third, each of two columns, in a residual with noise.
+    fn three(names: [usize; 3]) -> (Vec<Block>, Target) {
+        let columns: Vec<DMatrix<f64>> = (0..3).map(|k| matrix(90, 2, 7.0 * k as f64)).collect();
+        let residual = columns[0].column(0) * 60.0 + columns[1].column(1) * 25.0 + matrix(90, 1, 99.0).column(0);
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
+        let block = |&k: &usize| {
+            let design = Design::Dense(columns[k].clone()).scaled(30).unwrap();
+            Block::new(design, &fit, -5.0, Coefficients::default())
+        };
+        let blocks = names.iter().map(block).collect();
+        let noise = Noise { freedom: 89.0, trust: 0.1, least: 0.0 };
+        (blocks, Target { fit, noise, stop: Stop::default() })
+    }
+
+    #[test]
+    fn a_set_is_as_probable_in_whatever_order_it_was_taken() {
+        let rules = &SelectionRules::DEFAULT;
+        let of = |names: [usize; 3], members: &[usize]| {
+            let (blocks, target) = three(names);
+            assembled(members, &blocks, &target, rules).unwrap().ln_posterior
+        };
+        let first = of([0, 1, 2], &[0, 1]);
+        assert!((first - of([1, 0, 2], &[0, 1])).abs() < 1e-6, "{first} {}", of([1, 0, 2], &[0, 1]));
+        // Beside two strong effects, each of the size that it has, one that is not there gains nothing.
+        assert!(of([0, 1, 2], &[0, 1, 2]) < first - 4.0);
+    }
+
+    #[test]
+    fn products_tell_what_columns_do() {
+        let rules = &SelectionRules::DEFAULT;
+        let (blocks, target) = three([0, 1, 2]);
+        let set = Set { members: vec![0, 2], sizes: vec![30.0, 0.3], ln_posterior: 0.0 };
+        let conditioned = Conditioned::new(&set, &blocks, &target).unwrap();
+        let left = Products::of(&[0, 1, 2], &blocks, &target).left(&[30.0, 10.0, 0.3], Some(1)).unwrap();
+        assert!((left.squares / conditioned.squares - 1.0).abs() < 1e-9);
+        let (gain, size) = conditioned.gain(&blocks[1], &target, rules);
+        let of = ((left.squares, target.noise.freedom), left.without);
+        let own = blocks[1].gain_beside(Some((&left.along, &left.taken)), of, &conditioned.grid, rules);
+        assert!((gain - own.0).abs() < 1e-7 && size.to_bits() == own.1.to_bits(), "{gain} {own:?}");
+    }
 }

@@ -105,7 +105,7 @@ impl Waves<'_, '_> {
                     second.extend(near.into_iter().map(|order| written(order, digits)));
                     second.extend([order.floor(), order.ceil()]);
                 }
-                second.retain(|order| *order > 0.0);
+                second.retain(|order| (TAU / (high - low)..=self.rules.wave_orders).contains(order));
                 second.sort_by(f64::total_cmp);
                 second.dedup();
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();

@@ -200,7 +200,7 @@ impl Driven {
         };
         let terms = effects.iter().map(|effect| effect.terms(linearised.problem).into_iter().map(&mut term).collect());
         let terms = terms.collect();
-        let value = |driver: &Driver| linearised.poses.iter().map(|pose| driver.value(&pose.setup)).collect();
+        let value = |driver: &Driver| driver.values(linearised.poses.iter().map(|pose| &pose.setup));
         Self { terms, values: drivers.par_iter().map(value).collect() }
     }
 }

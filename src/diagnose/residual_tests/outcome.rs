@@ -169,6 +169,12 @@ impl Findings {
         }
     }
 
+    /// Whether the residual is smaller than chance makes one of the declared σ.
+    pub fn overstates_sigma(&self) -> bool {
+        let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
+        size.filter_map(|test| test.outcome.as_ref().ok()).any(|own| own.statistic < own.bounds.0)
+    }
+
     /// Whether anything was tested for structure.
     pub fn is_testable(&self) -> bool {
         self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())

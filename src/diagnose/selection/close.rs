@@ -331,13 +331,19 @@ fn stands(fitted: &Fitted, data: &Data, added: &[Effect], functions: usize) -> R
     Ok(best.is_some_and(|best| is_held(best, added) && best.without_law().len() <= functions))
 }
 
+/// Factors of a time constant or distance that are tried in its place: between one listed value and the next.
+const FINER: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
+
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
 fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, IdentifyError> {
     let added = rounds.added(fitted);
-    if added.len() < 2 {
+    if added.len() < 2 && !added.iter().any(Effect::has_memory) {
         return Ok(None);
     }
-    let candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    let mut candidates = Candidates::of(&fitted.problem, rounds.data).testable;
+    // Of a time constant or distance those between the listed ones too.
+    let nearer = |effect: &Effect| FINER.iter().filter_map(|factor| effect.scaled(*factor)).collect::<Vec<_>>();
+    candidates.extend(added.iter().filter(|effect| effect.has_memory()).flat_map(nearer));
     let linearised = fitted.linearised(rounds.data, &candidates);
     let replacements = Replacements::new(fitted, &linearised, &candidates, rounds.data);
     for effect in &added {

@@ -1,7 +1,7 @@
 //! Which effects a round adds.
 
 use super::super::data::Data;
-use super::super::neighbourhood::Scan;
+use super::super::neighbourhood::{Scan, Tried};
 use crate::problem::Effect;
 
 /// What a round adds.
@@ -22,7 +22,11 @@ pub(super) fn pick(scan: &mut Scan, data: &Data, affords_fits: bool) -> Vec<Pick
     let without = scan.linear.cross_validate(&data.block);
     while picks.len() < rules.picks {
         let ranking = scan.ranking();
-        let mut standing = ranking.iter().filter(|tried| tried.corrected < rules.level && tried.criterion < 0.0);
+        let is_alike = |effect: &Effect| picks.iter().any(|pick| pick.effect.remembers_like(effect));
+        let stands = |tried: &&Tried| {
+            tried.corrected < rules.level && tried.criterion < 0.0 && !is_alike(&scan.effects[tried.index])
+        };
+        let mut standing = ranking.iter().filter(stands);
         // The first alone must predict poses that were left out; those after it are judged together.
         let Some(best) = standing.by_ref().take(rules.validated).find(|tried| {
             let with = || scan.linear.with(&scan.columns(tried.index));

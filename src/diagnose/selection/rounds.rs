@@ -81,7 +81,10 @@ impl<'a> Rounds<'a> {
         self.is_new(&fitted);
         while self.done.len() < self.data.rules.rounds {
             self.tell(0, 0);
-            let candidates = Candidates::of(&fitted.problem, self.data);
+            let mut candidates = Candidates::of(&fitted.problem, self.data);
+            // One of a place: another time constant or distance comes in its stead, when all others are in.
+            let added = self.added(&fitted);
+            candidates.testable.retain(|effect| !added.iter().any(|known| known.remembers_like(effect)));
             let (picks, staying) = {
                 let linearised = fitted.linearised(self.data, &candidates.testable);
                 let fit = fitted.neighbourhood(&linearised);

@@ -117,6 +117,11 @@ impl Effect {
         self.family().searched.is_some()
     }
 
+    /// Whether it remembers the poses before, as another effect of its family at the same place does for another time or distance.
+    pub(crate) fn remembers_like(&self, other: &Self) -> bool {
+        self.has_memory() && self.name_and_place() == other.name_and_place()
+    }
+
     /// The same with its searched argument multiplied; `None` where values between those of the candidates tell nothing.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         (self.family().scaled)(self, factor)

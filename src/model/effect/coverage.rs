@@ -7,8 +7,8 @@ use crate::problem::{Effect, Problem};
 /// Which drivers of effects the poses at hand have, and vary.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataCoverage {
-    /// Whether the temperature is known and changes.
-    pub temperature: bool,
+    /// Why effects of the temperature cannot be shown; `None` where it is known, beside the one that the problem refers to, and changes.
+    pub no_temperature: Option<&'static str>,
     /// Whether directions of approach are known.
     pub approach: bool,
     /// For each joint, whether it was approached from both sides.
@@ -19,6 +19,9 @@ pub struct DataCoverage {
     pub ranges: Vec<(f64, f64)>,
     /// Times between which a station may have moved \[s\], ascending.
     pub times: Vec<f64>,
+    /// Usual time between two poses of a session, and that of the longest session from end to end \[s\]; `None` where times were not
+    /// measured: what was before a pose is not known.
+    pub clock: Option<(f64, f64)>,
     /// For each of the problem's own covariates, whether it is known and changes.
     pub covariates: Vec<bool>,
     /// Gravity, arm base frame [m/s²].
@@ -48,7 +51,11 @@ impl DataCoverage {
 }
 
 /// Why an effect that needs the temperature cannot be shown.
-pub(super) const NO_TEMPERATURE: &str = "no temperature that changes, or no reference_temperature_C";
+pub const NO_TEMPERATURE: &str = "no temperature that changes";
+/// The same, of a temperature that is measured.
+pub const NO_REFERENCE: &str = "the problem declares no reference_temperature_C";
+/// Why an effect that remembers what was before a pose cannot be shown.
+pub(super) const NO_TIMES: &str = "no time_s that tells which pose was before which";
 /// Why an effect of a joint that stands still cannot be shown.
 pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
 /// Why an effect of loads cannot be shown.
@@ -61,6 +68,8 @@ pub struct Columns {
     pub temperature: bool,
     /// Directions of approach.
     pub approach: bool,
+    /// Times.
+    pub time: bool,
     /// The problem's own covariates.
     pub covariates: bool,
 }

@@ -1,6 +1,6 @@
 //! `joint-hysteresis`: friction pulls a joint back the way on which it came, Δθ = h z.                     [Dahl 1968]
 
-use super::coverage::STANDS_STILL;
+use super::coverage::{NO_TIMES, STANDS_STILL};
 use super::family::{Candidate, Family, Term, USUAL, to_three_digits};
 use super::place::commanded;
 use crate::model::parameter::{Driver, Slot};
@@ -28,7 +28,12 @@ pub(super) const FAMILY: Family = Family {
             let parts =
                 std::iter::successors(Some(SHORTEST), |part| Some(part * STEP)).take_while(|part| *part <= LONGEST);
             let candidate = |distance: f64| {
-                Candidate::needing(Effect::JointHysteresis { joint, distance }, data.moves(joint - 1), STANDS_STILL)
+                let untestable = match (data.moves(joint - 1), data.clock) {
+                    (false, _) => Some(STANDS_STILL),
+                    (true, None) => Some(NO_TIMES),
+                    _ => None,
+                };
+                Candidate { effect: Effect::JointHysteresis { joint, distance }, untestable }
             };
             parts.filter_map(|part| to_three_digits(part * range)).map(candidate).collect::<Vec<_>>()
         };

@@ -1,6 +1,6 @@
 //! `joint-thermal-drift`: Δθ = k (T − T₀).
 
-use super::coverage::{NO_TEMPERATURE, without_temperature};
+use super::coverage::without_temperature;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{commanded, warming};
 use crate::model::parameter::Slot;
@@ -17,7 +17,7 @@ pub(super) const FAMILY: Family = Family {
     },
     candidates: |problem, data| {
         let effect = |joint| Effect::JointThermalDrift { joint };
-        commanded(problem).map(|joint| Candidate::needing(effect(joint), data.temperature, NO_TEMPERATURE)).collect()
+        commanded(problem).map(|joint| Candidate { effect: effect(joint), untestable: data.no_temperature }).collect()
     },
     describe: |effect| match effect {
         Effect::JointThermalDrift { joint } => format!("zero of joint {joint} drifts with temperature"),

@@ -1,6 +1,6 @@
 //! `link-thermal-expansion`: strain α (T − T₀) of a beam.
 
-use super::coverage::{NO_TEMPERATURE, without_temperature};
+use super::coverage::without_temperature;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links, warming};
 use crate::model::parameter::{BeamField, Slot};
@@ -19,7 +19,7 @@ pub(super) const FAMILY: Family = Family {
     },
     candidates: |problem, data| {
         let effect = |link| Effect::LinkThermalExpansion { link };
-        links(problem).map(|link| Candidate::needing(effect(link), data.temperature, NO_TEMPERATURE)).collect()
+        links(problem).map(|link| Candidate { effect: effect(link), untestable: data.no_temperature }).collect()
     },
     describe: |effect| match effect {
         Effect::LinkThermalExpansion { link } => format!("link {link} grows with temperature"),

@@ -46,7 +46,7 @@ mod twist_bending;
 mod unmodelled_mass;
 
 pub use catalogue::{FAMILIES, candidates, parameters};
-pub use coverage::{Columns, DataCoverage};
+pub use coverage::{Columns, DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
 pub use custom::CustomEffect;
 pub use family::{Candidate, Family, Term};
 pub(crate) use joint_harmonic::HIGHEST_ORDER;

@@ -1,6 +1,6 @@
 //! `…-lag`: what follows the temperature with a time constant τ, dT̃/dt = (T − T̃)/τ, by (T̃ − T₀).
 
-use super::coverage::{DataCoverage, NO_TEMPERATURE, without_temperature};
+use super::coverage::{Columns, DataCoverage, NO_TIMES, without_temperature};
 use super::family::{Candidate, Family, Term, USUAL, to_three_digits};
 use super::place::{carrier, commanded, links};
 use crate::model::parameter::{BeamField, Driver, Slot};
@@ -33,13 +33,7 @@ pub(super) const JOINT: Family = Family {
         }
         _ => String::new(),
     },
-    describe_by_row: |effect| match effect {
-        Effect::JointThermalDriftLag { joint, time_constant } => {
-            Some(format!("zero of joint {joint} drifts with a temperature that lags by {time_constant} rows"))
-        }
-        _ => None,
-    },
-    missing_column: without_temperature,
+    missing_column: without_history,
     searched: Some(SEARCHED),
     scaled: |effect, factor| match effect {
         Effect::JointThermalDriftLag { joint, time_constant } => {
@@ -76,13 +70,7 @@ pub(super) const BENDING: Family = Family {
         }
         _ => String::new(),
     },
-    describe_by_row: |effect| match effect {
-        Effect::LinkThermalBendingLag { link, time_constant } => {
-            Some(format!("link {link} bows with a temperature that lags by {time_constant} rows"))
-        }
-        _ => None,
-    },
-    missing_column: without_temperature,
+    missing_column: without_history,
     searched: Some(SEARCHED),
     scaled: |effect, factor| match effect {
         Effect::LinkThermalBendingLag { link, time_constant } => {
@@ -116,13 +104,7 @@ pub(super) const EXPANSION: Family = Family {
         }
         _ => String::new(),
     },
-    describe_by_row: |effect| match effect {
-        Effect::LinkThermalExpansionLag { link, time_constant } => {
-            Some(format!("link {link} grows with a temperature that lags by {time_constant} rows"))
-        }
-        _ => None,
-    },
-    missing_column: without_temperature,
+    missing_column: without_history,
     searched: Some(SEARCHED),
     scaled: |effect, factor| match effect {
         Effect::LinkThermalExpansionLag { link, time_constant } => {
@@ -141,13 +123,17 @@ fn lagging(problem: &Problem, time_constant: f64) -> Driver {
     Driver::Lagging { reference: problem.data.reference_temperature.unwrap_or(0.0), time_constant }
 }
 
+/// The column without which the temperature that was is not known.
+fn without_history(effect: &Effect, problem: &Problem, columns: Columns) -> Option<&'static str> {
+    without_temperature(effect, problem, columns).or_else(|| (!columns.time).then_some("a column time_s"))
+}
+
 /// An effect of each time constant that these data can show.
 fn each(data: &DataCoverage, effect: impl Fn(f64) -> Effect) -> Vec<Candidate> {
-    let (Some(first), Some(last)) = (data.times.first(), data.times.last()) else { return Vec::new() };
-    let (span, between) = (last - first, (last - first) / (data.times.len().max(2) - 1) as f64);
+    let Some((between, span)) = data.clock else { return vec![Candidate::needing(effect(1.0), false, NO_TIMES)] };
     let all = std::iter::successors(Some(SHORTEST * between), |own| Some(own * STEP));
     all.take_while(|own| *own > 0.0 && *own <= LONGEST * span)
         .filter_map(to_three_digits)
-        .map(|time_constant| Candidate::needing(effect(time_constant), data.temperature, NO_TEMPERATURE))
+        .map(|time_constant| Candidate { effect: effect(time_constant), untestable: data.no_temperature })
         .collect()
 }

@@ -1,6 +1,6 @@
 //! What a parameter is multiplied by, pose by pose.
 
-use crate::problem::PoseView;
+use crate::problem::{Lag, PoseView};
 
 /// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the observation.
 ///
@@ -125,6 +125,16 @@ impl Quantity {
 }
 
 impl Driver {
+    /// Its values in some poses, the faster the more of them follow one another.
+    pub(crate) fn values<'p>(self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
+        let Self::Lagging { reference, time_constant } = self else {
+            return poses.map(|own| self.value(own)).collect();
+        };
+        let mut lag = Lag::new(time_constant);
+        let felt = |own: &PoseView| own.temperature.map(|now| lag.felt(&own.past, (own.time, now)) - reference);
+        poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
+    }
+
     /// Its value in a pose.
     pub fn value(self, setup: &PoseView) -> f64 {
         match self {
