@@ -10,7 +10,7 @@ use super::noise::noise;
 use super::parameters::correlated;
 use super::quantity::{counted, number};
 use super::render::text_within;
-use super::unexplained::{place, size_alone};
+use super::unexplained::{not_looked_for, place, size_alone};
 use crate::diagnose::{ClosedLoop, Verdict};
 use crate::identify::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
@@ -96,6 +96,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
+    blocks.extend(not_looked_for(closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
     let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));

@@ -203,6 +203,7 @@ fn what_keeps_the_loop_from_finding_is_said() {
     let told = bench.told(&["loop", "arm", "--out", "coarse"]);
     assert!(told.contains("Nothing found, and little could be") && !told.contains("looks like noise"), "{told}");
     bench.edit("arm/problem.toml", |text| {
+        let text = text.replace("[data]", "[data]\nreference_temperature_C = 20.0");
         format!("{text}\n[[effect]]\njoint-thermal-drift-lag = {{ joint = 1, time_constant_s = 600 }}\n")
     });
     bench.edit("arm/data.csv", |text| text.replace("time_s", "note"));

@@ -370,7 +370,7 @@ mod tests {
 
     /// Two strong effects and a third, each of two columns, in a residual with noise.
     fn three(names: [usize; 3]) -> (Vec<Block>, Target) {
-        let columns: Vec<DMatrix<f64>> = (0..3).map(|k| matrix(90, 2, 7.0 * k as f64)).collect();
+        let columns: Vec<DMatrix<f64>> = (0..3).map(|k| matrix(90, 2, 7.0 * f64::from(k))).collect();
         let residual = columns[0].column(0) * 60.0 + columns[1].column(1) * 25.0 + matrix(90, 1, 99.0).column(0);
         let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
         let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);

@@ -63,6 +63,7 @@ pub(super) const NO_LOADS: &str = "no gravity, so no loads";
 
 /// Which columns some measurements have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each says whether a column is there")]
 pub struct Columns {
     /// Temperatures.
     pub temperature: bool,
