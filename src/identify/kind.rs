@@ -19,6 +19,7 @@ const HUGE: f64 = 1e6;
 /// An error with its unit: of tilts \[rad\] with a decimal more, of others \[m\].
 pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     match kind {
+        _ if !error.is_finite() => "more than numbers hold".to_owned(),
         "tilt" => format!("{:.*}°", decimals + 1, error.to_degrees()),
         _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
         _ => format!("{:.2e} mm", error * 1e3),
@@ -53,5 +54,18 @@ pub(super) fn named(kind: &str) -> &'static str {
         "surface" => "the names in the column surface",
         "tilt" => "the names in the column frame",
         _ => "whether base and session are declared",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_without_a_number_is_said_in_words() {
+        for error in [f64::INFINITY, f64::NAN] {
+            assert_eq!(size("position", error, 3), "more than numbers hold");
+        }
+        assert_eq!((size("position", 1e-3, 2), size("tilt", 0.0, 1)), ("1.00 mm".to_owned(), "0.00°".to_owned()));
     }
 }
