@@ -80,7 +80,8 @@ fn tilts(
     let Some(frame) = frames.get(frame).or(frames.last()) else { return Vector3::from_element(zero) };
     let above = |axis: &Vector3<Dual64>| {
         let sine = axis.dot(&up);
-        let cosine = (-(sine * sine) + (1.0 + UPRIGHT)).sqrt();
+        let level = axis.cross(&up);
+        let cosine = (level.dot(&level) + UPRIGHT).sqrt();
         sine.atan2(cosine)
     };
     Vector3::new(above(&frame.axes[0]), above(&frame.axes[1]), zero)

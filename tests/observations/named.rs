@@ -288,6 +288,8 @@ fn an_effect_is_named_and_nothing_else() {
     let cases = [
         (arm("elbow"), (Measured::Wires, 200), Some(0), 100),
         (arm("elbow"), (Measured::Tilts, 150), Some(3), 3),
+        // The x axis of the third frame stands upright, where its tilt has no derivative.
+        (arm("gantry"), (Measured::Tilts, 150), Some(1), 54001),
         // A slide that alone moves along its axis: beside each socket its commands differ by noise alone.
         (arm("scara"), (Measured::Sockets, 120), None, 3007),
     ];
