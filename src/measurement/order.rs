@@ -56,16 +56,20 @@ impl Found {
 }
 
 impl Measurements {
-    /// Median time between two poses of a session that differ in it, and that of the longest session from end to end \[s\]; `None` where
-    /// times were not measured, or none differ.
+    /// Median time between two configurations of a session that differ in it, and that of the longest session from end to end \[s\]; `None`
+    /// where times were not measured, or none differ. Readings repeated in one configuration say nothing of how fast poses follow one another.
     pub fn clock(&self) -> Option<(f64, f64)> {
         let found = self.found();
-        let times = found.sorted.as_ref().map_or(self.time.as_slice(), |sorted| &sorted.times);
+        let sorted = found.sorted.as_ref();
+        let times = sorted.map_or(self.time.as_slice(), |sorted| &sorted.times);
+        let configurations = sorted.map_or(self.configurations.as_slice(), |sorted| &sorted.configurations);
+        let at_pose = |k: usize| configurations.get(k * self.joints..(k + 1) * self.joints);
         let (mut between, mut longest) = (Vec::new(), 0.0_f64);
         for &(begin, at) in &found.places {
             let (begin, at) = (begin as usize, at as usize);
             longest = longest.max(times[at] - times[begin]);
-            between.extend((at > begin && times[at] > times[at - 1]).then(|| times[at] - times[at - 1]));
+            let is_next = at > begin && times[at] > times[at - 1] && at_pose(at) != at_pose(at - 1);
+            between.extend(is_next.then(|| times[at] - times[at - 1]));
         }
         between.sort_by(f64::total_cmp);
         between.get(between.len() / 2).filter(|_| self.time_measured).map(|median| (*median, longest))
