@@ -32,7 +32,7 @@ pub use residual_tests::{
 };
 pub use rules::SelectionRules;
 pub use screening::{Ranked, Trace, examine, trace, trace_by};
-pub use selection::{ClosedLoop, Found, HARMONICS, Interval, Round, Verdict, close, close_by};
+pub use selection::{ClosedLoop, Found, HarmonicPrior, Interval, Round, Verdict, close, close_by};
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};

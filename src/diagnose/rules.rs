@@ -56,9 +56,13 @@ pub struct SelectionRules {
     pub several_orders: usize,
     /// Parts of each joint's range that are left out in turn to find the prior's scale.
     pub range_parts: usize,
-    /// Scales of the prior that are tried, as powers of two of the root mean square of the coefficients found; then half and quarter
-    /// powers about the best.
+    /// Scales of the prior that are tried, as powers of two of the size that the coefficients show; then half and quarter powers about the
+    /// best.
     pub prior_scales: RangeInclusive<i32>,
+    /// Orders over which the σ of that prior is smoothed: a joint that covers part of its turn tells no finer.
+    pub order_width: f64,
+    /// Squares of mean size that count beside those of the coefficients of an order, where these are few.
+    pub common_values: f64,
     /// Part of their rms error to which a correction must take poses that were left out to be worth stating.
     pub worthwhile: f64,
     /// Entries of a ranking.
@@ -165,6 +169,8 @@ impl SelectionRules {
         several_orders: 3,
         range_parts: 5,
         prior_scales: -8..=2,
+        order_width: 1.5,
+        common_values: 4.0,
         worthwhile: 0.95,
         ranked: 20,
         looked_at: 8,
@@ -228,6 +234,8 @@ impl SelectionRules {
                 "prior_scales",
                 !self.prior_scales.is_empty() && self.prior_scales.clone().all(|power| power.abs() < 1000),
             ),
+            ("order_width", size(self.order_width)),
+            ("common_values", size(self.common_values)),
             ("worthwhile", part(self.worthwhile)),
             ("alike", size(self.alike)),
             ("telling_poses", self.telling_poses >= 1),

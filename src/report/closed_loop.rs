@@ -322,11 +322,14 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
         Block::heading("What was found"),
         Block::Ranking(closure.effects.iter().map(|found| point(closure, found, alternatives)).collect()),
     ];
-    if let Some(sigma) = closure.harmonic_sigma {
+    if let Some(prior) = &closure.harmonic_prior {
+        let sigmas = || prior.by_order.iter().map(|own| own.1.to_degrees());
         blocks.push(Block::Text(format!(
-            "Many harmonics were found: every order up to the highest that stands out is in the model, with one prior of {} ° for \
-             all, the one that predicts poses best where part of a joint's range is left out.",
-            number(sigma.to_degrees(), 6)
+            "Many harmonics were found: every order up to the highest that stands out is in the model, with one prior for all \
+             joints of {} to {} ° by order, as wide as all of them are there and of the scale that predicts poses best where part \
+             of a joint's range is left out.",
+            number(sigmas().fold(f64::INFINITY, f64::min), 6),
+            number(sigmas().fold(0.0, f64::max), 6)
         )));
     }
     blocks

@@ -6,7 +6,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString,
 
 use super::effect::values;
 use super::quantity::p_value;
-use crate::diagnose::{ClosedLoop, Found, HARMONICS, SelectionRules, Trace};
+use crate::diagnose::{ClosedLoop, Found, HarmonicPrior, SelectionRules, Trace};
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
 
@@ -30,23 +30,26 @@ pub fn closed_problem(
         (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
     });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
-    match closure.harmonic_sigma {
-        Some(sigma) => with_rule(&edited, sigma),
+    match &closure.harmonic_prior {
+        Some(prior) => with_rules(&edited, prior),
         None => Ok(edited),
     }
 }
 
-/// The text with a prior of σ \[rad\] for all waves of joints at the end of `[parameters]`.
-fn with_rule(text: &str, sigma: f64) -> Result<String, TomlError> {
+/// The text with a prior for all harmonics of joints at the end of `[parameters]`.
+fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
     if let Some(parameters) = parameters.as_table_like_mut() {
-        let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
-        parameters.insert(HARMONICS, Item::Value(Value::InlineTable(sigma)));
+        for (pattern, sigma) in prior.rules() {
+            let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
+            parameters.insert(&pattern, Item::Value(Value::InlineTable(sigma)));
+        }
     }
     // A table in one line has no room for a comment.
-    if let Some(mut key) =
-        document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(HARMONICS))
+    if let Some((first, _)) = prior.rules().next()
+        && let Some(mut key) =
+            document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(&first))
     {
         key.leaf_decor_mut()
             .set_prefix("# Found by flexcal loop: with this prior, what is left out is predicted best.\n");
@@ -255,15 +258,18 @@ mod tests {
     }
 
     #[test]
-    fn a_prior_of_waves_is_a_rule() {
+    fn a_prior_of_harmonics_is_rules() {
         for text in [
             "[parameters]\n\"base.*\" = { free = true }\n\n[data]\nfiles = []\n",
             "parameters = {}\n",
             "name = \"x\"\n",
         ] {
-            let ruled = with_rule(text, 2.5e-5).unwrap();
+            let prior = HarmonicPrior { by_order: vec![(1, 2.5e-5), (17, 4.1e-5)] };
+            let ruled = with_rules(text, &prior).unwrap();
             let read: toml::Table = ruled.parse().unwrap();
-            assert_eq!(read["parameters"][HARMONICS]["sigma_rad"].as_float(), Some(2.5e-5), "{ruled}");
+            let sigma = |name: &str| read["parameters"][name]["sigma_rad"].as_float();
+            assert_eq!(sigma("joint-harmonic.sin1"), Some(2.5e-5), "{ruled}");
+            assert_eq!(sigma("joint-harmonic.cos17"), Some(4.1e-5), "{ruled}");
         }
     }
 

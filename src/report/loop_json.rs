@@ -34,8 +34,8 @@ object! {
         set_aside: Vec<RowEntry> = closure.set_aside.iter().map(RowEntry::of).collect(),
         /// Further structure without a known law.
         further: Vec<UnexplainedEntry> = closure.unexplained.iter().skip(1).map(|left| UnexplainedEntry::of(left, &closure.before)).collect(),
-        /// 1 σ of the prior that waves of joints were given \[rad\].
-        harmonic_prior_rad: Option<f64> = closure.harmonic_sigma,
+        /// The prior that harmonics of joints were given.
+        harmonic_prior: Option<Vec<PriorEntry>> = closure.harmonic_prior.as_ref().map(|prior| prior.by_order.iter().map(|&(order, sigma)| PriorEntry::of(order, sigma)).collect()),
         steps: Vec<StepEntry<'a>> = closure.rounds.iter().map(StepEntry::of).collect(),
         checks_before: Vec<findings::Entry> = findings::entries(&closure.before.findings),
         checks_after: Vec<findings::Entry> = findings::entries(&closure.findings),
@@ -51,6 +51,14 @@ object! {
         kinds: Vec<Kind> = fit.kinds.iter().map(Kind::of).collect(),
     }
 }
+object! {
+    /// 1 σ of the prior of one order of harmonics.
+    PriorEntry(order: u32, sigma: f64) {
+        order: u32 = order,
+        sigma_rad: f64 = sigma,
+    }
+}
+
 object! {
     RowEntry(row: &Location) {
         file: String = row.file.display().to_string(),

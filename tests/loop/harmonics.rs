@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::arms::parse;
 use crate::common::made::{normal, predicted};
-use flexcal::diagnose::{HARMONICS, Verdict, close};
+use flexcal::diagnose::{Verdict, close};
 use flexcal::identify::{Identification, Options};
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::monte_carlo::table;
@@ -81,12 +81,13 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     let split = Split { identification, held_out };
 
     let closure = close(&problem, &Dataset::new(measured.clone(), split), &Options::default()).unwrap();
-    let sigma = closure.harmonic_sigma.unwrap();
+    let prior = closure.harmonic_prior.as_ref().unwrap();
+    let (order, sigma) = *prior.by_order.last().unwrap();
     let rule = closure.closed.parameters.last().unwrap();
-    assert_eq!(rule.pattern, HARMONICS);
+    assert_eq!(rule.pattern, format!("joint-harmonic.cos{order}"));
     assert!(matches!(&rule.freedom, Freedom::Free { sigma: prior, .. } if prior.angle == Some(sigma)));
     let waves: Vec<&Vec<u32>> = closure.closed.effects.iter().filter_map(orders).collect();
-    println!("σ {:.5}°, orders {waves:?}", sigma.to_degrees());
+    println!("{prior:?}, orders {waves:?}");
     assert!(waves.len() >= 2 && waves.iter().filter(|orders| is_dense(orders)).count() >= 2, "{waves:?}");
 
     let errors = |rows: &[usize]| {

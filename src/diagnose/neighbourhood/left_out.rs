@@ -36,22 +36,43 @@ impl PartSquares {
         Self { whole: Squares::of(columns, residual, &every), parts }
     }
 
-    /// Σ rows · ln(mean square) of the parts, each predicted from the others; the first unknowns have these values and 1 σ of
-    /// their priors about 0. `None` where the others do not decide the fit.
+    /// Values of the unknowns fitted to all parts, and their variances, priors as in [`Self::left_out`].
+    pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
+        let (normal, pull) = self.normal(self.whole.gram.clone(), self.whole.product.clone(), priors);
+        let inverse = normal.cholesky()?.inverse();
+        let mut x = -(&inverse * pull);
+        for (j, prior) in priors.iter().enumerate() {
+            x[j] += prior.0;
+        }
+        Some((x, inverse.diagonal()))
+    }
+
+    /// The normal equations of some parts with priors.
     ///
     /// Directions that no pose sees stay where they are: to the diagonal comes (RANK)² of each column's length².
+    fn normal(
+        &self,
+        mut gram: DMatrix<f64>,
+        mut product: DVector<f64>,
+        priors: &[(f64, Option<f64>)],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        for j in 0..product.len() {
+            gram[(j, j)] += RANK * RANK * self.whole.gram[(j, j)] + f64::MIN_POSITIVE;
+        }
+        for (j, (x, sigma)) in priors.iter().enumerate() {
+            let weight = sigma.map_or(0.0, |sigma| sigma.powi(-2));
+            gram[(j, j)] += weight;
+            product[j] += weight * x;
+        }
+        (gram, product)
+    }
+
+    /// Σ rows · ln(mean square) of the parts, each predicted from the others; the first unknowns have these values and 1 σ of
+    /// their priors about 0. `None` where the others do not decide the fit.
     pub fn left_out(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
         let predicted = |part: &Squares| {
-            let mut normal = &self.whole.gram - &part.gram;
-            let mut pull = &self.whole.product - &part.product;
-            for j in 0..pull.len() {
-                normal[(j, j)] += RANK * RANK * self.whole.gram[(j, j)] + f64::MIN_POSITIVE;
-            }
-            for (j, (x, sigma)) in priors.iter().enumerate() {
-                let weight = sigma.map_or(0.0, |sigma| sigma.powi(-2));
-                normal[(j, j)] += weight;
-                pull[j] += weight * x;
-            }
+            let (gram, product) = (&self.whole.gram - &part.gram, &self.whole.product - &part.product);
+            let (normal, pull) = self.normal(gram, product, priors);
             let step = -normal.cholesky()?.solve(&pull);
             let squares = part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
             Some(part.rows as f64 * (squares / part.rows as f64).ln())

@@ -10,7 +10,7 @@ use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
 use super::super::witness::{Witness, WitnessVerdict, witness};
 use super::alternatives::Replacements;
-use super::harmonics;
+use super::harmonics::{self, HarmonicPrior};
 use super::interval;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
@@ -85,8 +85,8 @@ pub struct ClosedLoop {
     pub effects: Vec<Found>,
     /// What each round came to.
     pub rounds: Vec<Round>,
-    /// 1 σ of the prior that the closed problem has for the harmonics of joints, where they are many \[rad\].
-    pub harmonic_sigma: Option<f64>,
+    /// The prior that the closed problem has for the harmonics of joints, where they are many.
+    pub harmonic_prior: Option<HarmonicPrior>,
     /// Structure whose law is not known, the surest first.
     pub unexplained: Vec<Unexplained>,
     /// Mean reduction of the error on held-out poses \[m\].
@@ -137,7 +137,7 @@ pub fn close_by(
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
     options.tell(|| Progress::Finishing);
     rounds.data = &data;
-    let (fitted, harmonic_sigma, evidence) = if interrupted {
+    let (fitted, harmonic_prior, evidence) = if interrupted {
         (rounds.taken.clone().settled(&data, &unhurried)?, None, rounds.known.take())
     } else {
         result?
@@ -150,8 +150,8 @@ pub fn close_by(
     let fitted = anew.unwrap_or(fitted);
     // Beside a fit that is not to be trusted nothing is found: its residual may be that of a mistake in the data.
     let trusted = fitted.found.is_trusted();
-    let (fitted, harmonic_sigma, evidence) =
-        if trusted { (fitted, harmonic_sigma, evidence) } else { (declared, None, None) };
+    let (fitted, harmonic_prior, evidence) =
+        if trusted { (fitted, harmonic_prior, evidence) } else { (declared, None, None) };
     let findings = check_fit(&fitted, &data);
     let added = rounds.added(&fitted);
     // Of very many effects none is taken out again: what is left beside all of them is weighed.
@@ -162,7 +162,7 @@ pub fn close_by(
     let evidence = evidence.or_else(|| if is_wanted { weigh(&fitted, &data, taken_out) } else { None });
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
     let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
-    let effects = found(&rounds, &fitted, best, harmonic_sigma.is_some());
+    let effects = found(&rounds, &fitted, best, harmonic_prior.is_some());
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
@@ -184,7 +184,7 @@ pub fn close_by(
         closed: fitted.problem,
         effects,
         rounds: rounds.done,
-        harmonic_sigma,
+        harmonic_prior,
         unexplained,
         gain,
         set_aside,
@@ -195,7 +195,10 @@ pub fn close_by(
 ///
 /// Evidence leads on up to `led_poses` poses. It holds few hypotheses together: where many poses show structure beside them, as the waves
 /// of many orders that a gear has, rounds are tried, and taken where they leave noise.
-fn chosen(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>, Option<Evidence>), IdentifyError> {
+fn chosen(
+    rounds: &mut Rounds,
+    first: Fitted,
+) -> Result<(Fitted, Option<HarmonicPrior>, Option<Evidence>), IdentifyError> {
     let (data, rules) = (rounds.data, rounds.data.rules);
     let noise = |fitted: &Fitted| !check_fit(fitted, data).is_structured();
     let mut led = None;
@@ -223,7 +226,7 @@ fn chosen(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>, Op
 }
 
 /// The fit with what rounds found, and the prior that many harmonics share.
-fn tried(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
+fn tried(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<HarmonicPrior>), IdentifyError> {
     let mut fitted = rounds.run(first)?;
     for _ in 0..rounds.data.rules.exchanges.min(rounds.affordable_fits(&fitted)) {
         let Some(next) = exchanged(rounds, &fitted)? else { break };

@@ -2,13 +2,19 @@
 //!
 //! Where a joint covers part of its turn, harmonics of neighbouring orders hardly differ there. Which of them are picked is
 //! chance; they cancel where it was measured and part beyond. With every order in the model and one Gaussian prior on all
-//! coefficients, predictions go to zero where nothing was measured. The prior's σ is the one that predicts best when whole
-//! parts of a joint's range are left out.
+//! coefficients, predictions go to zero where nothing was measured.
+//!
+//! Joints of one arm have gears of a kind, which err at like orders. So σₖ = s hₖ is common to all joints: its course over the
+//! orders, hₖ, is that of the coefficients of all joints, smoothed over neighbouring orders, and its scale, s, the one that
+//! predicts best when whole parts of a joint's range are left out.
+
+use std::collections::BTreeSet;
 
 use super::super::candidates::joined;
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::PartSquares;
+use super::super::rules::SelectionRules;
 use super::rounds::{Retested, Rounds};
 use crate::identify::IdentifyError;
 use crate::model::effect;
@@ -16,12 +22,39 @@ use crate::model::parameter::{Driver, EffectParameter, rule_of};
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 use crate::quantity::Unit;
 
-/// Pattern of the rule that gives all harmonics of joints one prior.
-pub const HARMONICS: &str = "joint-harmonic.*";
+/// Estimates of σₖ from the coefficients and of these by σₖ: the first ones find its course, later ones hardly change it.
+const PASSES: usize = 2;
 
-/// The fit with every order of the joints whose harmonics are many, and 1 σ of their prior \[rad\]; the fit, settled, where
-/// they are few or no common prior can hold them.
-pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<f64>), IdentifyError> {
+/// The prior that harmonics of all joints share: 1 σ of each order's coefficients about 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HarmonicPrior {
+    /// Orders, ascending, and σ \[rad\].
+    pub by_order: Vec<(u32, f64)>,
+}
+
+impl HarmonicPrior {
+    /// Patterns of the rules that say so in a problem, and σ \[rad\].
+    pub fn rules(&self) -> impl Iterator<Item = (String, f64)> {
+        let of = |(order, sigma)| ["sin", "cos"].map(|wave| (format!("joint-harmonic.{wave}{order}"), sigma));
+        self.by_order.iter().copied().flat_map(of)
+    }
+
+    /// The same times a factor, to the digits that mean something.
+    fn scaled(&self, factor: f64) -> Self {
+        let rounded = |sigma: f64| format!("{sigma:.3e}").parse().unwrap_or(sigma);
+        Self { by_order: self.by_order.iter().map(|&(order, sigma)| (order, rounded(factor * sigma))).collect() }
+    }
+
+    /// σ of an order \[rad\].
+    fn sigma(&self, order: u32) -> Option<f64> {
+        let place = self.by_order.binary_search_by_key(&order, |own| own.0).ok()?;
+        self.by_order.get(place).map(|own| own.1)
+    }
+}
+
+/// The fit with every order of the joints whose harmonics are many, and their prior; the fit, settled, where they are few or no
+/// common prior can hold them.
+pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<HarmonicPrior>), IdentifyError> {
     let rules = rounds.data.rules;
     let coefficients = coefficients(&fitted);
     let all = |own| all_orders(own, &rounds.declared, rules.several_orders);
@@ -31,11 +64,12 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     if coefficients.len() < rules.many_coefficients || !takes_prior(&dense) {
         return Ok((fitted.settled(rounds.data, rounds.options)?, None));
     }
-    let squares: f64 = coefficients.iter().map(|&j| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
+    let squares: f64 = coefficients.iter().map(|&(j, _)| fitted.found.x[fitted.unknowns[j]].powi(2)).sum();
     let found = (squares / coefficients.len() as f64).sqrt();
-    let first = rounds.fit_on(with_scale(dense.clone(), found), &fitted)?;
-    let scale = best_scale(&first, rounds.data, found);
-    let mut filled = rounds.fit_towards(with_scale(dense, scale), &first)?;
+    let alike = HarmonicPrior { by_order: orders(&dense).into_iter().map(|order| (order, found)).collect() };
+    let first = rounds.fit_on(with_prior(dense.clone(), &alike), &fitted)?;
+    let prior = best_prior(&first, rounds.data, alike);
+    let mut filled = rounds.fit_towards(with_prior(dense, &prior), &first)?;
     // What more harmonics explain need not be explained by anything else.
     loop {
         let leaves = |tested: &Retested| {
@@ -46,7 +80,7 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
         if leaving.is_empty() {
             let in_passing = filled.found.in_passing;
             let whole = if in_passing { filled.settled(rounds.data, rounds.options)? } else { filled };
-            return Ok((whole, Some(scale)));
+            return Ok((whole, Some(prior)));
         }
         let kept = rounds.added(&filled).into_iter().filter(|own| !leaving.contains(own));
         let effects = kept.fold(rounds.declared.clone(), |all, own| joined(&all, &own));
@@ -54,20 +88,29 @@ pub(super) fn filled(rounds: &Rounds, fitted: Fitted) -> Result<(Fitted, Option<
     }
 }
 
-fn is_harmonic(driver: Driver) -> bool {
-    matches!(driver, Driver::Sine(..) | Driver::Cosine(..))
+/// Order of a harmonic.
+fn order(driver: Driver) -> Option<u32> {
+    match driver {
+        Driver::Sine(_, order) | Driver::Cosine(_, order) => Some(order),
+        _ => None,
+    }
 }
 
-/// Places of the coefficients of harmonics among the unknowns.
-fn coefficients(fitted: &Fitted) -> Vec<usize> {
-    let driver = |j: usize| fitted.model.parameters[fitted.unknowns[j]].driver;
-    (0..fitted.unknowns.len()).filter(|&j| is_harmonic(driver(j))).collect()
+/// Places of the coefficients of harmonics among the unknowns, and their orders.
+fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
+    let order = |j: usize| order(fitted.model.parameters[fitted.unknowns[j]].driver);
+    (0..fitted.unknowns.len()).filter_map(|j| Some((j, order(j)?))).collect()
+}
+
+/// Orders of all harmonics of a problem.
+fn orders(problem: &Problem) -> BTreeSet<u32> {
+    effect::parameters(problem).iter().filter_map(|own| order(own.driver)).collect()
 }
 
 /// Whether one prior in angles can hold all harmonics of a problem: none is of a joint that slides, and no rule speaks of any.
 fn takes_prior(problem: &Problem) -> bool {
     let takes = |own: &EffectParameter| own.unit() == Unit::Angle && rule_of(problem, own).is_none();
-    effect::parameters(problem).iter().filter(|own| is_harmonic(own.driver)).all(takes)
+    effect::parameters(problem).iter().filter(|own| order(own.driver).is_some()).all(takes)
 }
 
 /// Several orders of a joint that were found become all of them up to the highest but those declared.
@@ -86,23 +129,24 @@ fn all_orders(effect: Effect, declared: &[Effect], several: usize) -> Effect {
 }
 
 /// The problem with a prior for all harmonics.
-fn with_scale(mut problem: Problem, sigma: f64) -> Problem {
-    problem.parameters.push(ParameterRule {
-        pattern: HARMONICS.to_owned(),
+fn with_prior(mut problem: Problem, prior: &HarmonicPrior) -> Problem {
+    let rule = |(pattern, sigma)| ParameterRule {
+        pattern,
         freedom: Freedom::Free {
             sigma: Quantities { angle: Some(sigma), ..Quantities::default() },
             min: Quantities::default(),
             max: Quantities::default(),
         },
         location: problem.data.location.clone(),
-    });
+    };
+    let rules: Vec<ParameterRule> = prior.rules().map(rule).collect();
+    problem.parameters.extend(rules);
     problem
 }
 
-/// The scale \[rad\] of the prior on harmonics with which parts of the joints' ranges that are left out are predicted best,
-/// in the linear neighbourhood of the fit.
-fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
-    let own = coefficients(fitted);
+/// The prior on harmonics whose course over the orders all of them show, and with whose scale parts of the joints' ranges that are
+/// left out are predicted best, in the linear neighbourhood of the fit.
+fn best_prior(fitted: &Fitted, data: &Data, first: HarmonicPrior) -> HarmonicPrior {
     let linearised = fitted.linearised(data, &[]);
     let parts = parts_of_ranges(&fitted.problem, data);
     let squares = PartSquares::new(&linearised.fitted(), linearised.residual(), &parts);
@@ -111,23 +155,56 @@ fn best_scale(fitted: &Fitted, data: &Data, found: f64) -> f64 {
     // Weighed as fitted: where that took a σ larger than the declared one, priors counted for more.
     let weight = fitted.found.noise_factor.max(1.0).sqrt();
     let priors: Vec<(f64, Option<f64>)> = all.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
-    let error = |scale: f64| {
+    let own = coefficients(fitted);
+    let with = |prior: &HarmonicPrior| {
         let mut priors = priors.clone();
-        for &j in &own {
-            priors[j].1 = Some(scale / weight);
+        for &(j, order) in &own {
+            priors[j].1 = prior.sigma(order).map(|sigma| sigma / weight);
         }
-        squares.left_out(&priors)
+        priors
     };
-    let best = |powers: &[f64]| {
-        let tried = powers.iter().filter_map(|&power| Some((power, error(found * power.exp2())?)));
-        tried.min_by(|a, b| a.1.total_cmp(&b.1))
+    let tried = |prior: &HarmonicPrior, powers: &[f64]| {
+        let error = |&power: &f64| {
+            let prior = prior.scaled(power.exp2());
+            Some((squares.left_out(&with(&prior))?, prior))
+        };
+        powers.iter().filter_map(error).min_by(|a, b| a.0.total_cmp(&b.0))
     };
+    let finer = |(least, prior): (f64, HarmonicPrior), step: f64| {
+        tried(&prior, &[-step, step]).filter(|other| other.0 < least).unwrap_or((least, prior))
+    };
+    // Looser than that, coefficients of neighbouring orders are large and cancel: they would not show their course.
     let coarse: Vec<f64> = data.rules.prior_scales.clone().map(f64::from).collect();
-    let finer = |(power, least): (f64, f64), step: f64| {
-        best(&[power - step, power + step]).filter(|other| other.1 < least).unwrap_or((power, least))
+    let Some(alike) = tried(&first, &coarse).map(|own| finer(finer(own, 0.5), 0.25)) else { return first };
+    let course = (0..PASSES).fold(alike.1.clone(), |prior, _| {
+        let Some((x, variances)) = squares.posterior(&with(&prior)) else { return prior };
+        let expected: Vec<(u32, f64)> =
+            own.iter().map(|&(j, order)| (order, x[j].powi(2) + weight.powi(2) * variances[j])).collect();
+        smoothed(&prior, &expected, data.rules)
+    });
+    let best = tried(&course, &[0.0]).map(|own| finer(finer(own, 0.5), 0.25));
+    best.filter(|own| own.0 < alike.0).unwrap_or(alike).1
+}
+
+/// σₖ of every order from expected squares of the coefficients of all joints: their mean over neighbouring orders,
+/// σₖ² ∝ (Σ w c² + m c̄²) / (Σ w + m), w = exp(−(k' − k)² / (2 `order_width`²)), with `common_values` m squares of the mean size c̄²;
+/// of the same mean square over the coefficients as before.
+fn smoothed(prior: &HarmonicPrior, expected: &[(u32, f64)], rules: &SelectionRules) -> HarmonicPrior {
+    let count = expected.len().max(1) as f64;
+    let mean = expected.iter().map(|own| own.1).sum::<f64>() / count;
+    let of = |order: u32| {
+        let near = |own: u32| (-0.5 * ((f64::from(own) - f64::from(order)) / rules.order_width).powi(2)).exp();
+        let add = |(sum, weight): (f64, f64), own: &(u32, f64)| (sum + near(own.0) * own.1, weight + near(own.0));
+        let (sum, weight) = expected.iter().fold((rules.common_values * mean, rules.common_values), add);
+        (sum / weight).sqrt()
     };
-    let finest = best(&coarse).map(|own| finer(finer(own, 0.5), 0.25));
-    finest.map_or(found, |(power, _)| found * power.exp2())
+    let course = HarmonicPrior { by_order: prior.by_order.iter().map(|&(order, _)| (order, of(order))).collect() };
+    let size = |prior: &HarmonicPrior| {
+        let squares = expected.iter().filter_map(|own| prior.sigma(own.0)).map(|sigma| sigma.powi(2));
+        (squares.sum::<f64>() / count).sqrt()
+    };
+    let (before, after) = (size(prior), size(&course));
+    if before > 0.0 && after > 0.0 { course.scaled(before / after) } else { prior.clone() }
 }
 
 /// Identification poses in each part of the range of each joint that moves, as many in each.

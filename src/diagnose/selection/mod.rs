@@ -9,4 +9,4 @@ mod rounds;
 
 pub use crate::numeric::Interval;
 pub use close::{ClosedLoop, Found, Round, Verdict, close, close_by};
-pub use harmonics::HARMONICS;
+pub use harmonics::HarmonicPrior;
