@@ -96,6 +96,8 @@ pub(super) struct Block {
     coefficients: Coefficients,
     /// Whether it is of a function of several covariates.
     pub is_surface: bool,
+    /// Whether it is of an effect.
+    pub is_law: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -116,7 +118,14 @@ impl Block {
                 // The narrow side is transposed: this is the product that is fast.
                 gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
                 let normal = Normal::Dense { product: columns.tr_mul(fit.residual()), gram };
-                Self { columns: Columns::Dense(columns), normal, ln_prior, coefficients, is_surface: false }
+                Self {
+                    columns: Columns::Dense(columns),
+                    normal,
+                    ln_prior,
+                    coefficients,
+                    is_surface: false,
+                    is_law: false,
+                }
             }
             Design::Grouped { levers, groups } => {
                 let squares = levers.map(|value| value * value);
@@ -131,7 +140,14 @@ impl Block {
                         .into_owned(),
                 };
                 let normal = normal.whole_if_less_work();
-                Self { columns: Columns::Grouped { levers, groups }, normal, ln_prior, coefficients, is_surface: false }
+                Self {
+                    columns: Columns::Grouped { levers, groups },
+                    normal,
+                    ln_prior,
+                    coefficients,
+                    is_surface: false,
+                    is_law: false,
+                }
             }
         }
     }

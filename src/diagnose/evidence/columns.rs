@@ -39,7 +39,8 @@ impl Candidate {
             coefficients.largest.fill(f64::INFINITY);
         }
         let mut block = Block::new(design, neighbourhood, self.ln_prior, coefficients);
-        block.is_surface = self.hypothesis.effect().is_none() && self.hypothesis.depends_on.len() > 1;
+        block.is_law = self.hypothesis.effect().is_some();
+        block.is_surface = !block.is_law && self.hypothesis.depends_on.len() > 1;
         block
     }
 }
@@ -52,7 +53,7 @@ pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
 /// Slots whose columns the hypotheses need beside those of effects.
 pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
     let mut slots: Vec<Slot> = places(problem).collect();
-    slots.extend((0..3).map(|axis| Slot::Shift { axis }));
+    slots.extend((0..3).flat_map(|axis| [Slot::Shift { axis }, Slot::Turn { axis }]));
     for joint in 0..problem.joints.len() {
         slots.extend([JointField::Compliance, JointField::LateralX].map(|field| Slot::Joint { joint, field }));
         if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
@@ -214,6 +215,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             }
         }
         self.measurement(&known);
+        self.base(&known);
         self.warming(&known);
         self.repeats();
         self.sag();
@@ -405,6 +407,16 @@ impl<'a, 'l> Columns<'a, 'l> {
             self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);
+    }
+
+    /// How the base leans by what is no command: it stands on a floor that warms, creeps or gives way.
+    fn base(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> = (0..3).filter_map(|axis| self.linearised.place(Slot::Turn { axis })).collect();
+        let (slot, at) = (Slot::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let is_command = |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
+        for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
+            self.smooth("smooth at the base", slot, &at, of, &self.rules.smooth_lengths[..2]);
+        }
     }
 
     /// Another error in every configuration, which all positions measured in it share.

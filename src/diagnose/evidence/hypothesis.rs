@@ -86,9 +86,7 @@ impl Law {
     /// Whether it is the same law: of an effect whose time or order is searched with whatever one.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Effect(own), Self::Effect(other)) if own.is_searched() => {
-                own.name_and_place() == other.name_and_place()
-            }
+            (Self::Effect(own), Self::Effect(other)) => own.is_but_for_search(other),
             _ => self == other,
         }
     }

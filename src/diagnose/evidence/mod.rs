@@ -6,6 +6,7 @@
 //! sum, what knows no law: smooth functions of the same covariates at the same part, functions of two covariates, harmonics whose
 //! height and phase change, another value in every pose. So a law is probable only where it is better than what needs none.
 
+mod again;
 mod block;
 mod columns;
 mod explanation;
@@ -21,17 +22,16 @@ mod waves;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use rand::SeedableRng as _;
-use rand::seq::SliceRandom as _;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::covariate::Covariate;
-use super::data::{Data, bits, number};
+use super::data::Data;
 use super::fitted::Fitted;
 use super::rules::SelectionRules;
 use crate::identify::Noise;
 use crate::problem::Effect;
+use again::carried_by_one;
+pub(super) use again::stability;
 use block::Block;
 use columns::Candidate;
 pub use explanation::Explanation;
@@ -45,8 +45,6 @@ use waves::Waves;
 const NEGLIGIBLE: f64 = 1e-10;
 /// Shapes that are looked at more closely.
 const FINEST: usize = 4;
-/// Probability below which an explanation is not looked at in fits to fewer poses.
-const WORTH_A_DRAW: f64 = 1e-3;
 
 /// All explanations of a residual that were looked at.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +53,8 @@ pub struct Evidence {
     pub explanations: Vec<Explanation>,
     /// For hypotheses of the sure explanation, effects that do best in their place.
     stand_ins: Vec<(Hypothesis, Hypothesis)>,
+    /// Poses without which it was weighed, among those that are: each alone would have carried an effect.
+    pub(super) left_out: Vec<usize>,
 }
 
 /// What is claimed of a hypothesis, from the least to the most.
@@ -149,31 +149,39 @@ impl Evidence {
     /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
     /// first.
     pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
-        // Of one that is searched any time or order is the same.
-        let is_same = |one: &Effect, other: &Effect| {
-            one == other || (one.is_searched() && one.name_and_place() == other.name_and_place())
+        let others: Vec<Effect> = best.effects().into_iter().filter(|own| own != effect).collect();
+        // What an explanation holds beside these; of one that is searched another value stands for it where its own is not there.
+        let beside_others = |explanation: &Explanation| {
+            let mut rest = explanation.effects();
+            for other in &others {
+                let exact = rest.iter().position(|known| known == other);
+                let place = exact.or_else(|| rest.iter().position(|known| known.is_but_for_search(other)));
+                place.map(|place| rest.remove(place));
+            }
+            rest
         };
-        let has = |explanation: &Explanation, own: &Effect| {
-            explanation.hypotheses.iter().filter_map(Hypothesis::effect).any(|known| is_same(known, own))
-        };
-        let with: f64 =
-            self.explanations.iter().filter(|known| has(known, effect)).map(|known| known.probability).sum();
-        if with == 0.0 {
-            return Vec::new();
-        }
-        let mut others: Vec<(&Effect, f64)> = Vec::new();
-        for explanation in self.explanations.iter().filter(|known| !has(known, effect)) {
-            for other in explanation.hypotheses.iter().filter_map(Hypothesis::effect).filter(|other| !has(best, other))
-            {
-                match others.iter_mut().find(|(known, _)| *known == other) {
+        let mut with = 0.0;
+        // Each with the value of its argument that was most probable first, for explanations are sorted.
+        let mut instead: Vec<(Effect, f64)> = Vec::new();
+        for explanation in &self.explanations {
+            let rest = beside_others(explanation);
+            if rest.iter().any(|known| known.is_but_for_search(effect)) {
+                with += explanation.probability;
+                continue;
+            }
+            for other in rest {
+                match instead.iter_mut().find(|(known, _)| known.is_but_for_search(&other)) {
                     Some((_, probability)) => *probability += explanation.probability,
-                    None => others.push((other, explanation.probability)),
+                    None => instead.push((other, explanation.probability)),
                 }
             }
         }
-        others.retain(|(_, probability)| *probability >= with * beside);
-        others.sort_by(|a, b| b.1.total_cmp(&a.1));
-        others.into_iter().map(|(effect, _)| effect.clone()).collect()
+        if with == 0.0 {
+            return Vec::new();
+        }
+        instead.retain(|(_, probability)| *probability >= with * beside);
+        instead.sort_by(|a, b| b.1.total_cmp(&a.1));
+        instead.into_iter().map(|(effect, _)| effect).collect()
     }
 
     /// What is claimed of an effect; `None` where it is in no explanation.
@@ -215,7 +223,7 @@ impl Evidence {
 pub(super) fn ln_posterior(
     fitted: &Fitted,
     data: &Data,
-    added: &[Effect],
+    (added, left_out): (&[Effect], &[usize]),
     (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
     let rows = data.weighed();
@@ -225,7 +233,7 @@ pub(super) fn ln_posterior(
         None => functions.iter().any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis == *own),
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &[])?;
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &own, left_out)?;
     Some(search::ln_posterior(&blocks, &target, data.rules)? - target.noise.freedom * (fitted.sigma / sigma).ln())
 }
 
@@ -260,47 +268,6 @@ pub(super) fn best_form(
     let even = |(k, gain, size): (usize, f64, f64)| (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size);
     let (k, _, size) = gains(&forms)?.into_iter().map(even).max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some((k.checked_sub(1).map(|shaped| finer[shaped].0), size))
-}
-
-/// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth left out, whose most probable
-/// explanation holds it; linear about the fit to all.
-pub(super) fn stability(
-    fitted: &Fitted,
-    data: &Data,
-    (evidence, best): (&Evidence, &Explanation),
-    added: &[Effect],
-) -> Vec<(Effect, f64)> {
-    if best.effects().is_empty() {
-        return Vec::new();
-    }
-    let rows = data.weighed();
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let worth = || evidence.explanations.iter().filter(|known| known.probability > WORTH_A_DRAW);
-    let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
-    let is_known = |candidate: &&Candidate| {
-        all().any(|(own, (variant, _))| *variant == candidate.variant && *own == candidate.hypothesis)
-    };
-    let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_known).collect();
-    let present: Vec<usize> = (0..own.len())
-        .filter(|&k| best.hypotheses.iter().any(|known| known.says(&own[k].hypothesis) && known.effect().is_some()))
-        .collect();
-    let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
-    let count = configurations.iter().max().map_or(0, |last| last + 1);
-    let again = |seed: u64| {
-        let mut order: Vec<usize> = (0..count).collect();
-        order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
-        let left_out = &order[..count / data.rules.left_out];
-        let poses: Vec<usize> = (0..rows.len()).filter(|&pose| left_out.contains(&configurations[pose])).collect();
-        let (blocks, target) = blocks(fitted, data, &hypotheses, &own, &poses)?;
-        let most = search(&blocks, &target, data.rules, &present).into_iter().next()?;
-        Some(most.members.into_iter().filter_map(|k| own[k].hypothesis.effect().cloned()).collect::<Vec<Effect>>())
-    };
-    let drawn: Vec<Vec<Effect>> = (0..data.rules.drawn_again).into_par_iter().filter_map(again).collect();
-    let share = |effect: &Effect| {
-        let holds = drawn.iter().filter(|all| all.contains(effect)).count();
-        holds as f64 / drawn.len().max(1) as f64
-    };
-    best.effects().into_iter().map(|effect| (effect.clone(), share(&effect))).collect()
 }
 
 /// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
@@ -343,13 +310,31 @@ fn blocks(
     Some((blocks, target))
 }
 
-/// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again.
+/// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it again. A pose that alone carries an
+/// effect, however well, is left out: one row that is off shows no law.
 ///
 /// `None` where the residual is not a finite number, as that of a pose without equilibrium, or the end was asked for.
 pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
+    let mut left_out = Vec::new();
+    loop {
+        let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
+        match carried_by_one(fitted, data, (&evidence, &hypotheses)) {
+            Some(pose) if left_out.len() < data.rules.least_side => left_out.push(pose),
+            _ => return Some(evidence),
+        }
+    }
+}
+
+/// The same without some poses, and the hypotheses that were weighed.
+fn weighed_without<'a>(
+    fitted: &'a Fitted,
+    data: &Data<'a>,
+    added: &[Effect],
+    left_out: &[usize],
+) -> Option<(Evidence, Hypotheses<'a>)> {
     let rows = data.weighed();
     let mut hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let (mut blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), &[])?;
+    let (mut blocks, target) = blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), left_out)?;
     let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
@@ -358,14 +343,14 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
         return None;
     }
     let (own, rules) = (&hypotheses, data.rules);
-    let waves = Waves { hypotheses: own, blocks: &blocks, target: &target, fitted, rules, left_out: &[] };
+    let waves = Waves { hypotheses: own, blocks: &blocks, target: &target, fitted, rules, left_out };
     let waves = waves.promising(&weighted);
     if !waves.is_empty() {
-        blocks.extend(waves.iter().map(|wave| wave.block((fitted, &target.fit), &[])));
+        blocks.extend(waves.iter().map(|wave| wave.block((fitted, &target.fit), left_out)));
         hypotheses.all.extend(waves);
         weighted = search(&blocks, &target, data.rules, &present);
     }
-    let block = |own: &Candidate| own.block((fitted, &target.fit), &[]);
+    let block = |own: &Candidate| own.block((fitted, &target.fit), left_out);
     let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), block, (&fitted.problem, data.rules));
     if !finer.is_empty() {
         blocks.extend(finer.iter().map(block));
@@ -403,11 +388,11 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut evidence = Evidence { explanations, stand_ins: Vec::new() };
+    let mut evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
     if let Some(best) = evidence.sure(data.rules.sure) {
         evidence.stand_ins = stand_ins(best, &hypotheses, (&blocks, &target), data.rules);
     }
-    Some(evidence)
+    Some((evidence, hypotheses))
 }
 
 /// For each hypothesis of an explanation the few other effects, one of a family at each place, that do best in its place, if at least half as
@@ -449,6 +434,38 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_stands_for_one_effect_is_none_of_the_others_with_it() {
+        let shift = |time: f64| Effect::StationShift { at_time: time };
+        let drift = || Effect::TrackerDrift;
+        let settling = || Effect::TrackerSettling { time_constant: 50.0 };
+        let of = |effects: &[Effect], probability: f64| Explanation {
+            hypotheses: effects
+                .iter()
+                .map(|effect| Hypothesis {
+                    law: Law::Effect(effect.clone()),
+                    part: Part::Measurement,
+                    slot: None,
+                    depends_on: vec![Covariate::Time],
+                })
+                .collect(),
+            probability,
+            functions: vec![(0, 1.0); effects.len()],
+        };
+        let explanations = vec![
+            of(&[shift(10.0), drift()], 0.6),
+            of(&[shift(10.0), shift(30.0)], 0.1),
+            of(&[shift(31.0), shift(10.0)], 0.1),
+            of(&[shift(12.0), drift()], 0.1),
+            of(&[settling(), shift(10.0)], 0.1),
+        ];
+        let best = explanations[0].clone();
+        let evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: Vec::new() };
+        // Two later moves together are twice as probable as settling.
+        assert_eq!(evidence.alternatives(&drift(), &best, 0.1), [shift(30.0), settling()]);
+        assert_eq!(evidence.alternatives(&shift(10.0), &best, 0.1), []);
+    }
+
+    #[test]
     fn a_wave_is_as_sure_as_it_is_and_not_as_another_beside_it() {
         let wave = |order: f64| Hypothesis {
             law: Law::Effect(Effect::JointWave { joint: 1, order }),
@@ -463,7 +480,7 @@ mod tests {
         };
         let explanations =
             vec![of(&[6.4, 1.5], 0.5), of(&[6.4], 0.25), of(&[6.41, 1.5], 0.125), of(&[1.6, 6.4], 0.125)];
-        let evidence = Evidence { explanations, stand_ins: Vec::new() };
+        let evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         let law = |order: f64| evidence.claims(&wave(order)).law.1;
         // 6.41 stands for 6.4 and 1.6 for 1.5, but neither 6.4 for 1.5 nor the reverse.
         assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));

@@ -1,6 +1,6 @@
 //! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -17,6 +17,8 @@ const SETTLING: usize = 4;
 const LIKELY: usize = 32;
 /// Sets in which a function of several covariates is taken apart, the most probable ones.
 const SPLIT: usize = 3;
+/// Times that the best set is changed by more than one member, each time the best of those before.
+const CHANGES: usize = 4;
 
 /// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
@@ -55,12 +57,17 @@ impl Set {
         }
     }
 
+    /// Whether a member has another value in so many poses that the set is not extended.
+    fn has_wide(&self, blocks: &[Block], rules: &SelectionRules) -> bool {
+        self.members.iter().any(|&member| blocks[member].is_wide(rules))
+    }
+
     /// The same with the size of each member beside all others, and its posterior at these sizes.
     ///
     /// Sizes are in units of the noise, which an effect that is not yet explained is taken for: what was taken first would be held too
     /// tightly. ln p(r | set) = l + Σ (ln p(r | the others, k) − l), l at the sizes of all, of k summed over its own.
     fn settled(mut self, (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Self {
-        if self.members.len() < 2 || self.members.iter().any(|&member| blocks[member].is_wide(rules)) {
+        if self.members.len() < 2 || self.has_wide(blocks, rules) {
             return self;
         }
         let own = Products::of(&self.members, blocks, target);
@@ -189,6 +196,11 @@ impl Conditioned {
         Self::new(&assembled(members, blocks, target, rules)?, blocks, target)
     }
 
+    /// What is left of the residual, everything fitted projected out.
+    pub fn left(&self, target: &Target) -> DVector<f64> {
+        target.fit.residual() - self.within.tr_mul(&self.taken)
+    }
+
     /// The gain of a block, its prior among it, and its most probable size.
     pub fn odds(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
         let (gain, size) = self.gain(block, target, rules);
@@ -247,8 +259,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             }
             promising
         });
-        let has_wide = |set: &Set| set.members.iter().any(|&member| blocks[member].is_wide(rules));
-        let best = sets.into_iter().filter(|set| !has_wide(set)).take(rules.extended).collect::<Vec<_>>();
+        let best = sets.into_iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).collect::<Vec<_>>();
         front = best.into_par_iter().map(|set| set.settled((blocks, target), rules)).collect();
         front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
@@ -256,7 +267,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             break;
         }
     }
-    split(&mut known, (blocks, target), rules);
+    changed(&mut known, &promising.unwrap_or(every), (blocks, target), rules);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
@@ -282,33 +293,53 @@ fn extended(set: &Set, tried: &[usize], (blocks, target): (&[Block], &Target), r
     gains.into_iter().map(|(block, gain)| set.with(block, gain, blocks)).collect()
 }
 
-/// Where a likely set holds a function of several covariates, what acts there may be two things: adds the sets with two others in its
-/// place, which steps by one hypothesis lead to only past sets that explain less.
-fn split(known: &mut BTreeMap<Vec<usize>, Set>, (blocks, target): (&[Block], &Target), rules: &SelectionRules) {
-    let best = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-    let surface = |set: &Set| set.members.iter().copied().find(|&member| blocks[member].is_surface);
-    let mut likely: Vec<&Set> = known.values().filter(|set| set.ln_posterior > best - rules.hopeless).collect();
-    likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-    let laws: Vec<usize> = (0..blocks.len()).filter(|&block| !blocks[block].is_surface).collect();
-    let mut rests: Vec<Vec<usize>> = Vec::new();
-    for set in likely {
-        let Some(surface) = surface(set) else { continue };
-        let rest = set.members.iter().copied().filter(|&member| member != surface).collect::<Vec<_>>();
-        if rests.len() < SPLIT && !rests.iter().any(|known| sorted(known) == sorted(&rest)) {
-            rests.push(rest);
+/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members,
+/// and with two others in its place. So two things that act beside one another are found where a third, or a function of several
+/// covariates, does for both as well as one hypothesis can.
+fn changed(
+    known: &mut BTreeMap<Vec<usize>, Set>,
+    promising: &[usize],
+    (blocks, target): (&[Block], &Target),
+    rules: &SelectionRules,
+) {
+    let plain: Vec<usize> = (0..blocks.len()).filter(|&block| !blocks[block].is_surface).collect();
+    let laws: Vec<usize> = promising.iter().copied().filter(|&block| blocks[block].is_law).collect();
+    let mut tried: BTreeSet<Vec<usize>> = BTreeSet::new();
+    for _ in 0..CHANGES {
+        let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks, rules)).collect();
+        likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
+        likely.retain(|set| set.ln_posterior > best - rules.hopeless);
+        let is_surface = |member: &usize| blocks[*member].is_surface;
+        let surfaces = likely.iter().filter_map(|set| Some((set.members.iter().copied().find(is_surface)?, *set)));
+        let of_best = likely.iter().take(1).flat_map(|set| set.members.iter().map(move |&member| (member, *set)));
+        let mut rests: Vec<(Vec<usize>, usize)> = Vec::new();
+        for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
+            let rest: Vec<usize> = set.members.iter().copied().filter(|&member| member != gone).collect();
+            if tried.insert(sorted(&rest)) {
+                rests.push((rest, gone));
+            }
         }
-    }
-    for rest in rests {
-        let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
-        let mut one = extended(&rest, &laws, (blocks, target), rules);
-        one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        let has_wide = |set: &Set| set.members.iter().any(|&member| blocks[member].is_wide(rules));
-        for set in one.iter().filter(|set| !has_wide(set)).take(rules.extended) {
-            let likely = |two: &Set| two.ln_posterior > best - rules.hopeless;
-            for two in extended(set, &laws, (blocks, target), rules).into_iter().filter(likely) {
-                let own = known.entry(sorted(&two.members)).or_insert_with(|| two.clone());
-                if two.ln_posterior > own.ln_posterior {
-                    *own = two;
+        if rests.is_empty() {
+            return;
+        }
+        for (rest, gone) in rests {
+            let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
+            let others = if blocks[gone].is_surface { &plain } else { &laws };
+            let others: Vec<usize> = others.iter().copied().filter(|&other| other != gone).collect();
+            let mut one = extended(&rest, &others, (blocks, target), rules);
+            one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+            let narrow = one.iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);
+            let two: Vec<Set> = narrow.flat_map(|set| extended(set, &others, (blocks, target), rules)).collect();
+            let mut new: Vec<Set> =
+                one.into_iter().chain(two).filter(|set| set.ln_posterior > best - rules.hopeless).collect();
+            new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+            let (first, others) = new.split_at(new.len().min(rules.extended));
+            let settled = first.par_iter().map(|set| set.clone().settled((blocks, target), rules)).collect::<Vec<_>>();
+            for set in std::iter::once(rest).chain(settled).chain(others.iter().cloned()) {
+                let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+                if set.ln_posterior > own.ln_posterior {
+                    *own = set;
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! The whole story: before, what was found, after, what remains.
 
+use std::collections::BTreeSet;
+
 use super::super::candidates::Candidates;
 use super::super::data::Data;
 use super::super::evidence::{Claims, Evidence, Explanation, Hypothesis, ln_posterior, stability, weigh};
@@ -174,7 +176,10 @@ pub fn close_by(
         (true, false) => Verdict::Explained,
     };
     let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &data.split.held_out));
-    let set_aside = fitted.set_aside.iter().map(|&row| data.measurements.location(row)).collect();
+    let weighed = data.weighed();
+    let carried = evidence.iter().flat_map(|all| &all.left_out).map(|&pose| weighed[pose]);
+    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(carried).collect();
+    let set_aside = aside.into_iter().map(|row| data.measurements.location(row)).collect();
     Ok(ClosedLoop {
         verdict,
         interrupted,
@@ -289,8 +294,9 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     let added = rounds.added(fitted);
     let held = evidence.sure(rules.sure).filter(|best| !best.hypotheses.is_empty() && is_held(best, &added));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
+    let left_out = evidence.left_out.clone();
     let odds_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
-        unless_stopped(data, || ln_posterior(fitted, data, &rounds.added(fitted), (functions, sigma)))
+        unless_stopped(data, || ln_posterior(fitted, data, (&rounds.added(fitted), &left_out), (functions, sigma)))
     };
     let functions = best.without_law();
     let Some(own) = odds_of(fitted, &functions, fitted.sigma)? else { return Ok((evidence, None)) };
@@ -334,7 +340,7 @@ fn stands(fitted: &Fitted, data: &Data, added: &[Effect], functions: usize) -> R
     Ok(best.is_some_and(|best| is_held(best, added) && best.without_law().len() <= functions))
 }
 
-/// Factors of a time constant or distance that are tried in its place: between one listed value and the next.
+/// Factors of a time constant or distance that are tried in its place, where they are none of the list: between one and the next.
 const FINER: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
 /// The fit with an added effect exchanged for a better one, if there is one, once all others are in.
@@ -346,7 +352,9 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     let mut candidates = Candidates::of(&fitted.problem, rounds.data).testable;
     // Of a time constant or distance those between the listed ones too.
     let nearer = |effect: &Effect| FINER.iter().filter_map(|factor| effect.scaled(*factor)).collect::<Vec<_>>();
-    candidates.extend(added.iter().filter(|effect| effect.has_memory()).flat_map(nearer));
+    let finer: Vec<Effect> = added.iter().filter(|effect| effect.has_memory()).flat_map(nearer).collect();
+    let finer = finer.into_iter().filter(|effect| !candidates.contains(effect)).collect::<Vec<_>>();
+    candidates.extend(finer);
     let linearised = fitted.linearised(rounds.data, &candidates);
     let replacements = Replacements::new(fitted, &linearised, &candidates, rounds.data);
     for effect in &added {
@@ -410,9 +418,7 @@ fn alternatives((evidence, best): (&Evidence, &Explanation), effect: &Effect, be
     let mut all: Vec<Effect> = Vec::new();
     for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best, beside)) {
         let is_known = |known: &Effect| known.name_and_place() == other.name_and_place();
-        // Other times of the same shift are the same effect; other orders of a harmonic are not.
-        let is_own = effect.is_searched() && is_known(effect);
-        if !is_own && !all.iter().any(is_known) {
+        if !all.iter().any(is_known) {
             all.push(other);
         }
     }

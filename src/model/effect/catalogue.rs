@@ -117,6 +117,11 @@ impl Effect {
         self.family().searched.is_some()
     }
 
+    /// Whether it is the same effect, whatever the value of the argument that is searched.
+    pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
+        self == other || (self.is_searched() && self.name_and_place() == other.name_and_place())
+    }
+
     /// Whether it remembers the poses before, as another effect of its family at the same place does for another time or distance.
     pub(crate) fn remembers_like(&self, other: &Self) -> bool {
         self.has_memory() && self.name_and_place() == other.name_and_place()
