@@ -65,7 +65,11 @@ impl<'a> Kinds<'a> {
 /// Whether an effect is in the model with others, and nothing speaks for it by itself: evidence weighs it in no set, and chance does as
 /// well. Of many orders under one prior none may stand out.
 pub(super) fn is_beside(closure: &ClosedLoop, found: &Found) -> bool {
-    closure.harmonic_sigma.is_none() && found.claims.is_none() && found.p_value >= SelectionRules::DEFAULT.leaving_level
+    closure.harmonic_sigma.is_none() && is_unsupported(found)
+}
+
+fn is_unsupported(found: &Found) -> bool {
+    found.claims.is_none() && found.p_value >= SelectionRules::DEFAULT.leaving_level
 }
 
 /// How many effects were found, and how many causes whose laws are not sure.
@@ -198,6 +202,8 @@ fn lower(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::ErrorSummary;
+    use crate::problem::Effect;
 
     #[test]
     fn nothing_is_said_surer_than_it_is_known() {
@@ -213,6 +219,21 @@ mod tests {
         assert_eq!(words(0.999, 0.0), (true, "something at joint 2 (over 99 %) whose law is not known".to_owned()));
         assert_eq!(title(0.999, 0.0), "joint 2: its law is not known");
         assert!(!words(0.2, 0.001).1.contains("wave") && !title(0.2, 0.001).contains("wave"));
+    }
+
+    #[test]
+    fn what_chance_does_as_well_is_not_found() {
+        let found = |p_value: f64| Found {
+            effect: Effect::GearRatio { joint: 1 },
+            claims: None,
+            p_value,
+            estimates: Vec::new(),
+            alternatives: Vec::new(),
+            stability: None,
+            witness: None,
+            held_out_after: ErrorSummary::default(),
+        };
+        assert!(is_unsupported(&found(1.0)) && !is_unsupported(&found(1e-6)));
     }
 
     #[test]

@@ -222,6 +222,15 @@ fn what_keeps_the_loop_from_finding_is_said() {
 }
 
 #[test]
+fn laws_that_were_not_tried_for_want_of_a_reference_are_said() {
+    let bench = Bench::new(THERMAL);
+    bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
+    let told = bench.told(&["loop", "arm", "-v"]);
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("were not tried because the problem declares no reference_temperature_C"), "{told}");
+}
+
+#[test]
 fn the_trace_ranks_and_says_why_not() {
     let bench = Bench::new(THERMAL);
     let json = bench.json(&["trace", "arm"]);
