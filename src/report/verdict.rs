@@ -68,6 +68,7 @@ pub(super) fn is_beside(closure: &ClosedLoop, found: &Found) -> bool {
     closure.harmonic_sigma.is_none() && is_unsupported(found)
 }
 
+/// Whether evidence weighs an effect in no set, and chance does as well.
 fn is_unsupported(found: &Found) -> bool {
     found.claims.is_none() && found.p_value >= SelectionRules::DEFAULT.leaving_level
 }
