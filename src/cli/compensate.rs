@@ -70,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
     }
+    identify::check_target_columns(&problem, &targets)?;
     let placement = identify::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let estimate = SavedEstimate::read(&arguments.estimate)?;
@@ -77,6 +78,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (x, trusted) = (estimate.vector(&problem, &model)?, estimate.trusted);
     if !trusted && !common.quiet {
         diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
+    }
+    // Waypoints go with the base, wherever it is.
+    let is_seen = targets.position_measured && matches!(arguments.frame, Frame::Measuring);
+    if is_seen && estimate.leaves_base_open() && !common.quiet {
+        diagnostic::warn(
+            "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \
+             happens to be assumed; --frame base takes them in the frame of the base",
+        );
     }
     // As they are shown, and as they are sought: in the measuring frame.
     let (targets, sought) = match (targets.position_measured, arguments.frame) {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::identify::{Placement, SavedEstimate};
+use flexcal::identify::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -113,6 +113,7 @@ fn errors(
     if !quiet {
         diagnostic::print_warnings(&warnings);
     }
+    check_columns(problem, &rows)?;
     let data = Dataset::of(problem, rows)?;
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);

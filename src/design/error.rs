@@ -66,11 +66,15 @@ impl DesignError {
 
     /// Nothing says how exact positions will be.
     pub(super) fn no_sigma(problem: &Problem) -> Self {
-        let mut write = "the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)".to_owned();
-        if !problem.fixtures.is_empty() {
-            write += "; poses that are to touch or to measure against something stand in a table that says so in a column point, anchor or \
-                      surface: --candidates FILE.csv";
-        }
+        let sigma = "the 1 σ of a coordinate to reckon with (or give the poses a column sigma_mm)";
+        let write = if problem.fixtures.is_empty() {
+            sigma.to_owned()
+        } else {
+            format!(
+                "--candidates FILE.csv, a table that says in a column point, anchor or surface what each pose is to touch or to measure \
+                 against; of poses whose positions are measured, {sigma}"
+            )
+        };
         let location = problem.data.location.clone().with_key("data.position_sigma_mm");
         location.error(InputErrorKind::MissingKey { write, near: None }).into()
     }

@@ -29,6 +29,8 @@ pub struct Detection {
     pub effects: Vec<Detectable>,
     /// The others, and why they cannot.
     pub untestable: Vec<(Effect, &'static str)>,
+    /// Whether the poses have no times yet, and are taken to be measured one after another, a minute apart.
+    pub times_assumed: bool,
 }
 
 /// From what size on an effect is found.
@@ -69,12 +71,14 @@ impl Size {
 ///
 /// LinearNeighbourhood about the nominal arm. With the columns C of an effect's parameters p, everything free projected out as a fit with
 /// priors does, an effect of size p has the noncentrality λ = pᵀ CᵀC p; it is found if F on k and ν − k degrees of freedom is
-/// beyond level / tries. Poses without a time are taken to be a minute apart.
+/// beyond level / tries. Poses without a time are taken to be a minute apart; of rows that are measured already no more than the
+/// order is known then.
 ///
 /// # Errors
 /// Rules of `[parameters]` do not fit the arm.
 pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
-    let poses = timed(poses);
+    let is_known = poses.time_measured || poses.position_measured;
+    let poses = if is_known { poses.clone() } else { timed(poses) };
     let Candidates { testable, untestable } = candidates(problem, &poses);
     let (tries, families) = tries(&testable, problem);
     let effects = with_linear(problem, &poses, &testable, |linearised, linear| {
@@ -84,7 +88,7 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
         };
         testable.par_iter().zip(tries).map(sizes).collect()
     })?;
-    Ok(Detection { power: RULES.power, level: RULES.level, effects, untestable })
+    Ok(Detection { power: RULES.power, level: RULES.level, effects, untestable, times_assumed: !is_known })
 }
 
 /// The poses with times.

@@ -414,6 +414,8 @@ pub enum WarningKind {
     UnitIgnored { write: String },
     #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", more(*rows))]
     RowsRepeated { rows: usize, first: String },
+    #[error("the time goes back by {back} s from the row before{}; rows are taken in the order of their times", further(*rows))]
+    TimeGoesBack { rows: usize, back: String },
     #[error(
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
     )]
@@ -428,6 +430,10 @@ pub enum WarningKind {
 
 fn more(rows: usize) -> String {
     if rows > 1 { format!(", and {} further rows repeat others", rows - 1) } else { String::new() }
+}
+
+fn further(rows: usize) -> String {
+    if rows > 1 { format!(", and in {} further row{}", rows - 1, plural(rows - 1)) } else { String::new() }
 }
 
 /// Where a column goes that is not a known one written wrongly.

@@ -31,6 +31,8 @@ pub enum UrdfMistake {
     Repeated { what: &'static str, name: String },
     #[error("\"{text}\" is not {count} finite number{}", if *count == 1 { "" } else { "s" })]
     NotNumbers { text: String, count: usize },
+    #[error("a mass of {text} kg is negative")]
+    NegativeMass { text: String },
     #[error("the axis has no direction")]
     NoAxis,
     #[error(

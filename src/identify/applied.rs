@@ -3,6 +3,7 @@
 use nalgebra::{DVector, Vector3};
 
 use super::errors::of_kind;
+use super::needed::check_columns;
 use super::outliers::outlying;
 use super::placement::UNKNOWN_SIGMA;
 use super::predict::{Residual, in_space};
@@ -106,13 +107,14 @@ impl ErrorsBySession {
 /// are held out, where that is known.
 ///
 /// # Errors
-/// The estimate is not of this problem, or lacks a parameter that the rows need.
+/// The estimate is not of this problem, or lacks a parameter that the rows need, or the rows lack a column that an effect needs.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,
     rows: &Measurements,
     split: Option<&Split>,
 ) -> Result<Prediction, PredictError> {
+    check_columns(problem, rows)?;
     let placement = Placement::of(rows);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let model = estimate.map_or(model.clone(), |estimate| estimate.model(model));

@@ -9,6 +9,7 @@ use super::active::ActiveConstraint;
 use super::covariance::Collected;
 use super::fitting::{FitEnd, Fitting};
 use super::judgement::Judgement;
+use super::needed::check_columns;
 use super::noise::{fitted, taken};
 use super::noise_model::{LEAST_NOISE, NoiseModel};
 use super::outcome::{Estimate, Identification, Noise, enter};
@@ -24,9 +25,8 @@ use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::Dataset;
 use crate::model::Model;
-use crate::model::effect::Columns;
 use crate::model::parameter::Parameter;
-use crate::problem::{Effect, EffectDeclaration, Problem, Robust, RobustLoss};
+use crate::problem::{Effect, Problem, Robust, RobustLoss};
 
 /// How to identify: [`Options::default()`] with what the `with_…` methods change.
 #[derive(Clone, Default)]
@@ -208,17 +208,7 @@ fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> R
             return Err(error(InputErrorKind::NoPositionSigma));
         }
     }
-    let columns = Columns {
-        temperature: measurements.temperature.is_some(),
-        approach: measurements.approach.is_some(),
-        time: measurements.time_measured,
-        covariates: measurements.covariates.len() == problem.data.covariates.len() * measurements.len(),
-    };
-    for EffectDeclaration { effect, location } in &problem.effects {
-        if let Some(write) = effect.missing_column(problem, columns) {
-            return Err(location.clone().error(InputErrorKind::NeedsColumn { write }).into());
-        }
-    }
+    check_columns(problem, measurements)?;
     if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
 }
 

@@ -17,6 +17,9 @@ use crate::problem::item::GREATEST;
 /// Largest estimate.json that is read [MiB].
 const LARGEST_MIB: u64 = 256;
 
+/// Identified part from which on a parameter is known but for rounding.
+const IDENTIFIED: f64 = 0.99;
+
 /// What an estimate.json says of the arm.
 #[derive(Debug, Clone)]
 pub struct SavedEstimate {
@@ -40,6 +43,9 @@ struct Entry {
     name: String,
     nominal: f64,
     estimate: f64,
+    /// Not there where it has none, or in what older versions wrote.
+    std_error: Option<f64>,
+    identified: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -113,7 +119,7 @@ impl SavedEstimate {
             own.name = one_line(&own.name);
         }
         let mut names = HashSet::new();
-        for Entry { name, nominal, estimate } in &parameters {
+        for Entry { name, nominal, estimate, .. } in &parameters {
             if !names.insert(name.as_str()) {
                 return Err(SavedEstimateError::Twice { file, name: name.clone() });
             }
@@ -169,6 +175,13 @@ impl SavedEstimate {
             return Err(SavedEstimateError::OtherArm { file: file() });
         }
         Ok(())
+    }
+
+    /// Whether the rows that were fitted leave open where a base is in its measuring frame, as contacts with sockets of unknown places do.
+    pub fn leaves_base_open(&self) -> bool {
+        let is_base = |own: &&Entry| own.name.starts_with("base.") || own.name.starts_with("base[");
+        let is_open = |own: &Entry| own.std_error.is_none() && own.identified.is_some_and(|part| part < IDENTIFIED);
+        self.parameters.iter().filter(is_base).any(is_open)
     }
 
     /// Words in brackets behind `base` or `tool`, in the order of the file; one that is empty where there are none.

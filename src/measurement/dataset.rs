@@ -58,6 +58,7 @@ impl Dataset {
     pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
         warnings.extend(measurements.repeated_rows());
+        warnings.extend(measurements.time_going_back());
         Ok((Self::of(problem, measurements)?, warnings))
     }
 
@@ -68,6 +69,7 @@ impl Dataset {
     pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
         warnings.extend(measurements.repeated_rows());
+        warnings.extend(measurements.time_going_back());
         Ok((Self::of(problem, measurements)?, warnings))
     }
 }

@@ -1,8 +1,10 @@
 //! Rows in the order in which they were measured, session by session: what was before a pose.
 
+use std::collections::HashMap;
 use std::sync::OnceLock;
 
 use super::Measurements;
+use crate::error::{Warning, WarningKind};
 use crate::problem::Past;
 
 /// The order of a table's rows, found when it is first asked for; a copy finds its own, for its rows may change.
@@ -75,6 +77,24 @@ impl Measurements {
         between.get(between.len() / 2).filter(|_| self.time_measured).map(|median| (*median, longest))
     }
 
+    /// A warning where the time of a row is before that of the row above it, in one file and session.
+    pub fn time_going_back(&self) -> Option<Warning> {
+        if !self.time_measured {
+            return None;
+        }
+        let file = |row: usize| self.origin.get(row).map(|own| own.0);
+        let session = |row: usize| self.session.of_row.get(row);
+        let mut last: HashMap<_, f64> = HashMap::new();
+        let mut back: Vec<(usize, f64)> = Vec::new();
+        for row in 0..self.len() {
+            let before = last.insert((file(row), session(row)), self.time[row]);
+            back.extend(before.map(|before| (row, before - self.time[row])).filter(|(_, by)| *by > 0.0));
+        }
+        let &(row, by) = back.first()?;
+        let kind = WarningKind::TimeGoesBack { rows: back.len(), back: format!("{by:.3}") };
+        Some(Warning { location: self.location(row), kind })
+    }
+
     fn found(&self) -> &Found {
         self.order.0.get_or_init(|| Found::of(self))
     }
@@ -114,7 +134,8 @@ mod tests {
     fn what_was_before_goes_by_time_within_a_session() {
         let table = Measurements {
             joints: 2,
-            origin: vec![(0, 0); 5],
+            files: vec!["table.csv".into()],
+            origin: (2..7).map(|line| (0, line)).collect(),
             positions: vec![nalgebra::Vector3::zeros(); 5],
             configurations: (0..10).map(f64::from).collect(),
             time: vec![5.0, 0.0, 3.0, 1.0, 4.0],
@@ -124,12 +145,17 @@ mod tests {
             ..Measurements::default()
         };
         assert_eq!(table.clock(), Some((2.0, 5.0)));
+        // Row 1 is before row 0 in session a, row 3 before row 2 in session b.
+        let warning = table.time_going_back().unwrap();
+        assert_eq!(warning.kind, WarningKind::TimeGoesBack { rows: 2, back: "5.000".to_owned() });
+        assert_eq!(warning.location.line, Some(3));
         let past = table.past(0);
         assert_eq!((past.times, past.temperatures), ([0.0, 4.0].as_slice(), [21.0, 24.0].as_slice()));
         assert_eq!((past.configurations, past.approaches), ([2.0, 3.0, 8.0, 9.0].as_slice(), [].as_slice()));
         assert_eq!(table.past(2).times, [1.0]);
         assert!(table.past(1).times.is_empty() && table.past(3).configurations.is_empty());
         let in_order = table.select(&[1, 4, 0, 3, 2]);
+        assert_eq!(in_order.time_going_back(), None);
         assert_eq!((in_order.past(2).times, in_order.past(4).temperatures), (past.times, [23.0].as_slice()));
     }
 }

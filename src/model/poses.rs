@@ -10,7 +10,7 @@ use super::derivative::Linearised;
 use super::driven::Commands;
 use super::observation::between;
 use super::pose::Pose;
-use super::tilt::Tilts;
+use super::tilt::{Tilts, rigid_tilts};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::mechanics::{Equilibrated, Shape, Workspace};
 use crate::problem::Observation;
@@ -218,6 +218,34 @@ impl Model {
             instrument.of(&base.point(&tip.point(&targets[pose.target])), &pose.setup)
         };
         poses.iter().map(position).collect()
+    }
+
+    /// Residuals measured − predicted of poses, whatever they measure, as the geometry alone predicts them at the full parameter vector
+    /// `x` \[m\], of tilts \[rad\]; points, anchors and surfaces are where `x` has them.
+    pub fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+        let arm = self.arm(|k| x[k]);
+        let (bases, targets, instrument) = (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
+        let fixtures = self.fixtures(x);
+        let mut commands = Commands::new(&self.driven, &[], &[]);
+        let residual = |pose: &Pose| {
+            let setup = commands.apply(&pose.setup);
+            let seen = match pose.observation {
+                Observation::Between(first, second) => between(&fixtures[first], &fixtures[second]).seen,
+                Observation::Tilt(frame) => rigid_tilts(&arm, &setup, frame),
+                of => {
+                    let base = instrument.base(&bases[pose.base], &pose.setup);
+                    let tip = arm.rigid_frame(&setup, self.carrier(pose.target));
+                    let position = base.point(&tip.point(&targets[pose.target]));
+                    match of.fixture() {
+                        Some(fixture) if of.is_point() => base.resolve(&fixtures[fixture].seen(&position)),
+                        Some(fixture) => fixtures[fixture].seen(&position),
+                        None => instrument.of(&position, &pose.setup),
+                    }
+                }
+            };
+            pose.measured - seen
+        };
+        poses.iter().map(residual).collect()
     }
 
     /// The arm as a line to the target at the full parameter vector `x`, measuring frame \[m\]; `None` without equilibrium.

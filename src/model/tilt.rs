@@ -1,7 +1,7 @@
 //! Tilts of frames of the arm against gravity, and their derivatives.
 
 use nalgebra::{DVector, Vector3};
-use num_dual::{Dual64, DualNum as _};
+use num_dual::Dual64;
 
 use super::Model;
 use super::elastic::seed_arm;
@@ -9,6 +9,7 @@ use super::inputs::Input;
 use super::rows::Rows;
 use crate::mechanics::{Arm, Equilibrated, Workspace};
 use crate::problem::PoseView;
+use crate::scalar::Scalar;
 
 /// Least squared cosine of a tilt, so that one of a right angle has a derivative.
 const UPRIGHT: f64 = 1e-18;
@@ -65,7 +66,11 @@ impl Tilts {
     }
 }
 
-/// How far the x and the y axis of a frame lie above the horizontal: sin τ = a·u with u up, against gravity.
+/// The tilts of a frame of the arm that does not deflect \[rad\], 0 behind them.
+pub(super) fn rigid_tilts(arm: &Arm<f64>, setup: &PoseView, frame: usize) -> Vector3<f64> {
+    above(&arm.rigid_frame(setup, frame.min(arm.last())).axes, &arm.gravity)
+}
+
 fn tilts(
     arm: &Arm<Dual64>,
     setup: &PoseView,
@@ -73,16 +78,21 @@ fn tilts(
     rest: &Equilibrated,
     ws: &mut Workspace<Dual64>,
 ) -> Vector3<Dual64> {
-    let zero = Dual64::from(0.0);
-    let weight = arm.gravity.dot(&arm.gravity).sqrt();
-    let up = if weight.re > 0.0 { -arm.gravity / weight } else { Vector3::new(zero, zero, Dual64::from(1.0)) };
     let frames = arm.frames(setup, rest, ws);
-    let Some(frame) = frames.get(frame).or(frames.last()) else { return Vector3::from_element(zero) };
-    let above = |axis: &Vector3<Dual64>| {
+    let Some(frame) = frames.get(frame).or(frames.last()) else { return Vector3::from_element(Dual64::from(0.0)) };
+    above(&frame.axes, &arm.gravity)
+}
+
+/// How far the x and the y axis of a frame lie above the horizontal: sin τ = a·u with u up, against gravity.
+fn above<S: Scalar>(axes: &[Vector3<S>; 3], gravity: &Vector3<S>) -> Vector3<S> {
+    let zero = S::from(0.0);
+    let weight = gravity.dot(gravity).sqrt();
+    let up = if weight.re() > 0.0 { -gravity / weight } else { Vector3::new(zero, zero, S::from(1.0)) };
+    let tilt = |axis: &Vector3<S>| {
         let sine = axis.dot(&up);
         let level = axis.cross(&up);
         let cosine = (level.dot(&level) + UPRIGHT).sqrt();
         sine.atan2(cosine)
     };
-    Vector3::new(above(&frame.axes[0]), above(&frame.axes[1]), zero)
+    Vector3::new(tilt(&axes[0]), tilt(&axes[1]), zero)
 }

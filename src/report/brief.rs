@@ -1,7 +1,7 @@
 //! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
 
 use super::around::unsteady;
-use super::closed_loop::{called, errors, quality_flag, set_aside, verdict};
+use super::closed_loop::{errors, quality_flag, set_aside};
 use super::document::{Block, Point};
 use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
@@ -10,8 +10,9 @@ use super::noise::noise;
 use super::parameters::correlated;
 use super::quantity::{counted, number};
 use super::render::text_within;
-use super::unexplained::{not_looked_for, place, size_alone};
-use crate::diagnose::{ClosedLoop, Verdict};
+use super::unexplained::{not_looked_for, places, size_alone};
+use super::verdict::{called, is_beside, verdict};
+use crate::diagnose::{ClosedLoop, Found, Verdict};
 use crate::identify::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
 
@@ -96,20 +97,21 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
-    blocks.extend(not_looked_for(closure).map(Block::Text));
+    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
     let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let last = end.lines().count();
-    if !closure.effects.is_empty() {
+    let found: Vec<&Found> = closure.effects.iter().filter(|found| !is_beside(closure, found)).collect();
+    if !found.is_empty() {
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
-        let few = closure.effects.len() <= FEW;
+        let few = found.len() <= FEW;
         let title = |found| if few { called(closure, found) } else { cut(&called(closure, found)) };
-        let titles = closure.effects.iter().map(|found| Point::from(title(found)));
+        let titles = found.iter().map(|found| Point::from(title(found)));
         blocks.push(Block::heading("What was found"));
         blocks.push(Block::Ranking(titles.take(room).collect()));
-        let more = closure.effects.len().saturating_sub(room);
+        let more = found.len().saturating_sub(room);
         let more = if more > 0 { format!("     and {more} more\n") } else { String::new() };
         return text(&blocks) + &more + &end;
     }
@@ -148,12 +150,12 @@ fn gain(closure: &ClosedLoop) -> String {
 /// What is left, in a sentence.
 fn remains(closure: &ClosedLoop) -> Option<String> {
     let failed = findings::failed(&closure.findings).len();
-    let first = closure.unexplained.first().filter(|_| closure.verdict == Verdict::Unexplained);
-    let first = first.filter(|_| size_alone(closure).is_none());
-    let structure = first.map(|left| {
-        let more = closure.unexplained.len() - 1;
+    let is_left = closure.verdict == Verdict::Unexplained && size_alone(closure).is_none();
+    let places = if is_left { places(closure) } else { Vec::new() };
+    let structure = places.first().map(|first| {
+        let more = places.len() - 1;
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("structure without a known law ({}{more})", cut(&place(left)))
+        format!("structure without a known law ({}{more})", cut(first))
     });
     let checks = (failed > 0).then(|| format!("{} failed", counted(failed, "check")));
     let parts: Vec<String> = structure.into_iter().chain(checks).collect();

@@ -13,9 +13,10 @@ use super::noise::size;
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};
-use super::unexplained::{correction, not_looked_for, size_alone, unexplained};
+use super::unexplained::{correction, not_looked_for, unexplained};
+use super::verdict::{called, counts, is_beside, stand_in, verdict, verdict_word};
 use super::{effect, findings, trace};
-use crate::diagnose::{ClosedLoop, Found, Round, SelectionRules, Verdict, Witness, WitnessVerdict};
+use crate::diagnose::{ClosedLoop, Found, Round, Witness, WitnessVerdict};
 use crate::identify::{ErrorSummary, Errors, Identification};
 use crate::problem::Problem;
 
@@ -51,7 +52,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(verdict(closure)),
     ];
     blocks.extend(quality_flag(closure));
-    blocks.extend(not_looked_for(closure).map(Block::Text));
+    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
@@ -88,7 +89,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
     blocks.extend(quality_flag(closure));
-    blocks.extend(not_looked_for(closure).map(Block::Text));
+    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend(beware(after, plots));
     blocks.extend([
@@ -151,7 +152,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
     let digits = decimals(in_unit(&last, gain.high - gain.low), 4).max(2);
     let mut facts = vec![
         ("Verdict", verdict_word(closure.verdict).replace('-', " ")),
-        ("Effects found", closure.effects.len().to_string()),
+        ("Effects found", counts(closure)),
         poses(after),
         fitted_parameters(after),
         size("Residual before", fit),
@@ -171,91 +172,6 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         states.push(("with what was found", mean(&best)));
     }
     Headline { states, unit: unit(&last), of, facts }
-}
-
-/// What it came to, in a word.
-pub(super) fn verdict_word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::NothingFound => "nothing-found",
-        Verdict::Explained => "explained",
-        Verdict::Unexplained => "unexplained",
-    }
-}
-
-/// That the search ended early.
-pub fn interrupted(closure: &ClosedLoop) -> String {
-    let rounds = match closure.rounds.len() {
-        0 => "before the first round was done".to_owned(),
-        rounds => format!("after {}", counted(rounds, "round")),
-    };
-    format!("interrupted {rounds}: there may be more to find")
-}
-
-/// The outcome in a sentence or two, after a word that it is not the last one where the search ended early.
-pub(super) fn verdict(closure: &ClosedLoop) -> String {
-    let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
-    end + &came_to(closure)
-}
-
-fn came_to(closure: &ClosedLoop) -> String {
-    if !closure.after.is_trusted() {
-        return "Nothing is claimed of causes: the fit is not to be trusted. Mend first what stands below.".to_owned();
-    }
-    let stated = SelectionRules::DEFAULT.stated;
-    let (contradicted, others): (Vec<&Found>, Vec<&Found>) =
-        closure.effects.iter().partition(|found| found.is_contradicted());
-    let (named, such): (Vec<&Found>, Vec<&Found>) = others.into_iter().partition(|found| found.is_named(stated));
-    let only_such = named.is_empty();
-    let named = match named.as_slice() {
-        [] => "No effect was found".to_owned(),
-        [one] => format!("One effect was found ({})", closure.before.describe(&one.effect)),
-        several => format!("{} effects were found", several.len()),
-    };
-    let found = match such.as_slice() {
-        [] => named,
-        [one] if only_such => format!("No effect is sure; most probable is {}", probable(closure, one)),
-        [one] => format!("{named}; one more is probable: {}", probable(closure, one)),
-        several => format!("{named}; {} more are probable, their laws not sure", several.len()),
-    };
-    let found = match contradicted.as_slice() {
-        [] => found,
-        [one] => format!("{found}; {} is contradicted by data that took no part", closure.before.describe(&one.effect)),
-        several => format!("{found}; {} causes are contradicted by data that took no part", several.len()),
-    };
-    if let (Verdict::Unexplained, Some(size)) = (closure.verdict, size_alone(closure)) {
-        let size = number(size, 1);
-        return format!(
-            "Unexplained: the residual is {size} × the declared σ, and no structure is seen in it. {found}."
-        );
-    }
-    match (closure.verdict, closure.findings.is_testable()) {
-        (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
-        (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
-        (_, false) => format!("{found}; whether structure is left could not be tested."),
-        (Verdict::NothingFound, true) if closure.findings.overstates_sigma() => {
-            "Nothing found, and little could be: the residual is smaller than the declared σ lets it be. No effect below that σ is looked for; \
-             declare that of the instrument, or none."
-                .to_owned()
-        }
-        (Verdict::NothingFound, true) => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
-        (Verdict::Explained, true) => format!("Explained: {}, and what is left looks like noise.", lower(&found)),
-    }
-}
-
-/// A cause whose law is not sure, how probable it is, and what it may be instead.
-fn probable(closure: &ClosedLoop, found: &Found) -> String {
-    let own = closure.before.describe(&found.effect);
-    if let Some(claims) = found.claims.as_ref().filter(|claims| claims.law.1 < 0.5) {
-        return format!("something at {} whose law is not known, such as {own}", claims.place.0);
-    }
-    let sure = found.claims.as_ref().map(|claims| format!(" ({} %)", number(claims.law.1 * 100.0, 0)));
-    let rival = found.alternatives.first().map(|other| format!(", or else {}", closure.before.describe(other)));
-    format!("{own}{}{}", sure.unwrap_or_default(), rival.unwrap_or_default())
-}
-
-fn lower(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
 /// Why the final fit is not to be trusted.
@@ -336,7 +252,8 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
 }
 
 fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
-    let mut details = effect::values(found);
+    let mut details: Vec<String> = stand_in(closure, found).into_iter().collect();
+    details.extend(effect::values(found));
     details.extend(found.claims.as_ref().map(trace::claimed));
     details.extend(
         found
@@ -344,7 +261,14 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
             .map(|share| format!("named in {} % of weighings without a fifth of the poses", number(share * 100.0, 0))),
     );
     details.extend(found.witness.as_ref().map(|own| format!("{} by {}, which took no part", says(own), own.data)));
-    let mut chance = format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value));
+    let mut chance = if is_beside(closure, found) {
+        format!(
+            "p-value {}: nothing speaks for it by itself; it is in the model together with others",
+            p_value(found.p_value)
+        )
+    } else {
+        format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value))
+    };
     if let Some(then) = closure.held_out_once(found) {
         let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
     }
@@ -356,18 +280,6 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
         details.push(format!("these data do not distinguish it from: {}", named.join("; ")));
     }
     Point { text: called(closure, found), details, mark: None }
-}
-
-/// An effect that was found, as surely as it is known.
-pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
-    let own = effect::both(&found.effect, &closure.before);
-    match &found.claims {
-        _ if found.is_contradicted() => format!("contradicted: {own}"),
-        Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
-            format!("{}: its law is not known, such as: {own}", claims.place.0)
-        }
-        _ => own,
-    }
 }
 
 /// What a witness says, in a word.

@@ -6,7 +6,8 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString,
 
 use super::effect::values;
 use super::quantity::p_value;
-use crate::diagnose::{ClosedLoop, Found, HarmonicPrior, SelectionRules, Trace};
+use super::verdict::is_beside;
+use crate::diagnose::{ClosedLoop, Found, HarmonicPrior, SelectionRules};
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
 
@@ -27,7 +28,7 @@ pub fn closed_problem(
     let holds = |effect: &Effect| declared.contains(effect) || of(effect).is_none_or(|found| !found.is_contradicted());
     let closed = closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
         let found = of(&declared.effect);
-        (declared.effect.clone(), found.map(|found| comments(found, &closure.before)).unwrap_or_default())
+        (declared.effect.clone(), found.map(|found| comments(found, closure)).unwrap_or_default())
     });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
     match &closure.harmonic_prior {
@@ -178,10 +179,17 @@ fn arguments(effect: &Effect) -> Value {
 }
 
 /// What is known of an effect that was found, line by line.
-fn comments(found: &Found, trace: &Trace) -> Vec<String> {
-    let sure = if found.is_named(SelectionRules::DEFAULT.stated) { "" } else { "; that this is the law is not sure" };
-    let first =
-        format!("Found by flexcal loop: {}, p-value {}{sure}.", trace.describe(&found.effect), p_value(found.p_value));
+fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
+    let sure = match found.is_named(SelectionRules::DEFAULT.stated) {
+        _ if is_beside(closure, found) => "; nothing speaks for it by itself",
+        true => "",
+        false => "; that this is the law is not sure",
+    };
+    let first = format!(
+        "Found by flexcal loop: {}, p-value {}{sure}.",
+        closure.before.describe(&found.effect),
+        p_value(found.p_value)
+    );
     // A custom effect may say of itself what it likes, in several lines.
     std::iter::once(first).chain(values(found)).map(|line| one_line(&line.replace('\n', " "))).collect()
 }

@@ -1,6 +1,6 @@
 //! Which effects poses would show, for programs and for people.
 
-use super::document::{Block, Table};
+use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
 use super::json::object;
@@ -15,6 +15,8 @@ object! {
     Entry<'a>(detection: &'a Detection) {
         power: f64 = detection.power,
         level: f64 = detection.level,
+        /// Whether the poses have no times yet: effects that remember what was before a pose need them.
+        times_assumed: bool = detection.times_assumed,
         effects: Vec<EffectEntry<'a>> = detection.effects.iter().map(EffectEntry::of).collect(),
         untestable: Vec<effect::Untestable<'a>> = detection.untestable.iter().map(effect::Untestable::of).collect(),
     }
@@ -40,10 +42,13 @@ object! {
 /// The hardest of each family, and what is not to be seen.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let seen = |own: &&Detectable| own.sizes.iter().any(Size::is_within_prior);
-    let (visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
+    let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
     // Of an argument that is searched, as a time, one that is seen is enough.
     let places: Vec<String> = visible.iter().map(|own| own.effect.name_and_place()).collect();
     hidden.retain(|own| !own.effect.is_searched() || !places.contains(&own.effect.name_and_place()));
+    let needs_times = |own: &&Detectable| detection.times_assumed && own.effect.has_memory();
+    let if_timed: Vec<&Effect> = visible.iter().copied().filter(needs_times).map(|own| &own.effect).collect();
+    visible.retain(|own| !needs_times(own));
     let mut families: Vec<&str> = Vec::new();
     for own in &visible {
         if !families.contains(&own.effect.name()) {
@@ -59,6 +64,13 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     if !rows.is_empty() {
         let header = ["effect", "found from", "at best", "prior ± 1 σ", "unit", "parameters"];
         blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5])));
+    }
+    if !if_timed.is_empty() {
+        let list = effect::listed(if_timed).join("; ");
+        blocks.push(Block::Text(format!(
+            "Only if {} is measured too, a minute or so from pose to pose: {list}.",
+            code("time_s")
+        )));
     }
     if !hidden.is_empty() {
         let list = effect::listed(hidden.into_iter().map(|own| &own.effect)).join("; ");

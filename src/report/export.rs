@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 
 use super::document::{Block, Table};
 use super::errors;
 use super::json::{Summary, object, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
-use crate::identify::{ErrorSummary, Placement, SavedEstimate};
+use crate::identify::{ErrorSummary, Placement, SavedEstimate, rows_of_kind};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::parameter::Slot;
@@ -20,7 +20,7 @@ use crate::urdf::MovedOrigin;
 const ALONE: &str = "A controller that knows geometry alone may do better with one that was fitted alone: identify the problem without its \
                      effects (and with --strategy rigid where joints or links give way), export that, and compare its error.";
 
-/// Errors on held-out poses.
+/// Errors on held-out rows, of the first kind that the table has.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExportErrors {
     /// Of the model with everything that was identified.
@@ -39,10 +39,10 @@ impl ExportErrors {
         if let Some(saved) = saved {
             saved.count_time_in(&mut poses);
         }
-        let geometric = model.geometric_positions(&poses, x.as_slice());
-        let rigid: Vec<_> = poses.iter().zip(geometric).map(|(pose, predicted)| pose.measured - predicted).collect();
+        let rigid = model.geometric_residuals(&poses, x.as_slice());
         let whole = model.residuals(poses, x);
-        Self { whole: ErrorSummary::of(&whole), rigid: ErrorSummary::of(&rigid) }
+        let of = |errors: &[Vector3<f64>]| ErrorSummary::of_rows(measurements, split.held_out.iter().copied(), errors);
+        Self { whole: of(&whole), rigid: of(&rigid) }
     }
 }
 
@@ -127,8 +127,9 @@ pub fn export_text(exported: &Exported) -> String {
     }
     if let Some(ExportErrors { whole, rigid }) = &exported.errors {
         blocks.push(Block::lines(format!(
-            "{} held-out poses: {} with the whole model, {} with the geometry that was exported",
+            "{} held-out {}: {} with the whole model, {} with the geometry that was exported",
             whole.n,
+            rows_of_kind(whole.kind),
             errors::mean_and_rms(whole),
             errors::mean_and_rms(rigid)
         )));

@@ -1,9 +1,10 @@
 //! What `loop` writes: loop.json.
 
-use super::closed_loop::{says, verdict_word};
+use super::closed_loop::says;
 use super::errors::in_unit;
 use super::json::{Both, Kind, Summary, object, to_text};
 use super::unexplained::place;
+use super::verdict::verdict_word;
 use super::{findings, trace};
 use crate::diagnose::{ClosedLoop, Correction, Found, Interval, Round, Trace, Unexplained, Witness};
 use crate::error::Location;

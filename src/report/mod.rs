@@ -40,11 +40,12 @@ mod study;
 mod table;
 mod trace;
 mod unexplained;
+mod verdict;
 
 pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
 pub use brief::{estimate_brief, loop_brief};
 pub use check::{check_json, check_text, why_not_sufficient};
-pub use closed_loop::{interrupted, loop_report, loop_text};
+pub use closed_loop::{loop_report, loop_text};
 pub use closed_problem::closed_problem;
 pub use columns::{Column, Columns, residual_columns, residuals_csv};
 pub use compare::{compare_json, compare_text, comparison_report};
@@ -65,3 +66,4 @@ pub use replica::{replica_json, replica_report, replica_text};
 pub use shell::shell_word;
 pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};
 pub use trace::{trace_json, trace_text};
+pub use verdict::interrupted;

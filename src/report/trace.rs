@@ -224,7 +224,8 @@ pub(super) fn claimed(claims: &Claims) -> String {
     format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
 }
 
-fn percent(probability: f64) -> String {
+/// A probability for people.
+pub(super) fn percent(probability: f64) -> String {
     match probability {
         p if p > 0.995 => "over 99 %".to_owned(),
         p if p < 0.005 => "under 1 %".to_owned(),

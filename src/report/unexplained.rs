@@ -7,7 +7,8 @@ use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
 use crate::diagnose::{ClosedLoop, Correction, Covariate, HELD_FIXED, Law, Part, REFUSED, Unexplained};
 use crate::model::effect::NO_REFERENCE;
-use crate::problem::{JointKind, Problem};
+use crate::model::parameter::holds_all;
+use crate::problem::{Effect, JointKind, Problem};
 
 /// The correction of structure without a law, if there is one.
 pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
@@ -25,11 +26,29 @@ pub(super) fn place(left: &Unexplained) -> String {
     left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
 }
 
+/// Why a law was not tried: what its rules say comes before what the problem lacks, for a reference does not free what is held.
+fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
+    let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
+    if is_held { HELD_FIXED } else { reason }
+}
+
 /// What of the table was of no use, and what makes it so.
-pub(super) fn not_looked_for(closure: &ClosedLoop) -> Option<String> {
-    let needs = closure.before.untestable.iter().any(|(_, reason)| *reason == NO_REFERENCE);
-    let why = "The table has temperatures, and no effect of them was looked for: declare";
+pub(super) fn not_looked_for(problem: &Problem, closure: &ClosedLoop) -> Option<String> {
+    let needs = closure.before.untestable.iter().any(|own| untried(problem, own) == NO_REFERENCE);
+    let why = "The table has temperatures, and no law of them was looked for, only functions without one: declare";
     needs.then(|| format!("{why} {}, at which the arm is as declared.", code("reference_temperature_C")))
+}
+
+/// Each place where structure is left whose law is not known, once for everything that would be said of it alike.
+pub(super) fn places(closure: &ClosedLoop) -> Vec<String> {
+    let mut said: Vec<(String, String)> = Vec::new();
+    for left in &closure.unexplained {
+        let words = located(left);
+        if !said.iter().any(|(known, _)| *known == words) {
+            said.push((words, place(left)));
+        }
+    }
+    said.into_iter().map(|(_, place)| place).collect()
 }
 
 /// Structure whose law is not known.
@@ -44,13 +63,23 @@ pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String
             number(size, 1)
         )];
     }
-    let mut sentences: Vec<String> = closure.unexplained.iter().map(located).collect();
-    let untried = |why: &str| closure.before.untestable.iter().filter(|(_, reason)| *reason == why).count();
+    // Functions of several forms may be left at one place.
+    let mut sentences: Vec<String> = Vec::new();
+    for words in closure.unexplained.iter().map(located) {
+        if !sentences.contains(&words) {
+            sentences.push(words);
+        }
+    }
     let mut catalogue = "No effect of the catalogue explains it better than a function without a law".to_owned();
-    for (why, words) in [(HELD_FIXED, "holds them fixed"), (REFUSED, "speaks of them in another unit")] {
-        match untried(why) {
+    for (why, words) in [
+        (HELD_FIXED, "[parameters] holds them fixed"),
+        (REFUSED, "[parameters] speaks of them in another unit"),
+        (NO_REFERENCE, NO_REFERENCE),
+    ] {
+        match closure.before.untestable.iter().filter(|own| untried(problem, own) == why).count() {
             0 => {}
-            count => _ = write!(catalogue, "; {count} were not tried because [parameters] {words}"),
+            1 => _ = write!(catalogue, "; one was not tried because {}", words.replace("them", "it")),
+            count => _ = write!(catalogue, "; {count} were not tried because {words}"),
         }
     }
     sentences.push(catalogue + ".");

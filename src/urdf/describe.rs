@@ -107,6 +107,12 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
             bodies: Vec::new(),
         });
+        if let Some((lower, upper)) = joint.reversed_limits {
+            notes.push(format!(
+                "{}: the limits {lower} to {upper} exclude each other (the lower one is above the upper one) and are taken as none",
+                joint.name
+            ));
+        }
         if let (None, Some((leader, ..))) = (stage.mimic, joint.mimic)
             && let Some(leader) = chain.robot.joints.get(leader)
         {

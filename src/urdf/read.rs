@@ -53,6 +53,8 @@ pub(super) struct Joint {
     pub axis: Vector3<f64>,
     /// Range of q, infinite where none is given.
     pub limits: (f64, f64),
+    /// Limits whose lower one is above the upper one, which are none.
+    pub reversed_limits: Option<(f64, f64)>,
     /// Index of the joint that it follows, factor and addend.
     pub mimic: Option<(usize, f64, f64)>,
     /// Its element as bytes of the text.
@@ -228,7 +230,7 @@ impl Reader<'_> {
         let mass = match child(inertial, "mass").and_then(get) {
             Some(mass) => match self.numbers::<1>(mass, "value")? {
                 Some(([value], span)) if value < 0.0 => {
-                    return self.fail_at(span, UrdfMistake::NotNumbers { text: value.to_string(), count: 1 });
+                    return self.fail_at(span, UrdfMistake::NegativeMass { text: value.to_string() });
                 }
                 Some(([value], _)) => value,
                 None => 0.0,
@@ -275,16 +277,17 @@ impl Reader<'_> {
             };
         }
         let turns_on = node.attribute("type") == Some("continuous");
-        let limits = match child("limit").filter(|_| moves && !turns_on) {
+        let written = match child("limit").filter(|_| moves && !turns_on) {
             Some(limit) => {
                 let one =
                     |which| Ok::<_, InputError>(self.numbers::<1>(limit, which)?.map_or(0.0, |([value], _)| value));
-                // Both are 0 where they are left out; a range of nothing is none.
-                let (lower, upper) = (one("lower")?, one("upper")?);
-                if lower < upper { (lower, upper) } else { (f64::NEG_INFINITY, f64::INFINITY) }
+                Some((one("lower")?, one("upper")?))
             }
-            None => (f64::NEG_INFINITY, f64::INFINITY),
+            None => None,
         };
+        // Both are 0 where they are left out; a range of nothing is none.
+        let limits = written.filter(|(lower, upper)| lower < upper).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let reversed_limits = written.filter(|(lower, upper)| lower > upper);
         let mimic = match child("mimic").filter(|_| moves) {
             Some(element) => {
                 let leader = self.attribute(element, "joint")?;
@@ -299,7 +302,18 @@ impl Reader<'_> {
             }
             None => None,
         };
-        Ok(Joint { name, kind, parent, child: child_link, origin, axis, limits, mimic, span: node.range() })
+        Ok(Joint {
+            name,
+            kind,
+            parent,
+            child: child_link,
+            origin,
+            axis,
+            limits,
+            reversed_limits,
+            mimic,
+            span: node.range(),
+        })
     }
 
     fn origin(&self, node: Node<'_, '_>) -> Result<Origin, InputError> {

@@ -131,6 +131,26 @@ fn a_check_names_what_would_be_found() {
 }
 
 #[test]
+fn without_times_nothing_that_remembers_is_promised() {
+    let bench = Bench::new();
+    let measured = fs::read_to_string("tests/cases/a-none.csv").unwrap();
+    let untimed = bench.write("untimed.csv", &measured.replacen("time_s", "note", 1));
+    let (out, _) = bench.run(0, "check tests/cases --data", &[&untimed]);
+    assert!(out.contains("no time_s that tells which pose was before which"), "{out}");
+    let check: Value = serde_json::from_str(&fs::read_to_string(bench.path("check.json")).unwrap()).unwrap();
+    let names = |key: &str| {
+        let all = check["detectable"][key].as_array().unwrap();
+        all.iter().filter(|own| own["effect"] == "joint-hysteresis").count()
+    };
+    assert_eq!((names("effects"), names("untestable") > 0), (0, true), "{check}");
+    assert_eq!(check["detectable"]["times_assumed"], false);
+    // What is still to be measured may well be measured with its times.
+    let (out, _) = bench.run(0, "check tests/cases --truth tests/cases/truth.toml --poses 60", &[]);
+    let (table, rest) = out.split_once("Only if time_s is measured too").unwrap();
+    assert!(rest.contains("joint-hysteresis") && !table.contains("joint-hysteresis"), "{out}");
+}
+
+#[test]
 fn a_plan_that_would_tell_nothing_is_refused() {
     let bench = Bench::new();
     let text = "name = 'arm'\n[[joint]]\nd_m = 0.3\nmin_deg = -90\nmax_deg = 90\n[tool]\ntarget_m = [0, 0, 0.2]\n\

@@ -198,7 +198,13 @@ fn what_keeps_the_loop_from_finding_is_said() {
     let bench = Bench::new(NONE);
     bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
     let told = bench.told(&["loop", "arm", "--out", "cold"]);
-    assert!(told.contains("no effect of them was looked for") && told.contains("reference_temperature_C"), "{told}");
+    assert!(told.contains("no law of them was looked for") && told.contains("reference_temperature_C"), "{told}");
+    bench.edit("arm/problem.toml", |text| {
+        text.replace("[parameters]\n", "[parameters]\n\"*thermal*\" = { fixed = true }\n")
+    });
+    let told = bench.told(&["loop", "arm", "--out", "held"]);
+    assert!(!told.contains("reference_temperature_C"), "{told}");
+    bench.edit("arm/problem.toml", |text| text.replace("\"*thermal*\" = { fixed = true }\n", ""));
     bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 50"));
     let told = bench.told(&["loop", "arm", "--out", "coarse"]);
     assert!(told.contains("Nothing found, and little could be") && !told.contains("looks like noise"), "{told}");
@@ -210,6 +216,18 @@ fn what_keeps_the_loop_from_finding_is_said() {
     let refused = bench.run(&["identify", "arm", "--out", "untimed"]).code(2);
     assert!(text(&refused.get_output().stderr).contains("a column time_s"), "{refused}");
     assert!(!bench.path("untimed").exists());
+    let refused = bench.run(&["predict", "arm", "--out", "untimed"]).code(2);
+    assert!(text(&refused.get_output().stderr).contains("a column time_s"), "{refused}");
+    assert!(!bench.path("untimed").exists());
+}
+
+#[test]
+fn laws_that_were_not_tried_for_want_of_a_reference_are_said() {
+    let bench = Bench::new(THERMAL);
+    bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
+    let told = bench.told(&["loop", "arm", "-v"]);
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("were not tried because the problem declares no reference_temperature_C"), "{told}");
 }
 
 #[test]

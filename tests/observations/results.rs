@@ -266,6 +266,80 @@ fn positions_alone_are_accepted() {
     assert!(page.contains(&format!("Rows that were fitted: {all}.")), "{page}");
 }
 
+/// The geometry that is exported is judged with points, anchors and surfaces where they were found: of an arm that does not give way it
+/// is the whole model, whatever is measured.
+#[test]
+fn an_exported_geometry_is_judged_by_what_rows_measure() {
+    for kinds in [["point", "plane"], ["distance", "tilt"], ["plane", "distance"], ["tilt", "point"]] {
+        let folder = bench(AROUND, &kinds, 60);
+        let folder = folder.path();
+        let fitted = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+            .current_dir(folder)
+            .args(["identify", ".", "--strategy", "rigid", "--out", "fit"])
+            .output()
+            .unwrap();
+        assert!(matches!(fitted.status.code(), Some(0 | 1)), "{fitted:?}");
+        let exported = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+            .current_dir(folder)
+            .args([
+                "export",
+                ".",
+                "--estimate",
+                "fit/estimate.json",
+                "--format",
+                "ros-yaml",
+                "--out",
+                "k.yaml",
+                "--json",
+            ])
+            .output()
+            .unwrap();
+        let exported: Value = serde_json::from_slice(&exported.stdout).unwrap();
+        let estimate = json(folder, "fit/estimate.json");
+        for arm in ["whole", "rigid"] {
+            let of = &exported["held_out"][arm];
+            assert_eq!(
+                (&of["n"], &of["kind"]),
+                (&estimate["held_out"]["n"], &estimate["held_out"]["kind"]),
+                "{kinds:?}"
+            );
+            let unit = if of["rms_deg"].is_object() { "rms_deg" } else { "rms_mm" };
+            let [own, fitted] = [of, &estimate["held_out"]].map(|of| of[unit]["norm"].as_f64().unwrap());
+            assert!((own / fitted - 1.0).abs() < 1e-6, "{kinds:?}, {arm}: {own} {fitted}");
+        }
+    }
+}
+
+/// Sockets of unknown places say nothing of where the base is: targets in the measuring frame are not promised without a word.
+#[test]
+fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
+    let around = AROUND.replace("[[anchor]]", "[[anchor]]\nat_m = [1, 1, 1]");
+    let folder = bench(&format!("\"base.*\" = {{ free = true }}\n{around}"), &["point"], 90);
+    let folder = folder.path();
+    run(folder, "identify", "fit", &[]);
+    fs::write(
+        folder.join("targets.csv"),
+        "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,x_m,y_m,z_m\n0,0.5,0.5,0,0.5,0,0.9,0.1,0.6\n",
+    )
+    .unwrap();
+    for (frame, is_said) in [("measuring", true), ("base", false)] {
+        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let output = flexcal
+            .current_dir(folder)
+            .args(["compensate", ".", "--estimate", "fit/estimate.json", "--data", "targets.csv", "--frame", frame])
+            .output()
+            .unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{error}");
+        assert_eq!(error.contains("--frame base"), is_said, "{error}");
+    }
+    // What to give comes before what is missing of poses that nobody touches anything in.
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    let refused = flexcal.current_dir(folder).args(["check", ".", "--poses", "80", "--out", "check"]).assert().code(2);
+    let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(error.contains("write --candidates FILE.csv") || error.contains("min_deg"), "{error}");
+}
+
 /// Lengths and angles have no σ together, rows of one number no axes, and rows without positions no place in figures of positions.
 #[test]
 fn every_kind_is_told_in_its_own_terms() {

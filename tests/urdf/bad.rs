@@ -56,7 +56,7 @@ fn mistakes_are_named_with_their_place() {
         (
             "mass",
             with("<link name=\"a\"><inertial>\n<mass value=\"-1\"/></inertial></link><link name=\"b\"/>", JOINT),
-            ":3: \"-1\" is not 1 finite number",
+            ":3: a mass of -1 kg is negative",
         ),
         ("mimic", revolute("<mimic joint=\"k\"/>"), ":5: no joint is called \"k\""),
         ("mimic itself", revolute("<mimic joint=\"j\"/>"), "follow each other in a circle"),

@@ -140,6 +140,20 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
     assert!(chain(Some("world"), Some("base")).contains("no joint moves"));
 }
 
+#[test]
+fn limits_that_exclude_each_other_are_said_to_be_none() {
+    for (limits, is_said) in [("lower=\"1\" upper=\"-1\"", true), ("lower=\"-1\" upper=\"1\"", false), ("", false)] {
+        let text = format!(
+            "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"revolute\"><parent link=\"a\"/>\
+             <child link=\"b\"/><limit {limits}/></joint></robot>"
+        );
+        let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
+        let described = describe(&Chain::new(&robot, None, None).unwrap()).unwrap();
+        let said = described.notes.iter().any(|note| note.starts_with("j: the limits 1 to -1 exclude each other"));
+        assert_eq!((said, described.text.contains("min_deg")), (is_said, limits.contains("\"-1\" upper")), "{limits}");
+    }
+}
+
 /// Two joints of the chain follow one another, the first a joint outside of it; and joints bear the names of rows that are no joints.
 const FOLLOWERS: &str = r#"<robot name="followers">
 <link name="base"/><link name="side"/><link name="one"/><link name="two"/><link name="tip"/>

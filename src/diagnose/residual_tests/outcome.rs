@@ -169,10 +169,11 @@ impl Findings {
         }
     }
 
-    /// Whether the residual is smaller than chance makes one of the declared σ.
-    pub fn overstates_sigma(&self) -> bool {
+    /// The residual in units of the declared σ, where it is smaller than chance makes one of that σ.
+    pub fn overstated_sigma(&self) -> Option<f64> {
         let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
-        size.filter_map(|test| test.outcome.as_ref().ok()).any(|own| own.statistic < own.bounds.0)
+        let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());
+        sizes.find(|own| own.statistic < own.bounds.0).map(|own| own.statistic.max(0.0).sqrt())
     }
 
     /// Whether anything was tested for structure.
