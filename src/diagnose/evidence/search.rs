@@ -294,7 +294,7 @@ fn extended(set: &Set, tried: &[usize], (blocks, target): (&[Block], &Target), r
 }
 
 /// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members,
-/// and with two others in its place. So two things that act beside one another are found where a third, or a function of several
+/// with another in its place, and with two others there. So two things that act beside one another are found where a third, or a function of several
 /// covariates, does for both as well as one hypothesis can.
 fn changed(
     known: &mut BTreeMap<Vec<usize>, Set>,
@@ -302,7 +302,8 @@ fn changed(
     (blocks, target): (&[Block], &Target),
     rules: &SelectionRules,
 ) {
-    let plain: Vec<usize> = (0..blocks.len()).filter(|&block| !blocks[block].is_surface).collect();
+    let every: Vec<usize> = (0..blocks.len()).collect();
+    let plain: Vec<usize> = every.iter().copied().filter(|&block| !blocks[block].is_surface).collect();
     let laws: Vec<usize> = promising.iter().copied().filter(|&block| blocks[block].is_law).collect();
     let mut tried: BTreeSet<Vec<usize>> = BTreeSet::new();
     for _ in 0..CHANGES {
@@ -327,16 +328,18 @@ fn changed(
             let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
             let others = if blocks[gone].is_surface { &plain } else { &laws };
             let others: Vec<usize> = others.iter().copied().filter(|&other| other != gone).collect();
-            let mut one = extended(&rest, &others, (blocks, target), rules);
+            let mut one = extended(&rest, &every, (blocks, target), rules);
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-            let narrow = one.iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);
+            let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
+            let narrow = one.iter().filter(is_other).filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);
             let two: Vec<Set> = narrow.flat_map(|set| extended(set, &others, (blocks, target), rules)).collect();
-            let mut new: Vec<Set> =
-                one.into_iter().chain(two).filter(|set| set.ln_posterior > best - rules.hopeless).collect();
+            let mut new: Vec<Set> = one.into_iter().chain(two).collect();
             new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+            // At settled sizes a set may be far more probable than with its members taken one after the other.
             let (first, others) = new.split_at(new.len().min(rules.extended));
             let settled = first.par_iter().map(|set| set.clone().settled((blocks, target), rules)).collect::<Vec<_>>();
-            for set in std::iter::once(rest).chain(settled).chain(others.iter().cloned()) {
+            let others = others.iter().filter(|set| set.ln_posterior > best - rules.hopeless);
+            for set in std::iter::once(rest).chain(settled).chain(others.cloned()) {
                 let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
                 if set.ln_posterior > own.ln_posterior {
                     *own = set;
@@ -425,6 +428,29 @@ mod tests {
         assert!((first - of([1, 0, 2], &[0, 1])).abs() < 1e-6, "{first} {}", of([1, 0, 2], &[0, 1]));
         // Beside two strong effects, each of the size that it has, one that is not there gains nothing.
         assert!(of([0, 1, 2], &[0, 1, 2]) < first - 4.0);
+    }
+
+    #[test]
+    fn two_that_a_third_does_for_are_found_where_one_alone_is_followed() {
+        let rules = &SelectionRules { extended: 1, ..SelectionRules::DEFAULT };
+        let (one, other, noise) = (matrix(90, 1, 3.0), matrix(90, 1, 11.0), matrix(90, 1, 99.0));
+        let residual = (&one * 20.0 + &other * 20.0 + noise).column(0).into_owned();
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
+        // The third is nearly the sum of both, and nothing of it is there.
+        let third = &one + &other + matrix(90, 1, 40.0) * 0.2;
+        let block = |columns: &DMatrix<f64>| {
+            let design = Design::Dense(columns.clone()).scaled(30).unwrap();
+            let mut block = Block::new(design, &fit, -5.0, Coefficients::default());
+            block.is_law = true;
+            block
+        };
+        let blocks = [&third, &one, &other].map(block);
+        let target =
+            Target { fit: fit.clone(), noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 }, stop: Stop::default() };
+        let found = search(&blocks, &target, rules, &[]);
+        assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
+        assert!(found[0].probability > 0.9, "{}", found[0].probability);
     }
 
     #[test]
