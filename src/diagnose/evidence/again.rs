@@ -8,9 +8,13 @@ use rayon::prelude::*;
 use super::super::data::{Data, bits, number};
 use super::super::fitted::Fitted;
 use super::block::Block;
+use super::blocks::blocks;
 use super::columns::Candidate;
+use super::explanation::Explanation;
+use super::hypotheses::Hypotheses;
+use super::hypothesis::Hypothesis;
+use super::posterior::Evidence;
 use super::search::{Conditioned, Target, search};
-use super::{Evidence, Explanation, Hypotheses, Hypothesis, blocks};
 use crate::problem::Effect;
 
 /// Probability below which an explanation is not looked at in fits to fewer poses.

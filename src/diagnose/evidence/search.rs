@@ -328,7 +328,12 @@ fn changed(
             let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
             let others = if blocks[gone].is_surface { &plain } else { &laws };
             let others: Vec<usize> = others.iter().copied().filter(|&other| other != gone).collect();
-            let mut one = extended(&rest, &every, (blocks, target), rules);
+            // All hypotheses by themselves are known.
+            let mut one: Vec<Set> = if rest.members.is_empty() {
+                known.values().filter(|set| set.members.len() == 1).cloned().collect()
+            } else {
+                extended(&rest, &every, (blocks, target), rules)
+            };
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
             let narrow = one.iter().filter(is_other).filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);

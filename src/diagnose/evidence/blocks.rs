@@ -1,0 +1,54 @@
+//! Hypotheses as blocks of columns beside one another, with what they explain.
+
+use rayon::prelude::*;
+
+use super::block::Block;
+use super::columns::Candidate;
+use super::hypotheses::Hypotheses;
+use super::marginal;
+use super::search::Target;
+use super::waves::Waves;
+use crate::diagnose::data::Data;
+use crate::diagnose::fitted::Fitted;
+use crate::identify::Noise;
+use crate::problem::Effect;
+
+/// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
+/// a finite number, or the end was asked for.
+pub(super) fn blocks(
+    fitted: &Fitted,
+    data: &Data,
+    hypotheses: &Hypotheses,
+    own: &[&Candidate],
+    left_out: &[usize],
+) -> Option<(Vec<Block>, Target)> {
+    let linearised = hypotheses.linearised.without(left_out);
+    let neighbourhood = fitted.neighbourhood_with(&linearised, &hypotheses.unknowns, None);
+    if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let is_declared = fitted.found.noise == Noise::Declared;
+    let unless_stopped = |candidate: &&Candidate| {
+        (!data.stop.is_requested()).then(|| candidate.block((fitted, &neighbourhood), left_out))
+    };
+    let mut blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
+    let rows = data.weighed();
+    let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
+    let numbers = |row: usize| data.measurements.observation(row).coordinates();
+    let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
+        + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
+    let noise = marginal::Noise {
+        freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
+        trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
+        least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
+    };
+    let target = Target { fit: neighbourhood, noise, stop: data.stop.clone() };
+    let is_added = |&k: &usize| own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
+    let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
+    let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();
+    let waves = Waves { hypotheses, blocks: &blocks, target: &target, fitted, rules: data.rules, left_out };
+    for (k, ln_spread) in waves.spreads(&added, &effects) {
+        blocks[k].ln_prior += ln_spread;
+    }
+    Some((blocks, target))
+}
