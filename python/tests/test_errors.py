@@ -123,6 +123,8 @@ def many(rows: int) -> dict[str, Any]:
     repeated = {str(name): np.resize(FRAME[name].to_numpy(), rows) for name in FRAME if name != "pose"}
     for name in [*(f"q{k}_deg" for k in range(1, 5)), "x_mm", "y_mm", "z_mm"]:
         repeated[name] = repeated[name] + random.normal(0.0, 0.3, rows)
+    if "time_s" in repeated:
+        repeated["time_s"] = 60.0 * np.arange(rows)
     return repeated
 
 
