@@ -70,7 +70,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !common.quiet {
         diagnostic::print_warnings(&warnings);
     }
-    identify::check_target_columns(&problem, &targets)?;
+    // Targets may be waypoints alone.
+    if let (Err(missing), false) = (identify::check_target_columns(&problem, &targets), common.quiet) {
+        diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
+    }
     let placement = identify::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let estimate = SavedEstimate::read(&arguments.estimate)?;

@@ -46,7 +46,7 @@ pub struct SelectionRules {
     pub few_steps: u64,
     /// Blocks of the cross-validation: ten-fold, as usual [Hastie, Tibshirani and Friedman 2009, section 7.10].
     pub blocks: usize,
-    /// Poses that a station shift must leave on either side.
+    /// Poses that a station shift must leave on either side; as many, each of which alone carries an effect, are left out of the weighing at most.
     pub least_side: usize,
     /// Times of a station shift that are tried at most.
     pub shift_times: usize,

@@ -114,6 +114,25 @@ fn the_digest_is_of_what_predictions_depend_on() {
     assert_eq!(seen.len(), count);
 }
 
+/// Waypoints have no more than the joints; what an effect would do there is left out, and said.
+#[test]
+fn targets_without_what_an_effect_follows_are_reached_without_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.current_dir(folder.path()).args(arguments).assert().success()
+    };
+    let drift = "[[effect]]\njoint-thermal-drift = { joint = 2 }\n\n[parameters]";
+    fs::write(path("problem.toml"), changed("[parameters]", drift)).unwrap();
+    fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
+    run(&["identify", ".", "--quiet", "--out", "."]);
+    fs::write(path("targets.csv"), "q1_deg,q2_deg,q3_deg,q4_deg\n0,10,-40,5\n").unwrap();
+    let done = run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
+    let told = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(told.contains("commands leave out what depends on it") && path("there/commands.csv").exists(), "{told}");
+}
+
 #[test]
 fn an_estimate_of_another_arm_is_refused() {
     let folder = tempfile::tempdir().unwrap();
