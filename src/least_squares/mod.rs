@@ -7,7 +7,7 @@ mod curvature;
 mod derivative;
 mod identifiability;
 mod inverse;
-mod kernel;
+pub(crate) mod kernel;
 mod loss;
 mod memory;
 mod objective;

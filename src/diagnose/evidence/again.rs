@@ -14,7 +14,8 @@ use super::explanation::Explanation;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::Hypothesis;
 use super::posterior::Evidence;
-use super::search::{Conditioned, Target, search};
+use super::products::{Products, Target};
+use super::search::{left_by, search};
 use crate::problem::Effect;
 
 /// Probability below which an explanation is not looked at in fits to fewer poses.
@@ -70,7 +71,7 @@ impl<'a> Again<'a> {
     fn most_probable(&self, left_out: &[usize]) -> Option<Vec<&Hypothesis>> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
-        let most = search(&blocks, &target, self.data.rules, &present).into_iter().next()?;
+        let most = search(&Products::new((&blocks, &target), self.data.rules), &present).into_iter().next()?;
         let own = self.own();
         Some(most.members.into_iter().map(|k| &own[k].hypothesis).collect())
     }
@@ -78,10 +79,8 @@ impl<'a> Again<'a> {
     /// The pose whose squares a member of the best explanation lowers most, beside all others.
     fn mainstay(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
-        let left = |of: &dyn Fn(&Hypothesis) -> bool| {
-            let own = Conditioned::on(&self.members(of), (&blocks, &target), self.data.rules)?;
-            Some(own.left(&target))
-        };
+        let products = Products::new((&blocks, &target), self.data.rules);
+        let left = |of: &dyn Fn(&Hypothesis) -> bool| left_by(&self.members(of), &products)?.residual();
         let (with, without) = (left(&|_| true)?, left(&|known| known.effect() != Some(effect))?);
         let poses = self.hypotheses.linearised.poses().len();
         let gain = |pose: usize| without.rows(3 * pose, 3).norm_squared() - with.rows(3 * pose, 3).norm_squared();

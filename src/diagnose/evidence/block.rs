@@ -7,6 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use super::marginal::{Coefficients, Normal, of_block};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
+use crate::least_squares::kernel::products;
+
+/// Columns on either side from which on a product of tall matrices is worth rearranging them.
+const MANY: usize = 24;
 
 /// Columns A of a hypothesis, shape = (3 N, k).
 #[derive(Debug, Clone)]
@@ -86,6 +90,20 @@ fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -
     all
 }
 
+/// Products of columns of groups of poses, everything fitted projected out.
+fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
+    let squares = levers.map(|value| value * value);
+    let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
+    let residual = fit.residual().rows(0, levers.nrows()).transpose();
+    let product = along(&DMatrix::from_rows(&[residual]), levers, groups).transpose();
+    let normal = Normal::LessFew {
+        diagonal: diagonal.column(0).into_owned(),
+        less: along(&fit.fitted().transpose(), levers, groups),
+        product: product.column(0).into_owned(),
+    };
+    normal.whole_if_less_work()
+}
+
 /// Columns of one hypothesis with everything fitted projected out, and the logarithm of its prior probability.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
@@ -110,46 +128,40 @@ enum Columns {
 
 impl Block {
     /// Of columns of root mean square 1 in the data.
+    #[cfg(test)]
     pub fn new(design: Design, fit: &LinearNeighbourhood, ln_prior: f64, coefficients: Coefficients) -> Self {
-        match design {
-            Design::Dense(columns) => {
-                let columns = fit.left_of(&columns);
-                let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
-                // The narrow side is transposed: this is the product that is fast.
-                gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
-                let normal = Normal::Dense { product: columns.tr_mul(fit.residual()), gram };
-                Self {
-                    columns: Columns::Dense(columns),
-                    normal,
-                    ln_prior,
-                    coefficients,
-                    is_surface: false,
-                    is_law: false,
+        Self::all(vec![(design, ln_prior, coefficients)], fit).remove(0)
+    }
+
+    /// Of several designs of columns of root mean square 1 in the data, projected together: a product of many columns is fast.
+    pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
+        let dense =
+            designs.iter().filter_map(|(design, ..)| if let Design::Dense(own) = design { Some(own) } else { None });
+        let rows = designs.first().map_or(0, |(design, ..)| design.values().nrows());
+        let mut all = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
+        let columns = dense.flat_map(DMatrix::column_iter);
+        all.column_iter_mut().zip(columns).for_each(|(mut own, column)| own.copy_from(&column));
+        let left = fit.left_of(&all);
+        let mut first = 0;
+        let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
+            let (columns, normal) = match design {
+                Design::Dense(columns) => {
+                    let own = left.columns(first, columns.ncols()).into_owned();
+                    first += columns.ncols();
+                    let mut gram = DMatrix::zeros(own.ncols(), own.ncols());
+                    // The narrow side is transposed: this is the product that is fast.
+                    gram.gemm(1.0, &own.transpose(), &own, 0.0);
+                    let product = own.tr_mul(fit.residual());
+                    (Columns::Dense(own), Normal::Dense { product, gram })
                 }
-            }
-            Design::Grouped { levers, groups } => {
-                let squares = levers.map(|value| value * value);
-                let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, &groups).transpose();
-                let residual = fit.residual().rows(0, levers.nrows()).transpose();
-                let normal = Normal::LessFew {
-                    diagonal: diagonal.column(0).into_owned(),
-                    less: along(&fit.fitted().transpose(), &levers, &groups),
-                    product: along(&DMatrix::from_rows(&[residual]), &levers, &groups)
-                        .transpose()
-                        .column(0)
-                        .into_owned(),
-                };
-                let normal = normal.whole_if_less_work();
-                Self {
-                    columns: Columns::Grouped { levers, groups },
-                    normal,
-                    ln_prior,
-                    coefficients,
-                    is_surface: false,
-                    is_law: false,
+                Design::Grouped { levers, groups } => {
+                    let normal = grouped(&levers, &groups, fit);
+                    (Columns::Grouped { levers, groups }, normal)
                 }
-            }
-        }
+            };
+            Self { columns, normal, ln_prior, coefficients, is_surface: false, is_law: false }
+        };
+        designs.into_iter().map(of).collect()
     }
 
     /// Whether it has more columns than a set that is extended may hold.
@@ -168,25 +180,27 @@ impl Block {
         }
     }
 
-    /// ln p(r | set and block) − ln p(r | set) of a residual from which a set takes `taken` along the rows Z = `within`, and the most
-    /// probable size; `left` are the squares that the set leaves, and their degrees of freedom.
-    pub fn gain(
-        &self,
-        (within, taken): (&DMatrix<f64>, &DVector<f64>),
-        (left, without): ((f64, f64), f64),
-        grid: &[(f64, f64)],
-        rules: &SelectionRules,
-    ) -> (f64, f64) {
-        let along = match &self.columns {
-            _ if within.nrows() == 0 => None,
-            Columns::Dense(columns) => Some(within * columns),
-            Columns::Grouped { levers, groups } => Some(along(within, levers, groups)),
-        };
-        self.gain_beside(along.as_ref().map(|along| (along, taken)), (left, without), grid, rules)
+    /// Aᵀr.
+    pub fn product(&self) -> &DVector<f64> {
+        self.normal.product()
     }
 
-    /// The same with Z A and Z r of the set, `None` for nothing.
-    pub fn gain_beside(
+    /// MᵀA of other columns M with everything fitted projected out, also transposed.
+    pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
+        match &self.columns {
+            Columns::Dense(columns) if columns.ncols().min(others.ncols()) < MANY => products(others, columns),
+            Columns::Dense(columns) => {
+                let mut all = DMatrix::zeros(others.ncols(), columns.ncols());
+                all.gemm(1.0, transposed, columns, 0.0);
+                all
+            }
+            Columns::Grouped { levers, groups } => along(transposed, levers, groups),
+        }
+    }
+
+    /// ln p(r | set and block) − ln p(r | set), and the most probable size, of a residual from which a set takes Z r off, and Z A off the
+    /// columns: with both, `None` for nothing. `left` are the squares that the set leaves, and their degrees of freedom.
+    pub fn gain(
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
         (left, without): ((f64, f64), f64),
@@ -222,8 +236,8 @@ mod tests {
         let (within, grid) =
             (fit.left_of(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2, [(0.0, 0.5), (-1.0, 0.2)]);
         let taken = &within * fit.residual();
-        for set in [within, DMatrix::zeros(0, fit.residual().len())] {
-            let taken = if set.nrows() == 0 { DVector::zeros(0) } else { taken.clone() };
+        let others = within.transpose();
+        for is_beside in [true, false] {
             let groups = (0..12).map(|pose| (pose != 5).then_some(pose / 2)).collect();
             for grouped in [
                 Design::per_pose(&matrix(36, 1).column(0).into_owned()),
@@ -233,7 +247,9 @@ mod tests {
                 let dense = Design::Dense(grouped.columns().into_owned());
                 let [one, other] = [grouped, dense].map(|design| {
                     let block = Block::new(design, &fit, 0.0, Coefficients::default());
-                    (block.gain((&set, &taken), ((100.0, 30.0), 0.0), &grid, &rules), block.columns(&fit).into_owned())
+                    let along = block.times((&others, &within));
+                    let set = is_beside.then_some((&along, &taken));
+                    (block.gain(set, ((100.0, 30.0), 0.0), &grid, &rules), block.columns(&fit).into_owned())
                 });
                 assert!((one.0.0 - other.0.0).abs() < 1e-9 && (one.0.1 - other.0.1).abs() < 1e-12, "{one:?} {other:?}");
                 assert!((one.1 - other.1).amax() < 1e-12);

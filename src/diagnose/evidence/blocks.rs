@@ -6,12 +6,15 @@ use super::block::Block;
 use super::columns::Candidate;
 use super::hypotheses::Hypotheses;
 use super::marginal;
-use super::search::Target;
+use super::products::{Products, Target};
 use super::waves::Waves;
 use crate::diagnose::data::Data;
 use crate::diagnose::fitted::Fitted;
 use crate::identify::Noise;
 use crate::problem::Effect;
+
+/// Hypotheses whose columns are projected together.
+pub(super) const TOGETHER: usize = 64;
 
 /// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
 /// a finite number, or the end was asked for.
@@ -28,10 +31,11 @@ pub(super) fn blocks(
         return None;
     }
     let is_declared = fitted.found.noise == Noise::Declared;
-    let unless_stopped = |candidate: &&Candidate| {
-        (!data.stop.is_requested()).then(|| candidate.block((fitted, &neighbourhood), left_out))
+    let unless_stopped = |some: &[&Candidate]| {
+        (!data.stop.is_requested()).then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
     };
-    let mut blocks: Vec<Block> = own.par_iter().map(unless_stopped).collect::<Option<_>>()?;
+    let blocks: Vec<Vec<Block>> = own.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
+    let mut blocks = blocks.concat();
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();
@@ -46,8 +50,10 @@ pub(super) fn blocks(
     let is_added = |&k: &usize| own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
     let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();
-    let waves = Waves { hypotheses, blocks: &blocks, target: &target, fitted, rules: data.rules, left_out };
-    for (k, ln_spread) in waves.spreads(&added, &effects) {
+    let products = Products::new((&blocks, &target), data.rules);
+    let waves = Waves { hypotheses, products: &products, fitted, left_out };
+    let spreads = waves.spreads(&added, &effects);
+    for (k, ln_spread) in spreads {
         blocks[k].ln_prior += ln_spread;
     }
     Some((blocks, target))

@@ -30,18 +30,22 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Its columns with everything that is fitted projected out, some poses left out.
-    pub fn block(&self, (fitted, neighbourhood): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Block {
-        let design = self.design.clone().without(left_out);
-        let mut coefficients = self.coefficients.clone();
-        if fitted.found.noise != Noise::Declared {
-            // A σ from a residual that holds the effect says nothing of how large that is.
-            coefficients.largest.fill(f64::INFINITY);
+    /// Their columns with everything that is fitted projected out, some poses left out.
+    pub fn blocks(all: &[&Self], (fitted, fit): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Vec<Block> {
+        let design = |own: &&Self| {
+            let mut coefficients = own.coefficients.clone();
+            if fitted.found.noise != Noise::Declared {
+                // A σ from a residual that holds the effect says nothing of how large that is.
+                coefficients.largest.fill(f64::INFINITY);
+            }
+            (own.design.clone().without(left_out), own.ln_prior, coefficients)
+        };
+        let mut blocks = Block::all(all.iter().map(design).collect(), fit);
+        for (block, own) in blocks.iter_mut().zip(all) {
+            block.is_law = own.hypothesis.effect().is_some();
+            block.is_surface = !block.is_law && own.hypothesis.depends_on.len() > 1;
         }
-        let mut block = Block::new(design, neighbourhood, self.ln_prior, coefficients);
-        block.is_law = self.hypothesis.effect().is_some();
-        block.is_surface = !block.is_law && self.hypothesis.depends_on.len() > 1;
-        block
+        blocks
     }
 }
 

@@ -1,14 +1,13 @@
 //! Values of a searched argument between those that are listed, as a time constant: about the effects that explanations hold, the value that
 //! does best beside the rest becomes a hypothesis like all others. A strong effect of a value hardly off would else leave structure.
 
-use rayon::prelude::*;
-
 use super::block::{Block, Design};
 use super::columns::{Candidate, even};
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law};
 use super::marginal::Coefficients;
-use super::search::{Target, Weighted, gains_beside};
+use super::products::{Products, Target};
+use super::search::{Weighted, gains_beside};
 use crate::diagnose::rules::SelectionRules;
 use crate::problem::{Effect, Problem};
 
@@ -28,7 +27,7 @@ pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
     (blocks, target): (&mut Vec<Block>, &Target),
-    block: impl Fn(&Candidate) -> Block + Sync,
+    of: impl Fn(&[Candidate]) -> Vec<Block>,
     (problem, rules): (&Problem, &SelectionRules),
 ) -> Vec<Candidate> {
     let known = blocks.len();
@@ -50,9 +49,9 @@ pub(super) fn finer(
                     if near.is_empty() || target.stop.is_requested() {
                         break;
                     }
-                    blocks.par_extend(near.par_iter().map(&block));
+                    blocks.extend(of(&near));
                     let all: Vec<usize> = std::iter::once(member).chain(known..blocks.len()).collect();
-                    let mut gains = gains_beside(rest, &all, (blocks, target), rules);
+                    let mut gains = gains_beside(rest, &all, &Products::new((blocks, target), rules));
                     blocks.truncate(known);
                     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
                     let of_own = gains.iter().find(|(k, ..)| *k == member).map_or(least, |(_, gain, _)| gain + BETTER);

@@ -65,6 +65,13 @@ pub(super) enum Normal {
 }
 
 impl Normal {
+    /// b.
+    pub fn product(&self) -> &DVector<f64> {
+        match self {
+            Self::Dense { product, .. } | Self::LessFew { product, .. } => product,
+        }
+    }
+
     /// The same beside a set that takes Z A = `along` off the columns and `taken` = Z r off the residual.
     pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {

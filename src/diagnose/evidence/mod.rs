@@ -17,6 +17,7 @@ mod hypotheses;
 mod hypothesis;
 mod marginal;
 mod posterior;
+mod products;
 mod sag;
 mod search;
 mod waves;
@@ -26,11 +27,9 @@ use std::collections::btree_map::Entry;
 
 use super::data::Data;
 use super::fitted::Fitted;
-use super::rules::SelectionRules;
 use crate::problem::Effect;
 use again::carried_by_one;
 pub(super) use again::stability;
-use block::Block;
 use blocks::blocks;
 use columns::Candidate;
 pub use explanation::Explanation;
@@ -38,7 +37,8 @@ pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
 pub use posterior::{Claims, Evidence};
-use search::{Target, Weighted, search};
+use products::Products;
+use search::{Weighted, search};
 use waves::Waves;
 
 /// Shapes that are looked at more closely.
@@ -63,7 +63,10 @@ pub(super) fn ln_posterior(
     };
     let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
     let (blocks, target) = blocks(fitted, data, &hypotheses, &own, left_out)?;
-    Some(search::ln_posterior(&blocks, &target, data.rules)? - target.noise.freedom * (fitted.sigma / sigma).ln())
+    Some(
+        search::ln_posterior(&Products::new((&blocks, &target), data.rules))?
+            - target.noise.freedom * (fitted.sigma / sigma).ln(),
+    )
 }
 
 /// The most probable form of a function without a law, beside what the fit holds, and 1 σ of the coefficients of its columns: one of
@@ -80,7 +83,7 @@ pub(super) fn best_form(
     let gains = |forms: &[&Candidate]| {
         let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
         let all: Vec<usize> = (0..blocks.len()).collect();
-        let mut gains = search::gains_beside(&[], &all, (&blocks, &target), data.rules);
+        let mut gains = search::gains_beside(&[], &all, &Products::new((&blocks, &target), data.rules));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(gains)
     };
@@ -127,24 +130,24 @@ fn weighed_without<'a>(
     let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    let mut weighted = search(&blocks, &target, data.rules, &present);
+    let products = Products::new((&blocks, &target), data.rules);
+    let mut weighted = search(&products, &present);
     if data.stop.is_requested() {
         return None;
     }
-    let (own, rules) = (&hypotheses, data.rules);
-    let waves = Waves { hypotheses: own, blocks: &blocks, target: &target, fitted, rules, left_out };
-    let waves = waves.promising(&weighted);
+    let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }.promising(&weighted);
+    let blocks_of =
+        |some: &[Candidate]| Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out);
     if !waves.is_empty() {
-        blocks.extend(waves.iter().map(|wave| wave.block((fitted, &target.fit), left_out)));
+        blocks.extend(blocks_of(&waves));
         hypotheses.all.extend(waves);
-        weighted = search(&blocks, &target, data.rules, &present);
+        weighted = search(&Products::new((&blocks, &target), data.rules), &present);
     }
-    let block = |own: &Candidate| own.block((fitted, &target.fit), left_out);
-    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), block, (&fitted.problem, data.rules));
+    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), blocks_of, (&fitted.problem, data.rules));
     if !finer.is_empty() {
-        blocks.extend(finer.iter().map(block));
+        blocks.extend(blocks_of(&finer));
         hypotheses.all.extend(finer);
-        weighted = search(&blocks, &target, data.rules, &present);
+        weighted = search(&Products::new((&blocks, &target), data.rules), &present);
     }
     let of = |k: usize| &hypotheses.all[k].hypothesis;
     if data.stop.is_requested() {
@@ -181,21 +184,16 @@ fn weighed_without<'a>(
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
     if let Some(best) = evidence.sure(data.rules.sure) {
-        evidence.stand_ins = stand_ins(best, &hypotheses, (&blocks, &target), data.rules);
+        evidence.stand_ins = stand_ins(best, &hypotheses, &Products::new((&blocks, &target), data.rules));
     }
     Some((evidence, hypotheses))
 }
 
 /// For each hypothesis of an explanation the few other effects, one of a family at each place, that do best in its place, if at least half as
 /// well.
-fn stand_ins(
-    best: &Explanation,
-    hypotheses: &Hypotheses,
-    (blocks, target): (&[Block], &Target),
-    rules: &SelectionRules,
-) -> Vec<(Hypothesis, Hypothesis)> {
+fn stand_ins(best: &Explanation, hypotheses: &Hypotheses, products: &Products) -> Vec<(Hypothesis, Hypothesis)> {
     let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
-    let tried: Vec<usize> = (0..blocks.len()).filter(|&k| effect(k).is_some()).collect();
+    let tried: Vec<usize> = (0..products.blocks.len()).filter(|&k| effect(k).is_some()).collect();
     let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
         hypotheses.all.iter().position(|known| known.variant == *variant && known.hypothesis == *own)
     };
@@ -203,15 +201,15 @@ fn stand_ins(
     let mut all = Vec::new();
     for &own in &members {
         let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
-        let mut gains = search::gains_beside(&others, &tried, (blocks, target), rules);
-        let of_own = search::gains_beside(&others, &[own], (blocks, target), rules);
+        let mut gains = search::gains_beside(&others, &tried, products);
+        let of_own = search::gains_beside(&others, &[own], products);
         let least = of_own.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
         gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
         let mut known = vec![name(own)];
         for (k, ..) in gains {
-            if !known.contains(&name(k)) && known.len() <= rules.stand_ins {
+            if !known.contains(&name(k)) && known.len() <= products.rules.stand_ins {
                 known.push(name(k));
                 all.push((hypotheses.all[own].hypothesis.clone(), hypotheses.all[k].hypothesis.clone()));
             }

@@ -2,14 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::super::neighbourhood::LinearNeighbourhood;
 use super::super::rules::SelectionRules;
 use super::block::Block;
-use super::marginal::{Noise, over_noise};
-use crate::identify::Stop;
+use super::products::{Left, Products};
 
 /// Passes over the sizes of a set until they are to one another as they stay.
 const SETTLING: usize = 4;
@@ -19,15 +16,6 @@ const LIKELY: usize = 32;
 const SPLIT: usize = 3;
 /// Times that the best set is changed by more than one member, each time the best of those before.
 const CHANGES: usize = 4;
-
-/// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
-#[derive(Debug, Clone)]
-pub(super) struct Target {
-    pub fit: LinearNeighbourhood,
-    pub noise: Noise,
-    /// The wish that the search end early.
-    pub stop: Stop,
-}
 
 /// A set of hypotheses, and its probability among all sets looked at.
 #[derive(Debug, Clone)]
@@ -66,151 +54,31 @@ impl Set {
     ///
     /// Sizes are in units of the noise, which an effect that is not yet explained is taken for: what was taken first would be held too
     /// tightly. ln p(r | set) = l + Σ (ln p(r | the others, k) − l), l at the sizes of all, of k summed over its own.
-    fn settled(mut self, (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Self {
-        if self.members.len() < 2 || self.has_wide(blocks, rules) {
+    fn settled(mut self, products: &Products) -> Self {
+        if self.members.len() < 2 || self.has_wide(products.blocks, products.rules) {
             return self;
         }
-        let own = Products::of(&self.members, blocks, target);
         let mut summed = vec![0.0; self.members.len()];
         for _ in 0..SETTLING {
             let mut changed = false;
             for (k, &member) in self.members.iter().enumerate() {
-                let Some(others) = own.left(&self.sizes, Some(k)) else { return self };
-                let left = (others.squares, target.noise.freedom);
-                let set = Some((&others.along, &others.taken));
-                let (gain, size) = blocks[member].gain_beside(set, (left, others.without), &own.grid, rules);
+                let others = [&self.members[..k], &self.members[k + 1..]].concat();
+                let sizes = [&self.sizes[..k], &self.sizes[k + 1..]].concat();
+                let Some(others) = products.left(&others, &sizes) else { return self };
+                let (gain, size) = others.gain(member);
                 changed |= size.to_bits() != self.sizes[k].to_bits();
                 self.sizes[k] = size;
-                summed[k] = others.ln_likelihood + gain;
+                summed[k] = others.ln_likelihood() + gain;
             }
             if !changed {
                 break;
             }
         }
-        let Some(all) = own.left(&self.sizes, None) else { return self };
-        let prior: f64 = self.members.iter().map(|&member| blocks[member].ln_prior).sum();
-        let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood).sum();
-        self.ln_posterior = all.ln_likelihood + gains - over_noise(own.squares, &own.grid) + prior;
+        let Some(all) = products.left(&self.members, &self.sizes) else { return self };
+        let prior: f64 = self.members.iter().map(|&member| products.blocks[member].ln_prior).sum();
+        let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
+        self.ln_posterior = all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
         self
-    }
-}
-
-/// Products of the columns of a set with one another and with the residual: what sizes do to it is told by these alone.
-struct Products {
-    /// AᵀA and Aᵀr of all members, and where each begins among the columns.
-    gram: DMatrix<f64>,
-    product: DVector<f64>,
-    begins: Vec<usize>,
-    /// rᵀr.
-    squares: f64,
-    grid: Vec<(f64, f64)>,
-}
-
-/// What a set leaves, or a set but for one member.
-struct Left {
-    /// L⁻¹DG of the columns of that member and L⁻¹Db, with D of sizes and 1 + DGD = L Lᵀ.
-    along: DMatrix<f64>,
-    taken: DVector<f64>,
-    squares: f64,
-    /// ln of the density of what is left, and that less ln det L: ln p(r | set) at these sizes.
-    without: f64,
-    ln_likelihood: f64,
-}
-
-impl Products {
-    fn of(members: &[usize], blocks: &[Block], target: &Target) -> Self {
-        let residual = target.fit.residual();
-        let mut all = DMatrix::zeros(residual.len(), 0);
-        let mut begins = vec![0];
-        for &member in members {
-            let (columns, first) = (blocks[member].columns(&target.fit), all.ncols());
-            all = all.resize_horizontally(first + columns.ncols(), 0.0);
-            all.columns_mut(first, columns.ncols()).copy_from(&columns);
-            begins.push(all.ncols());
-        }
-        let mut gram = DMatrix::zeros(all.ncols(), all.ncols());
-        gram.gemm(1.0, &all.transpose(), &all, 0.0);
-        let product = all.tr_mul(residual);
-        Self { gram, product, begins, squares: residual.norm_squared(), grid: target.noise.grid() }
-    }
-
-    fn left(&self, sizes: &[f64], without: Option<usize>) -> Option<Left> {
-        let of = |k: usize| self.begins[k]..self.begins[k + 1];
-        let members = (0..sizes.len()).filter(|&k| Some(k) != without);
-        let scaled: Vec<(usize, f64)> = members.flat_map(|k| of(k).map(move |column| (column, sizes[k]))).collect();
-        let gone: Vec<usize> = without.map_or_else(Vec::new, |k| of(k).collect());
-        let n = scaled.len();
-        let inner = DMatrix::from_fn(n, n, |i, j| {
-            let ((a, one), (b, other)) = (scaled[i], scaled[j]);
-            one * self.gram[(a, b)] * other + if i == j { 1.0 } else { 0.0 }
-        });
-        let lower = inner.cholesky()?.l();
-        let beside = |column: usize| DVector::from_fn(n, |i, _| scaled[i].1 * self.gram[(scaled[i].0, column)]);
-        let mut along = DMatrix::zeros(n, gone.len());
-        for (k, &column) in gone.iter().enumerate() {
-            along.set_column(k, &lower.solve_lower_triangular(&beside(column))?);
-        }
-        let product = DVector::from_fn(n, |i, _| scaled[i].1 * self.product[scaled[i].0]);
-        let taken = lower.solve_lower_triangular(&product)?;
-        let squares = self.squares - taken.norm_squared();
-        let without = over_noise(squares, &self.grid);
-        let ln_likelihood = without - lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
-        Some(Left { along, taken, squares, without, ln_likelihood })
-    }
-}
-
-/// What a set leaves of the residual: with A of its members scaled by their sizes and 1 + AᵀA = L Lᵀ, Z = L⁻¹AᵀC takes its part off
-/// other columns C.
-pub(super) struct Conditioned {
-    /// L⁻¹Aᵀ, shape = (columns of the set, rows).
-    within: DMatrix<f64>,
-    /// L⁻¹Aᵀr.
-    taken: DVector<f64>,
-    squares: f64,
-    /// Of the noise, and ln of the density of what is left over it.
-    grid: Vec<(f64, f64)>,
-    without: f64,
-}
-
-impl Conditioned {
-    fn new(set: &Set, blocks: &[Block], target: &Target) -> Option<Self> {
-        let residual = target.fit.residual();
-        let mut all = DMatrix::zeros(residual.len(), 0);
-        for (&member, &size) in set.members.iter().zip(&set.sizes) {
-            let (columns, first) = (blocks[member].columns(&target.fit), all.ncols());
-            all = all.resize_horizontally(first + columns.ncols(), 0.0);
-            all.columns_mut(first, columns.ncols()).copy_from(&(columns.as_ref() * size));
-        }
-        let k = all.ncols();
-        let inner = DMatrix::identity(k, k) + all.transpose() * &all;
-        let within = inner.cholesky()?.l().solve_lower_triangular(&all.transpose())?;
-        let taken = &within * residual;
-        let squares = residual.norm_squared() - taken.norm_squared();
-        let grid = target.noise.grid();
-        let without = over_noise(squares, &grid);
-        Some(Self { within, taken, squares, grid, without })
-    }
-
-    /// What a set with these members leaves.
-    pub fn on(members: &[usize], (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Option<Self> {
-        Self::new(&assembled(members, blocks, target, rules)?, blocks, target)
-    }
-
-    /// What is left of the residual, everything fitted projected out.
-    pub fn left(&self, target: &Target) -> DVector<f64> {
-        target.fit.residual() - self.within.tr_mul(&self.taken)
-    }
-
-    /// The gain of a block, its prior among it, and its most probable size.
-    pub fn odds(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
-        let (gain, size) = self.gain(block, target, rules);
-        (gain + block.ln_prior, size)
-    }
-
-    /// ln p(r | set and block) − ln p(r | set), and the block's most probable size.
-    fn gain(&self, block: &Block, target: &Target, rules: &SelectionRules) -> (f64, f64) {
-        let left = ((self.squares, target.noise.freedom), self.without);
-        block.gain((&self.within, &self.taken), left, &self.grid, rules)
     }
 }
 
@@ -218,12 +86,13 @@ impl Conditioned {
 ///
 /// The search starts from nothing and from the set `present`, whole and without one of its members: what was found before is
 /// judged again beside everything else. Stopped, it has looked at some sets only.
-pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, present: &[usize]) -> Vec<Weighted> {
+pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
+    let Products { blocks, rules, .. } = *products;
     let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
     let starts = std::iter::once(Vec::new()).chain((0..present.len()).map(without)).chain([present.to_vec()]);
     for start in starts {
-        if let Some(set) = assembled(&start, blocks, target, rules) {
+        if let Some(set) = assembled(&start, products) {
             known.insert(sorted(&set.members), set);
         }
     }
@@ -238,7 +107,7 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
         let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
         for (place, set) in front.iter().enumerate() {
             let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
-            for longer in extended(set, tried, (blocks, target), rules) {
+            for longer in extended(set, tried, products) {
                 let key = sorted(&longer.members);
                 let best = next.get(&key).or_else(|| known.get(&key));
                 if best.is_none_or(|other| longer.ln_posterior > other.ln_posterior) {
@@ -260,18 +129,18 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
             promising
         });
         let best = sets.into_iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).collect::<Vec<_>>();
-        front = best.into_par_iter().map(|set| set.settled((blocks, target), rules)).collect();
+        front = best.into_par_iter().map(|set| set.settled(products)).collect();
         front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
             break;
         }
     }
-    changed(&mut known, &promising.unwrap_or(every), (blocks, target), rules);
+    changed(&mut known, &promising.unwrap_or(every), products);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
-    let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled((blocks, target), rules)).collect();
+    let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
     known.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
     let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = known.values().map(|set| (set.ln_posterior - most).exp()).sum();
@@ -285,23 +154,19 @@ pub(super) fn search(blocks: &[Block], target: &Target, rules: &SelectionRules, 
 }
 
 /// A set with each of some further members.
-fn extended(set: &Set, tried: &[usize], (blocks, target): (&[Block], &Target), rules: &SelectionRules) -> Vec<Set> {
-    let Some(conditioned) = Conditioned::new(set, blocks, target) else { return Vec::new() };
-    let is_new = |block: &&usize| !set.members.contains(block) && !target.stop.is_requested();
-    let gain = |&block: &usize| (block, conditioned.gain(&blocks[block], target, rules));
-    let gains: Vec<(usize, (f64, f64))> = tried.par_iter().filter(is_new).map(gain).collect();
-    gains.into_iter().map(|(block, gain)| set.with(block, gain, blocks)).collect()
+fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
+    let Some(left) = products.left(&set.members, &set.sizes) else { return Vec::new() };
+    let is_new = |block: &&usize| !set.members.contains(block) && !products.target.stop.is_requested();
+    let gains: Vec<(usize, (f64, f64))> =
+        tried.par_iter().filter(is_new).map(|&block| (block, left.gain(block))).collect();
+    gains.into_iter().map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
 }
 
 /// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members,
 /// with another in its place, and with two others there. So two things that act beside one another are found where a third, or a function of several
 /// covariates, does for both as well as one hypothesis can.
-fn changed(
-    known: &mut BTreeMap<Vec<usize>, Set>,
-    promising: &[usize],
-    (blocks, target): (&[Block], &Target),
-    rules: &SelectionRules,
-) {
+fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products: &Products) {
+    let Products { blocks, rules, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
     let plain: Vec<usize> = every.iter().copied().filter(|&block| !blocks[block].is_surface).collect();
     let laws: Vec<usize> = promising.iter().copied().filter(|&block| blocks[block].is_law).collect();
@@ -325,24 +190,24 @@ fn changed(
             return;
         }
         for (rest, gone) in rests {
-            let Some(rest) = assembled(&rest, blocks, target, rules) else { continue };
+            let Some(rest) = assembled(&rest, products) else { continue };
             let others = if blocks[gone].is_surface { &plain } else { &laws };
             let others: Vec<usize> = others.iter().copied().filter(|&other| other != gone).collect();
             // All hypotheses by themselves are known.
             let mut one: Vec<Set> = if rest.members.is_empty() {
                 known.values().filter(|set| set.members.len() == 1).cloned().collect()
             } else {
-                extended(&rest, &every, (blocks, target), rules)
+                extended(&rest, &every, products)
             };
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
             let narrow = one.iter().filter(is_other).filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);
-            let two: Vec<Set> = narrow.flat_map(|set| extended(set, &others, (blocks, target), rules)).collect();
+            let two: Vec<Set> = narrow.flat_map(|set| extended(set, &others, products)).collect();
             let mut new: Vec<Set> = one.into_iter().chain(two).collect();
             new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             // At settled sizes a set may be far more probable than with its members taken one after the other.
             let (first, others) = new.split_at(new.len().min(rules.extended));
-            let settled = first.par_iter().map(|set| set.clone().settled((blocks, target), rules)).collect::<Vec<_>>();
+            let settled = first.par_iter().map(|set| set.clone().settled(products)).collect::<Vec<_>>();
             let others = others.iter().filter(|set| set.ln_posterior > best - rules.hopeless);
             for set in std::iter::once(rest).chain(settled).chain(others.cloned()) {
                 let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
@@ -355,35 +220,35 @@ fn changed(
 }
 
 /// ln p(r | all blocks) and of their prior.
-pub(super) fn ln_posterior(blocks: &[Block], target: &Target, rules: &SelectionRules) -> Option<f64> {
-    let all: Vec<usize> = (0..blocks.len()).collect();
-    let set = assembled(&all, blocks, target, rules)?;
-    Some(set.ln_posterior + over_noise(target.fit.residual().norm_squared(), &target.noise.grid()))
+pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
+    let all: Vec<usize> = (0..products.blocks.len()).collect();
+    Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
 }
 
-/// For each block that is tried the gain beside some others, its prior among it, and its most probable size.
-pub(super) fn gains_beside(
-    others: &[usize],
-    tried: &[usize],
-    (blocks, target): (&[Block], &Target),
-    rules: &SelectionRules,
-) -> Vec<(usize, f64, f64)> {
-    let Some(conditioned) = Conditioned::on(others, (blocks, target), rules) else { return Vec::new() };
+/// What a set with these members leaves, at their most probable sizes.
+pub(super) fn left_by<'p, 'a>(members: &[usize], products: &'p Products<'a>) -> Option<Left<'p, 'a>> {
+    let set = assembled(members, products)?;
+    products.left(&set.members, &set.sizes)
+}
+
+/// For each hypothesis that is tried the gain beside some others, its prior among it, and its most probable size.
+pub(super) fn gains_beside(others: &[usize], tried: &[usize], products: &Products) -> Vec<(usize, f64, f64)> {
+    let Some(left) = left_by(others, products) else { return Vec::new() };
     let gain = |&block: &usize| {
-        let (gain, size) = conditioned.odds(&blocks[block], target, rules);
-        (block, gain, size)
+        let (gain, size) = left.gain(block);
+        (block, gain + products.blocks[block].ln_prior, size)
     };
     tried.par_iter().map(gain).collect()
 }
 
 /// A set with these members, one after the other.
-fn assembled(members: &[usize], blocks: &[Block], target: &Target, rules: &SelectionRules) -> Option<Set> {
+fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {
-        let gain = Conditioned::new(&set, blocks, target)?.gain(&blocks[member], target, rules);
-        set = set.with(member, gain, blocks);
+        let gain = products.left(&set.members, &set.sizes)?.gain(member);
+        set = set.with(member, gain, products.blocks);
     }
-    Some(set.settled((blocks, target), rules))
+    Some(set.settled(products))
 }
 
 fn sorted(members: &[usize]) -> Vec<usize> {
@@ -394,10 +259,14 @@ fn sorted(members: &[usize]) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
     use crate::diagnose::evidence::block::Design;
-    use crate::diagnose::evidence::marginal::Coefficients;
-    use crate::diagnose::neighbourhood::Unknowns;
+    use crate::diagnose::evidence::marginal::{Coefficients, Noise};
+    use crate::diagnose::evidence::products::Target;
+    use crate::diagnose::neighbourhood::{LinearNeighbourhood, Unknowns};
+    use crate::identify::Stop;
 
     /// Numbers without pattern, of root mean square 1 about.
     fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
@@ -427,7 +296,7 @@ mod tests {
         let rules = &SelectionRules::DEFAULT;
         let of = |names: [usize; 3], members: &[usize]| {
             let (blocks, target) = three(names);
-            assembled(members, &blocks, &target, rules).unwrap().ln_posterior
+            assembled(members, &Products::new((&blocks, &target), rules)).unwrap().ln_posterior
         };
         let first = of([0, 1, 2], &[0, 1]);
         assert!((first - of([1, 0, 2], &[0, 1])).abs() < 1e-6, "{first} {}", of([1, 0, 2], &[0, 1]));
@@ -453,22 +322,8 @@ mod tests {
         let blocks = [&third, &one, &other].map(block);
         let target =
             Target { fit: fit.clone(), noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 }, stop: Stop::default() };
-        let found = search(&blocks, &target, rules, &[]);
+        let found = search(&Products::new((&blocks, &target), rules), &[]);
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
-    }
-
-    #[test]
-    fn products_tell_what_columns_do() {
-        let rules = &SelectionRules::DEFAULT;
-        let (blocks, target) = three([0, 1, 2]);
-        let set = Set { members: vec![0, 2], sizes: vec![30.0, 0.3], ln_posterior: 0.0 };
-        let conditioned = Conditioned::new(&set, &blocks, &target).unwrap();
-        let left = Products::of(&[0, 1, 2], &blocks, &target).left(&[30.0, 10.0, 0.3], Some(1)).unwrap();
-        assert!((left.squares / conditioned.squares - 1.0).abs() < 1e-9);
-        let (gain, size) = conditioned.gain(&blocks[1], &target, rules);
-        let of = ((left.squares, target.noise.freedom), left.without);
-        let own = blocks[1].gain_beside(Some((&left.along, &left.taken)), of, &conditioned.grid, rules);
-        assert!((gain - own.0).abs() < 1e-7 && size.to_bits() == own.1.to_bits(), "{gain} {own:?}");
     }
 }

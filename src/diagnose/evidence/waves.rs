@@ -16,11 +16,13 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::block::Block;
+use super::blocks::TOGETHER;
 use super::columns::{Candidate, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law, Part};
-use super::search::{Conditioned, Target, Weighted};
+use super::products::{Left, Products};
+use super::search::{Weighted, left_by};
 use crate::diagnose::covariate::Covariate;
 use crate::diagnose::fitted::Fitted;
 use crate::diagnose::rules::SelectionRules;
@@ -69,29 +71,30 @@ fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
 
 /// Waves of any order beside the other hypotheses about what a fit leaves.
 #[derive(Clone, Copy)]
-pub(super) struct Waves<'w, 'h> {
+pub(super) struct Waves<'w, 'h, 'a> {
     pub hypotheses: &'w Hypotheses<'h>,
-    pub blocks: &'w [Block],
-    pub target: &'w Target,
+    pub products: &'w Products<'a>,
     pub fitted: &'w Fitted,
-    pub rules: &'w SelectionRules,
     /// Poses that are left out.
     pub left_out: &'w [usize],
 }
 
-impl Waves<'_, '_> {
+impl<'w, 'a> Waves<'w, '_, 'a> {
     /// Waves of any order, and harmonics of orders that no list has, that may stand in the place of functions of `weighted` explanations.
     pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
         for (joint, rests) in self.places(weighted) {
             let Some((low, high)) = self.range(joint) else { continue };
-            if !is_free(&Effect::JointWave { joint: joint + 1, order: self.rules.wave_orders }, &self.fitted.problem) {
+            if !is_free(
+                &Effect::JointWave { joint: joint + 1, order: self.products.rules.wave_orders },
+                &self.fitted.problem,
+            ) {
                 continue;
             }
-            let left: Vec<Conditioned> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
+            let left: Vec<Left> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
             let [step, finer] = STEPS.map(|phase| phase / (high - low));
             // A wave of which less than one cycle is seen is none.
-            let first = self.gains(joint, &row(TAU / (high - low), self.rules.wave_orders, step), &left);
+            let first = self.gains(joint, &row(TAU / (high - low), self.products.rules.wave_orders, step), &left);
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
@@ -105,7 +108,7 @@ impl Waves<'_, '_> {
                     second.extend(near.into_iter().map(|order| written(order, digits)));
                     second.extend([order.floor(), order.ceil()]);
                 }
-                second.retain(|order| (TAU / (high - low)..=self.rules.wave_orders).contains(order));
+                second.retain(|order| (TAU / (high - low)..=self.products.rules.wave_orders).contains(order));
                 second.sort_by(f64::total_cmp);
                 second.dedup();
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
@@ -113,7 +116,7 @@ impl Waves<'_, '_> {
                 let new: Vec<Effect> = self.another(joint, &gains, &taken).into_iter().filter(is_new).collect();
                 for effect in new.into_iter().filter(|effect| is_free(effect, &self.fitted.problem)) {
                     let spread = order_of(&effect).map_or(1.0, |(_, order)| self.spread(joint, order, left));
-                    let candidate = self.hypotheses.function_of(&effect, (&self.fitted.problem, self.rules));
+                    let candidate = self.hypotheses.function_of(&effect, (&self.fitted.problem, self.products.rules));
                     found.extend(candidate.map(|own| Candidate { ln_prior: own.ln_prior + spread.ln(), ..own }));
                 }
             }
@@ -133,8 +136,8 @@ impl Waves<'_, '_> {
     }
 
     /// What some hypotheses leave.
-    fn beside(&self, rest: &[usize]) -> Option<Conditioned> {
-        Conditioned::on(rest, (self.blocks, self.target), self.rules)
+    fn beside(&self, rest: &[usize]) -> Option<Left<'w, 'a>> {
+        left_by(rest, self.products)
     }
 
     /// Least and greatest command of a joint \[rad\].
@@ -166,18 +169,22 @@ impl Waves<'_, '_> {
     }
 
     /// For what each of some sets leaves the orders, best first, with ln of the odds of such a wave to the set alone.
-    fn gains(&self, joint: usize, orders: &[f64], left: &[Conditioned]) -> Vec<Vec<(f64, f64)>> {
-        let how = (&self.fitted.problem, self.rules);
-        let of = |&order: &f64| {
-            if self.target.stop.is_requested() {
-                return None;
+    fn gains(&self, joint: usize, orders: &[f64], left: &[Left]) -> Vec<Vec<(f64, f64)>> {
+        let how = (&self.fitted.problem, self.products.rules);
+        let of = |orders: &[f64]| {
+            if self.products.target.stop.is_requested() {
+                return Vec::new();
             }
-            let wave = self.hypotheses.function_of(&Effect::JointWave { joint: joint + 1, order }, how)?;
-            let block = wave.block((self.fitted, &self.target.fit), self.left_out);
-            let odds: Vec<f64> = left.iter().map(|left| left.odds(&block, self.target, self.rules).0).collect();
-            Some((order, odds))
+            let wave = |&order: &f64| {
+                Some((order, self.hypotheses.function_of(&Effect::JointWave { joint: joint + 1, order }, how)?))
+            };
+            let (orders, waves): (Vec<f64>, Vec<Candidate>) = orders.iter().filter_map(wave).unzip();
+            let fit = (self.fitted, &self.products.target.fit);
+            let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
+            let odds = |block: &Block| left.iter().map(|left| left.odds_of(block)).collect();
+            orders.into_iter().zip(blocks.iter().map(odds)).collect()
         };
-        let all: Vec<(f64, Vec<f64>)> = orders.par_iter().filter_map(of).collect();
+        let all: Vec<(f64, Vec<f64>)> = orders.par_chunks(TOGETHER).flat_map_iter(of).collect();
         let of_set = |k: usize| {
             let mut own: Vec<(f64, f64)> = all.iter().map(|(order, odds)| (*order, odds[k])).collect();
             own.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -191,7 +198,7 @@ impl Waves<'_, '_> {
     fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else { return Vec::new() };
         let as_good = || {
-            let near = gains.iter().take_while(|(_, gain)| *gain > most - self.rules.another_order);
+            let near = gains.iter().take_while(|(_, gain)| *gain > most - self.products.rules.another_order);
             near.map(|(order, _)| *order)
         };
         let joint = joint + 1;
@@ -207,12 +214,12 @@ impl Waves<'_, '_> {
     }
 
     /// Orders about one, in units of orders, each by how well it does beside it: by the trapezoid rule, none more than it.
-    fn spread(&self, joint: usize, order: f64, left: &Conditioned) -> f64 {
+    fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
         let away = std::iter::successors(Some(STEPS[1]), |phase| Some(phase * WIDER)).take_while(|phase| *phase < PI);
         let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
-        let is_looked_for = |order: &f64| (TAU / range..=self.rules.wave_orders).contains(order);
+        let is_looked_for = |order: &f64| (TAU / range..=self.products.rules.wave_orders).contains(order);
         let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();

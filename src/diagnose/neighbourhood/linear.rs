@@ -15,6 +15,9 @@ pub(in crate::diagnose) const LEAST_DECIDED: f64 = 1e-6;
 
 /// So many columns at most are projected out by one direction of the basis after the other: it is gone through once for all of them.
 const NARROW: usize = 4;
+/// Part of a column that is left from which on what one projection leaves along a basis is rounding. Of less, two are enough [Giraud,
+/// Langou & Rozložník 2005].
+const MOSTLY: f64 = 0.1;
 
 /// The unknowns of a fit as it ended.
 #[derive(Debug, Clone, Default)]
@@ -220,25 +223,31 @@ impl LinearNeighbourhood {
     /// Columns of the data, shape = (3 N, k), with everything fitted projected out, shape = (3 N + priors, k).
     pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
-        let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
         // Below the data there is nothing at first.
-        for filled in [self.rows, self.residual.len()] {
-            if left.ncols() > NARROW {
-                // The narrow side is transposed: this is the product that is fast.
-                let along = (left.transpose() * &self.basis).transpose();
-                left.gemm(-1.0, &self.basis, &along, 1.0);
-            } else {
-                let along = self.basis.rows(0, filled).tr_mul(&left.rows(0, filled));
-                for (column, along) in self.basis.column_iter().zip(along.row_iter()) {
-                    let pairs = left.column_iter_mut().zip(along.iter());
-                    pairs.for_each(|(mut left, along)| left.axpy(-along, &column, 1.0));
-                }
-            }
-            if most_is_left(&left, &lengths) {
-                break;
-            }
+        self.take_off(&mut left, self.rows);
+        let is_short = |k: &usize| left.column(*k).norm() < MOSTLY * columns.column(*k).norm();
+        let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
+        if !short.is_empty() {
+            let mut again = left.select_columns(&short);
+            self.take_off(&mut again, self.residual.len());
+            short.iter().zip(again.column_iter()).for_each(|(&k, column)| left.set_column(k, &column));
         }
         left
+    }
+
+    /// Takes off columns what of them is along the basis, nothing of them being behind so many rows.
+    fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
+        if left.ncols() > NARROW {
+            // The narrow side is transposed: this is the product that is fast.
+            let along = (left.transpose() * &self.basis).transpose();
+            left.gemm(-1.0, &self.basis, &along, 1.0);
+            return;
+        }
+        let along = self.basis.rows(0, filled).tr_mul(&left.rows(0, filled));
+        for (column, along) in self.basis.column_iter().zip(along.row_iter()) {
+            let pairs = left.column_iter_mut().zip(along.iter());
+            pairs.for_each(|(mut left, along)| left.axpy(-along, &column, 1.0));
+        }
     }
 
     /// Whitened residual at the optimum, priors below.
@@ -304,10 +313,9 @@ impl LinearNeighbourhood {
     }
 }
 
-/// Whether a tenth at least is left of every column: then what one projection leaves along a basis is rounding. Of less, two are enough
-/// [Giraud, Langou & Rozložník 2005].
+/// Whether so much is left of every column.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
-    left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= 0.1 * length)
+    left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= MOSTLY * length)
 }
 
 /// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly 0.
