@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::columns::Candidate;
+use super::columns::{Candidate, TOGETHER};
 use super::hypotheses::Hypotheses;
 use super::marginal;
 use super::products::{Products, Target};
@@ -12,9 +12,6 @@ use crate::diagnose::data::Data;
 use crate::diagnose::fitted::Fitted;
 use crate::identify::Noise;
 use crate::problem::Effect;
-
-/// Hypotheses whose columns are projected together.
-pub(super) const TOGETHER: usize = 64;
 
 /// Hypotheses and the residual with everything that is fitted projected out, some poses left out; `None` where the residual is not
 /// a finite number, or the end was asked for.

@@ -29,6 +29,9 @@ pub(super) struct Candidate {
     pub coefficients: Coefficients,
 }
 
+/// Hypotheses whose columns are projected together.
+pub(super) const TOGETHER: usize = 64;
+
 impl Candidate {
     /// Their columns with everything that is fitted projected out, some poses left out.
     pub fn blocks(all: &[&Self], (fitted, fit): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Vec<Block> {
