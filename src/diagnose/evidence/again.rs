@@ -80,7 +80,7 @@ impl<'a> Again<'a> {
     fn mainstay(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new((&blocks, &target), self.data.rules);
-        let left = |of: &dyn Fn(&Hypothesis) -> bool| left_by(&self.members(of), &products)?.residual();
+        let left = |of: &dyn Fn(&Hypothesis) -> bool| Some(left_by(&self.members(of), &products)?.residual());
         let (with, without) = (left(&|_| true)?, left(&|known| known.effect() != Some(effect))?);
         let poses = self.hypotheses.linearised.poses().len();
         let gain = |pose: usize| without.rows(3 * pose, 3).norm_squared() - with.rows(3 * pose, 3).norm_squared();

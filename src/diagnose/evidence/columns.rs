@@ -312,11 +312,26 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Smooth functions of one covariate at some columns that belong together.
+    /// Whether an effect is looked for that is linear in a covariate there.
+    fn has_law(&self, slot: Slot, covariate: &Covariate) -> bool {
+        let acts = |own: &Candidate| {
+            let effect = own.hypothesis.effect().filter(|_| own.hypothesis.depends_on == [covariate.clone()]);
+            effect.is_some_and(|effect| effect.terms(self.problem).iter().any(|term| term.slot == slot))
+        };
+        self.candidates.iter().any(acts)
+    }
+
+    /// Smooth functions of one covariate at some columns that belong together: of what is no command a straight line, unless that is a law, and
+    /// any, which changes over some length.
     fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
         let hypothesis =
             |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate.clone()] };
-        // Of two values a function is the effect that the catalogue has.
+        let is_of_arm = matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load);
+        if !is_of_arm && !self.has_law(slot, &of.covariate) {
+            let line = || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
+            self.add(family, 1.0, hypothesis(Law::Smooth), line);
+        }
+        // Of two values any function is a line, or the effect that the catalogue has.
         if of.levels < 3 {
             return;
         }

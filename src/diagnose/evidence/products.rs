@@ -91,12 +91,14 @@ impl<'a> Products<'a> {
             }
         }
         let lower = inner.cholesky()?.l();
+        let within = lower.solve_lower_triangular(&DMatrix::from_diagonal(&DVector::from_row_slice(&scales)))?;
         if !lower.solve_lower_triangular_mut(&mut taken) {
             return None;
         }
         let squares = self.squares - taken.norm_squared();
         let without = self.over_noise(squares);
-        Some(Left { products: self, members: members.to_vec(), scales, lower, taken, squares, without })
+        let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum();
+        Some(Left { products: self, members: members.to_vec(), within, taken, squares, without, ln_determinant })
     }
 }
 
@@ -105,34 +107,34 @@ impl<'a> Products<'a> {
 pub(super) struct Left<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
-    /// D, a size for each column.
-    scales: Vec<f64>,
-    lower: DMatrix<f64>,
+    /// L⁻¹D.
+    within: DMatrix<f64>,
     /// Z r.
     taken: DVector<f64>,
     squares: f64,
     /// ln of the density of what is left.
     without: f64,
+    /// ln det L.
+    ln_determinant: f64,
 }
 
 impl Left<'_, '_> {
     /// ln p(r | set) at its sizes.
     pub fn ln_likelihood(&self) -> f64 {
-        self.without - self.lower.diagonal().iter().map(|value| value.ln()).sum::<f64>()
+        self.without - self.ln_determinant
     }
 
     /// What is left of the residual, everything fitted projected out.
-    pub fn residual(&self) -> Option<DVector<f64>> {
+    pub fn residual(&self) -> DVector<f64> {
         let mut left = self.products.target.fit.residual().clone();
-        let mut along = self.lower.tr_solve_lower_triangular(&self.taken)?;
-        along.iter_mut().zip(&self.scales).for_each(|(own, scale)| *own *= scale);
+        let along = self.within.tr_mul(&self.taken);
         let mut first = 0;
         for &member in &self.members {
             let columns = &self.products.member(member).columns;
             left.gemv(-1.0, columns.as_ref(), &along.rows(first, columns.ncols()), 1.0);
             first += columns.ncols();
         }
-        Some(left)
+        left
     }
 
     /// ln p(r | set and a hypothesis) − ln p(r | set), and its most probable size.
@@ -157,17 +159,12 @@ impl Left<'_, '_> {
         if self.members.is_empty() {
             return block.gain(None, left, grid, rules);
         }
-        let (mut along, mut first) = (DMatrix::zeros(self.scales.len(), block.product().len()), 0);
+        let (mut all, mut first) = (DMatrix::zeros(self.taken.len(), block.product().len()), 0);
         for with in with {
-            along.rows_mut(first, with.nrows()).copy_from(&with);
+            all.rows_mut(first, with.nrows()).copy_from(&with);
             first += with.nrows();
         }
-        for mut column in along.column_iter_mut() {
-            column.iter_mut().zip(&self.scales).for_each(|(own, scale)| *own *= scale);
-        }
-        if !self.lower.solve_lower_triangular_mut(&mut along) {
-            return (f64::NEG_INFINITY, 1.0);
-        }
+        let along = &self.within * all;
         block.gain(Some((&along, &self.taken)), left, grid, rules)
     }
 }
