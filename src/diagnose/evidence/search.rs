@@ -14,6 +14,8 @@ const SETTLING: usize = 4;
 const LIKELY: usize = 32;
 /// Sets in which a function of several covariates is taken apart, the most probable ones.
 const SPLIT: usize = 3;
+/// Members of a set of which two are taken out together.
+const FEW: usize = 6;
 /// Times that the best set is changed by more than one member, each time the best of those before.
 const CHANGES: usize = 4;
 
@@ -162,9 +164,9 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     gains.into_iter().map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
 }
 
-/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members,
-/// with another in its place, and with two others there. So two things that act beside one another are found where a third, or a function of several
-/// covariates, does for both as well as one hypothesis can.
+/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members, the best
+/// one without two, with another in their place, and with two others there. So two things that act beside one another are found where a third, or
+/// a function of several covariates, does for both as well as one hypothesis can, or a third with a function beside it.
 fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products: &Products) {
     let Products { blocks, rules, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
@@ -177,11 +179,13 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products:
         let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
         likely.retain(|set| set.ln_posterior > best - rules.hopeless);
         let is_surface = |member: &usize| blocks[*member].is_surface;
-        let surfaces = likely.iter().filter_map(|set| Some((set.members.iter().copied().find(is_surface)?, *set)));
-        let of_best = likely.iter().take(1).flat_map(|set| set.members.iter().map(move |&member| (member, *set)));
-        let mut rests: Vec<(Vec<usize>, usize)> = Vec::new();
+        let surfaces =
+            likely.iter().filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
+        let of_best =
+            likely.iter().take(1).flat_map(|set| one_or_two(&set.members).into_iter().map(move |gone| (gone, *set)));
+        let mut rests: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
         for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
-            let rest: Vec<usize> = set.members.iter().copied().filter(|&member| member != gone).collect();
+            let rest: Vec<usize> = set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             if tried.insert(sorted(&rest)) {
                 rests.push((rest, gone));
             }
@@ -191,8 +195,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products:
         }
         for (rest, gone) in rests {
             let Some(rest) = assembled(&rest, products) else { continue };
-            let others = if blocks[gone].is_surface { &plain } else { &laws };
-            let others: Vec<usize> = others.iter().copied().filter(|&other| other != gone).collect();
+            let others = if gone.iter().any(is_surface) { &plain } else { &laws };
+            let others: Vec<usize> = others.iter().copied().filter(|other| !gone.contains(other)).collect();
             // All hypotheses by themselves are known.
             let mut one: Vec<Set> = if rest.members.is_empty() {
                 known.values().filter(|set| set.members.len() == 1).cloned().collect()
@@ -217,6 +221,14 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products:
             }
         }
     }
+}
+
+/// Each member, and each two of them where they are few.
+fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
+    let single = members.iter().map(|&member| vec![member]);
+    let few = if members.len() <= FEW { members } else { &[] };
+    let pairs = few.iter().enumerate().flat_map(|(k, &one)| few[k + 1..].iter().map(move |&other| vec![one, other]));
+    single.chain(pairs).collect()
 }
 
 /// ln p(r | all blocks) and of their prior.
