@@ -9,7 +9,7 @@ use super::super::data::{Data, bits, number};
 use super::super::fitted::Fitted;
 use super::block::Block;
 use super::blocks::blocks;
-use super::columns::Candidate;
+use super::candidate::Candidate;
 use super::explanation::Explanation;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::Hypothesis;

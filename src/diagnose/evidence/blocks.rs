@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::columns::{Candidate, TOGETHER};
+use super::candidate::{Candidate, TOGETHER};
 use super::hypotheses::Hypotheses;
 use super::marginal;
 use super::products::{Products, Target};

@@ -2,60 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::block::{Block, Design};
+use super::block::Design;
+use super::candidate::{Candidate, even};
 use super::functions::{Known, basis, goes_with, merge, products_of, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
 use crate::diagnose::data::{bits, number};
-use crate::diagnose::fitted::Fitted;
-use crate::diagnose::neighbourhood::{LinearNeighbourhood, Linearised, tries};
+use crate::diagnose::neighbourhood::{Linearised, tries};
 use crate::diagnose::rules::SelectionRules;
-use crate::identify::Noise;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, JointField, Slot};
 use crate::problem::{Effect, JointKind, Observation, Problem};
-
-/// A hypothesis with its columns and the logarithm of its prior probability.
-#[derive(Clone)]
-pub(super) struct Candidate {
-    pub hypothesis: Hypothesis,
-    /// Which of the functions of that hypothesis, counted from 0.
-    pub variant: usize,
-    /// Of root mean square 1 all together.
-    pub design: Design,
-    pub ln_prior: f64,
-    pub coefficients: Coefficients,
-}
-
-/// Hypotheses whose columns are projected together.
-pub(super) const TOGETHER: usize = 64;
-
-impl Candidate {
-    /// Their columns with everything that is fitted projected out, some poses left out.
-    pub fn blocks(all: &[&Self], (fitted, fit): (&Fitted, &LinearNeighbourhood), left_out: &[usize]) -> Vec<Block> {
-        let design = |own: &&Self| {
-            let mut coefficients = own.coefficients.clone();
-            if fitted.found.noise != Noise::Declared {
-                // A σ from a residual that holds the effect says nothing of how large that is.
-                coefficients.largest.fill(f64::INFINITY);
-            }
-            (own.design.clone().without(left_out), own.ln_prior, coefficients)
-        };
-        let mut blocks = Block::all(all.iter().map(design).collect(), fit);
-        for (block, own) in blocks.iter_mut().zip(all) {
-            block.is_law = own.hypothesis.effect().is_some();
-            block.is_surface = !block.is_law && own.hypothesis.depends_on.len() > 1;
-        }
-        blocks
-    }
-}
-
-/// Joint, from 0, and order of a wave of any order.
-pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
-    if let Effect::JointWave { joint, order } = effect { Some((joint - 1, *order)) } else { None }
-}
 
 /// Slots whose columns the hypotheses need beside those of effects.
 pub(super) fn slots(problem: &Problem) -> Vec<Slot> {
@@ -86,33 +45,10 @@ fn acts_along_axes(terms: &[Term]) -> bool {
     terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
 }
 
-/// Largest displacement, in units of σ, by a parameter that moves nothing: above zero, for sizes have a reciprocal.
-const NOTHING: f64 = 1e-9;
-
 /// Commands in contact that differ by what moves the target by no more than this, in σ, may differ by noise alone.
 const NOISE_ALONE: f64 = 3.0;
 /// A contact that decides a command no better than by this \[rad or m\] decides none.
 const DECIDES: f64 = 0.02;
-
-/// Columns of an effect at the first poses, `weighed` ones, of one length, and the root mean square displacements, in units of σ, that the
-/// largest plausible values of its parameters cause: of several units, each alone moves the poses as much as the others.
-pub(super) fn even(
-    mut columns: DMatrix<f64>,
-    terms: &[Term],
-    weighed: usize,
-    rules: &SelectionRules,
-) -> (DMatrix<f64>, Vec<f64>) {
-    let mut largest = Vec::new();
-    for (k, mut column) in columns.column_iter_mut().enumerate() {
-        let length = column.rows(0, 3 * weighed).norm();
-        let most = terms.get(k).map_or(f64::INFINITY, |term| rules.plausible * term.size);
-        largest.push(if length > 0.0 { most * length / ((3 * weighed) as f64).sqrt() } else { NOTHING });
-        if length > 0.0 {
-            column /= length;
-        }
-    }
-    (columns, largest)
-}
 
 /// Everything that may explain a residual.
 pub(super) struct Columns<'a, 'l> {
@@ -312,29 +248,24 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Whether an effect is looked for that is linear in a covariate there.
-    fn has_law(&self, slot: Slot, covariate: &Covariate) -> bool {
+    /// Whether an effect is looked for that is linear in a covariate there; of two values every one is.
+    fn has_law(&self, slot: Slot, of: &Known) -> bool {
+        let is_line = |term: &Term| {
+            let is_linear = matches!(term.driver, Driver::Warming { .. } | Driver::Elapsed | Driver::Covariate(_));
+            term.slot == slot && (is_linear || of.levels < 3)
+        };
         let acts = |own: &Candidate| {
-            let effect = own.hypothesis.effect().filter(|_| own.hypothesis.depends_on == [covariate.clone()]);
-            effect.is_some_and(|effect| effect.terms(self.problem).iter().any(|term| term.slot == slot))
+            let effect = own.hypothesis.effect().filter(|_| own.hypothesis.depends_on == [of.covariate.clone()]);
+            effect.is_some_and(|effect| effect.terms(self.problem).iter().any(is_line))
         };
         self.candidates.iter().any(acts)
     }
 
-    /// Smooth functions of one covariate at some columns that belong together: of what is no command a straight line, unless that is a law, and
-    /// any, which changes over some length.
+    /// Smooth functions of one covariate at some columns that belong together: any, which changes over some length, and of what is neither a
+    /// command nor a load a straight line, unless that is a law.
     fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
         let hypothesis =
             |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate.clone()] };
-        let is_of_arm = matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load);
-        if !is_of_arm && !self.has_law(slot, &of.covariate) {
-            let line = || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
-            self.add(family, 1.0, hypothesis(Law::Smooth), line);
-        }
-        // Of two values any function is a line, or the effect that the catalogue has.
-        if of.levels < 3 {
-            return;
-        }
         for &length in lengths.iter().filter(|_| of.levels > 3) {
             self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, length)));
         }
@@ -342,13 +273,19 @@ impl<'a, 'l> Columns<'a, 'l> {
         if of.levels == 3 {
             self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, longest)));
         }
-        if matches!(of.covariate, Covariate::Time | Covariate::Row) {
+        if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
             // What settles changes fast at first.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
             if let Some(warped) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
                 self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&warped.scaled, 0.25)));
             }
+        }
+        // The last: where it is a law, and is not there, all others have the same number. Of two values any function is a line.
+        let is_of_arm = matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load);
+        if !is_of_arm && !self.has_law(slot, of) {
+            let line = || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
+            self.add(family, 1.0, hypothesis(Law::Smooth), line);
         }
     }
 

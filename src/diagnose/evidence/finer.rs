@@ -2,7 +2,7 @@
 //! does best beside the rest becomes a hypothesis like all others. A strong effect of a value hardly off would else leave structure.
 
 use super::block::{Block, Design};
-use super::columns::{Candidate, even};
+use super::candidate::{Candidate, even};
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law};
 use super::marginal::Coefficients;
@@ -27,7 +27,7 @@ pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
     (blocks, target): (&mut Vec<Block>, &Target),
-    of: impl Fn(&[Candidate]) -> Vec<Block>,
+    blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
     (problem, rules): (&Problem, &SelectionRules),
 ) -> Vec<Candidate> {
     let known = blocks.len();
@@ -49,7 +49,7 @@ pub(super) fn finer(
                     if near.is_empty() || target.stop.is_requested() {
                         break;
                     }
-                    blocks.extend(of(&near));
+                    blocks.extend(blocks_of(&near));
                     let all: Vec<usize> = std::iter::once(member).chain(known..blocks.len()).collect();
                     let mut gains = gains_beside(rest, &all, &Products::new((blocks, target), rules));
                     blocks.truncate(known);

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::columns::{Candidate, Columns, even, order_of, slots};
+use super::candidate::{Candidate, even, order_of};
+use super::columns::{Columns, slots};
 use super::explanation::Explanation;
 use super::functions::{Known, Shape};
 use super::hypothesis::Hypothesis;

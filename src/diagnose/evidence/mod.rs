@@ -9,6 +9,7 @@
 mod again;
 mod block;
 mod blocks;
+mod candidate;
 mod columns;
 mod explanation;
 mod finer;
@@ -31,7 +32,7 @@ use crate::problem::Effect;
 use again::carried_by_one;
 pub(super) use again::stability;
 use blocks::blocks;
-use columns::Candidate;
+use candidate::Candidate;
 pub use explanation::Explanation;
 pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
@@ -130,12 +131,15 @@ fn weighed_without<'a>(
     let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    let products = Products::new((&blocks, &target), data.rules);
-    let mut weighted = search(&products, &present);
-    if data.stop.is_requested() {
-        return None;
-    }
-    let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }.promising(&weighted);
+    let (mut weighted, waves) = {
+        let products = Products::new((&blocks, &target), data.rules);
+        let weighted = search(&products, &present);
+        if data.stop.is_requested() {
+            return None;
+        }
+        let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }.promising(&weighted);
+        (weighted, waves)
+    };
     let blocks_of =
         |some: &[Candidate]| Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out);
     if !waves.is_empty() {

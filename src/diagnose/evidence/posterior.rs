@@ -101,16 +101,6 @@ impl Evidence {
                 None => self.explanations.push(Explanation { probability, ..explanation.clone() }),
             }
         }
-        self.normalised()
-    }
-
-    /// The same with some explanations less probable by a factor.
-    pub(in crate::diagnose) fn with_less(mut self, factor: f64, of: impl Fn(&Explanation) -> bool) -> Self {
-        self.explanations.iter_mut().filter(|own| of(own)).for_each(|own| own.probability *= factor);
-        self.normalised()
-    }
-
-    fn normalised(mut self) -> Self {
         let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
         self.explanations.iter_mut().for_each(|own| own.probability /= total);
         self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));

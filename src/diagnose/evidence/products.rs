@@ -40,7 +40,7 @@ struct Member<'a> {
     /// Aᵀ.
     transposed: DMatrix<f64>,
     /// AᵀC of every other one.
-    with: Vec<OnceLock<DMatrix<f64>>>,
+    products: Vec<OnceLock<DMatrix<f64>>>,
 }
 
 impl<'a> Products<'a> {
@@ -58,15 +58,15 @@ impl<'a> Products<'a> {
     fn member(&self, block: usize) -> &Member<'a> {
         self.members[block].get_or_init(|| {
             let columns = self.blocks[block].columns(&self.target.fit);
-            let with = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
-            Member { transposed: columns.transpose(), columns, with }
+            let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
+            Member { transposed: columns.transpose(), columns, products }
         })
     }
 
     /// AᵀC of a member of a set and another hypothesis.
-    fn with(&self, member: usize, other: usize) -> &DMatrix<f64> {
+    fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
         let member = self.member(member);
-        member.with[other].get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
+        member.products[other].get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
     }
 
     /// What a set leaves at some sizes.
@@ -84,7 +84,7 @@ impl<'a> Products<'a> {
             taken.rows_mut(begins[i], product.len()).axpy(size, product, 0.0);
             for j in 0..=i {
                 // The lower half alone is read.
-                let gram = self.with(one, members[j]);
+                let gram = self.product(one, members[j]);
                 inner.view_mut((begins[i], begins[j]), gram.shape()).zip_apply(gram, |own, value| {
                     *own += size * sizes[j] * value;
                 });
@@ -102,8 +102,8 @@ impl<'a> Products<'a> {
     }
 }
 
-/// What a set leaves of the residual: with A of its members, D of their sizes and 1 + D AᵀA D = L Lᵀ, Z = L⁻¹D Aᵀ takes its part off
-/// other columns C.
+/// What a set leaves of the residual: with A of its members, D of their sizes, 1 + D AᵀA D = L Lᵀ and Z = L⁻¹D Aᵀ it leaves CᵀC − (Z C)ᵀ(Z C)
+/// and Cᵀr − (Z C)ᵀ(Z r) of further columns C.
 pub(super) struct Left<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
@@ -139,7 +139,7 @@ impl Left<'_, '_> {
 
     /// ln p(r | set and a hypothesis) − ln p(r | set), and its most probable size.
     pub fn gain(&self, block: usize) -> (f64, f64) {
-        let products = self.members.iter().map(|&member| Cow::Borrowed(self.products.with(member, block)));
+        let products = self.members.iter().map(|&member| Cow::Borrowed(self.products.product(member, block)));
         self.gain_with(&self.products.blocks[block], products)
     }
 
@@ -166,5 +166,51 @@ impl Left<'_, '_> {
         }
         let along = &self.within * all;
         block.gain(Some((&along, &self.taken)), left, grid, rules)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::evidence::block::Design;
+    use crate::diagnose::evidence::marginal::Coefficients;
+    use crate::diagnose::neighbourhood::Unknowns;
+
+    /// Numbers without pattern.
+    fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| (12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43.7 % 1.0)
+    }
+
+    #[test]
+    fn products_tell_what_a_dense_solve_does() {
+        let rules = &SelectionRules::DEFAULT;
+        let (jacobian, residual) = (matrix(120, 4, 0.5), matrix(120, 1, 9.0).column(0) * 4.0);
+        let unknowns = Unknowns { x: vec![0.0; 4], priors: vec![None; 4], active: DMatrix::zeros(0, 4) };
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        let lever = matrix(120, 1, 3.0).column(0).into_owned();
+        let designs =
+            [Design::Dense(matrix(120, 2, 1.0)), Design::per_pose(&lever), Design::Dense(matrix(120, 30, 2.0))];
+        let designs = designs.map(|own| (own.scaled(40).unwrap(), 0.0, Coefficients::default()));
+        let blocks = Block::all(designs.to_vec(), &fit);
+        let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
+        let target = Target { fit, noise, stop: Stop::default() };
+        let products = Products::new((&blocks, &target), rules);
+        let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
+        let left = products.left(&members, &sizes).unwrap();
+        let r = target.fit.residual();
+        let mut covariance = DMatrix::identity(r.len(), r.len());
+        for (&member, size) in members.iter().zip(sizes) {
+            let columns = blocks[member].columns(&target.fit).into_owned();
+            covariance += &columns * columns.transpose() * (size * size);
+        }
+        let factor = covariance.cholesky().unwrap();
+        let solved = factor.solve(r);
+        assert!((left.residual() - &solved).amax() < 1e-9);
+        assert!((left.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
+        let ln_determinant: f64 = factor.l().diagonal().iter().map(|value| value.ln()).sum();
+        assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
+        // One more gains as much whether it is among the blocks or not.
+        let two = products.left(&members[..2], &sizes[..2]).unwrap();
+        assert!((two.gain(2).0 - two.odds_of(&blocks[2])).abs() < 1e-9);
     }
 }

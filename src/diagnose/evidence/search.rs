@@ -14,7 +14,7 @@ const SETTLING: usize = 4;
 const LIKELY: usize = 32;
 /// Sets in which a function of several covariates is taken apart, the most probable ones.
 const SPLIT: usize = 3;
-/// Members of a set of which two are taken out together.
+/// Sets of so many members at most have two taken out together.
 const FEW: usize = 6;
 /// Times that the best set is changed by more than one member, each time the best of those before.
 const CHANGES: usize = 4;
@@ -164,8 +164,8 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     gains.into_iter().map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
 }
 
-/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without one of their members, the best
-/// one without two, with another in their place, and with two others there. So two things that act beside one another are found where a third, or
+/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without their function of several
+/// covariates, the best one without one or two of its members, with another in their place, and with two others there. So two things that act beside one another are found where a third, or
 /// a function of several covariates, does for both as well as one hypothesis can, or a third with a function beside it.
 fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products: &Products) {
     let Products { blocks, rules, .. } = *products;
@@ -197,12 +197,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products:
             let Some(rest) = assembled(&rest, products) else { continue };
             let others = if gone.iter().any(is_surface) { &plain } else { &laws };
             let others: Vec<usize> = others.iter().copied().filter(|other| !gone.contains(other)).collect();
-            // All hypotheses by themselves are known.
-            let mut one: Vec<Set> = if rest.members.is_empty() {
-                known.values().filter(|set| set.members.len() == 1).cloned().collect()
-            } else {
-                extended(&rest, &every, products)
-            };
+            let mut one = extended(&rest, &every, products);
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
             let narrow = one.iter().filter(is_other).filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::columns::{Candidate, TOGETHER, order_of};
+use super::candidate::{Candidate, TOGETHER, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law, Part};

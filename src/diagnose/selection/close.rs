@@ -247,7 +247,6 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
     let mut fitted = first;
     // What led to the fit at hand, if that were odds of fits of their own.
     let mut led: Option<Evidence> = None;
-    let mut passed: Vec<(Fitted, Evidence)> = Vec::new();
     while rounds.done.len() < rounds.data.rules.rounds {
         rounds.tell(0, 0);
         let added = rounds.added(&fitted);
@@ -260,10 +259,6 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
             // Back to what did less well at a fit of its own: that is known better than what the fit at hand says of it from afar.
             if let (None, Some(led)) = (&next, led) {
                 return Ok((fitted, Some(led)));
-            }
-            passed.push((fitted.clone(), evidence.clone()));
-            if next.is_none() {
-                return best_of_circle(rounds, &passed, (fitted, evidence.clone()));
             }
         }
         // Where the model holds what is sure: is there a better one at a fit of its own?
@@ -283,48 +278,6 @@ fn weighed(rounds: &mut Rounds, first: Fitted) -> Result<(Fitted, Option<Evidenc
     }
     let evidence = rounds.weigh(&fitted)?;
     Ok((fitted, evidence))
-}
-
-/// Of fits whose evidence leads from one to another and back the most probable one, each weighed at a fit of its own; and the evidence about it.
-///
-/// That evidence says more of what it led to than is there at its own fit. By as much it says too much of all that is not in the model.
-fn best_of_circle(
-    rounds: &mut Rounds,
-    passed: &[(Fitted, Evidence)],
-    (last, said): (Fitted, Evidence),
-) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
-    let (data, rules) = (rounds.data, rounds.data.rules);
-    let ln_posterior = |fitted: &Fitted, own: &Explanation| {
-        let added = rounds.added(fitted);
-        unless_stopped(data, || ln_posterior(fitted, data, (&added, &said.left_out), (&own.without_law(), last.sigma)))
-    };
-    let held = |(fitted, evidence): &(Fitted, Evidence)| {
-        let added = rounds.added(fitted);
-        evidence.explanations.iter().find(|own| is_held(own, &added)).cloned()
-    };
-    let mut best: Option<(usize, Explanation, f64)> = None;
-    for (k, one) in passed.iter().enumerate() {
-        let Some(own) = held(one) else { continue };
-        if let Some(ln) = ln_posterior(&one.0, &own)?.filter(|ln| best.as_ref().is_none_or(|best| *ln > best.2)) {
-            best = Some((k, own, ln));
-        }
-    }
-    let Some((k, own, ln_own)) = best else { return Ok((last, Some(said))) };
-    let (fitted, evidence) = &passed[k];
-    let (added, sure) = (rounds.added(fitted), evidence.sure(rules.sure).cloned());
-    let is_of = |sure: &Explanation| passed.iter().find(|(other, _)| is_held(sure, &rounds.added(other)));
-    let at_its_own = match sure.as_ref().and_then(|sure| Some((is_of(sure)?, sure))) {
-        Some(((other, _), sure)) => ln_posterior(other, sure)?.map(|ln| (sure, ln)),
-        None => None,
-    };
-    let Some((sure, ln_sure)) = at_its_own else { return Ok((last, Some(said))) };
-    let too_much = (ln_sure - ln_own).exp() * own.probability / sure.probability;
-    let evidence = evidence.clone().with_less(too_much.min(1.0), |other| !is_held(other, &added));
-    let fitted = fitted.clone();
-    if k + 1 < passed.len() {
-        rounds.note(&fitted);
-    }
-    Ok((fitted, Some(evidence)))
 }
 
 /// Whether the effects of an explanation are those that were added.
