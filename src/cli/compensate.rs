@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::print_warnings(&warnings);
     }
     // Targets may be waypoints alone.
-    if let (Err(missing), false) = (identify::check_target_columns(&problem, &targets), common.quiet) {
+    for missing in identify::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet) {
         diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
     }
     let placement = identify::Placement::of(&targets);

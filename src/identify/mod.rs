@@ -58,7 +58,7 @@ pub use jacobian::jacobian;
 pub use joint_source::{JointSources, joint_sources};
 pub(crate) use kind::{rows as rows_of_kind, size as size_of_kind};
 pub use misread::Misreading;
-pub use needed::{check_columns, check_target_columns};
+pub use needed::{check_columns, missing_target_columns};
 pub use outcome::{Estimate, Identification, Noise, STRONG_CORRELATION};
 pub use outliers::Outlier;
 pub use placement::Placement;

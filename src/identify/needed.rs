@@ -10,28 +10,25 @@ use crate::problem::{EffectDeclaration, Problem};
 /// # Errors
 /// One is not there: the effect that follows it, by file and line.
 pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), InputError> {
-    check(problem, rows, rows.time_measured)
+    missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)
 }
 
-/// The same of targets, which nothing was before: they need no times.
-///
-/// # Errors
-/// As [`check_columns`].
-pub fn check_target_columns(problem: &Problem, rows: &Measurements) -> Result<(), InputError> {
-    check(problem, rows, true)
+/// For each effect that follows a column that targets do not have an error that says so, by file and line. Nothing was before targets: they
+/// need no times.
+pub fn missing_target_columns(problem: &Problem, rows: &Measurements) -> Vec<InputError> {
+    missing(problem, rows, true).collect()
 }
 
-fn check(problem: &Problem, rows: &Measurements, time: bool) -> Result<(), InputError> {
+fn missing(problem: &Problem, rows: &Measurements, time: bool) -> impl Iterator<Item = InputError> {
     let columns = Columns {
         temperature: rows.temperature.is_some(),
         approach: rows.approach.is_some(),
         time,
         covariates: rows.covariates.len() == problem.data.covariates.len() * rows.len(),
     };
-    for EffectDeclaration { effect, location } in &problem.effects {
-        if let Some(write) = effect.missing_column(problem, columns) {
-            return Err(location.clone().error(InputErrorKind::NeedsColumn { write }));
-        }
-    }
-    Ok(())
+    let needs = move |EffectDeclaration { effect, location }: &EffectDeclaration| {
+        let write = effect.missing_column(problem, columns)?;
+        Some(location.clone().error(InputErrorKind::NeedsColumn { write }))
+    };
+    problem.effects.iter().filter_map(needs)
 }

@@ -123,14 +123,16 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         command.current_dir(folder.path()).args(arguments).assert().success()
     };
-    let drift = "[[effect]]\njoint-thermal-drift = { joint = 2 }\n\n[parameters]";
-    fs::write(path("problem.toml"), changed("[parameters]", drift)).unwrap();
+    let drift = |joint: u32| format!("[[effect]]\njoint-thermal-drift = {{ joint = {joint} }}\n\n");
+    fs::write(path("problem.toml"), changed("[parameters]", &(drift(2) + &drift(3) + "[parameters]"))).unwrap();
     fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
     run(&["identify", ".", "--quiet", "--out", "."]);
     fs::write(path("targets.csv"), "q1_deg,q2_deg,q3_deg,q4_deg\n0,10,-40,5\n").unwrap();
     let done = run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
     let told = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
-    assert!(told.contains("commands leave out what depends on it") && path("there/commands.csv").exists(), "{told}");
+    // One for each of the two effects.
+    assert_eq!(told.matches("commands leave out what depends on it").count(), 2, "{told}");
+    assert!(path("there/commands.csv").exists(), "{told}");
 }
 
 #[test]
