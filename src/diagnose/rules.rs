@@ -46,7 +46,7 @@ pub struct SelectionRules {
     pub few_steps: u64,
     /// Blocks of the cross-validation: ten-fold, as usual [Hastie, Tibshirani and Friedman 2009, section 7.10].
     pub blocks: usize,
-    /// Poses that a station shift must leave on either side; as many, each of which alone carries an effect, are left out of the weighing at most.
+    /// Poses that a station shift must leave on either side.
     pub least_side: usize,
     /// Times of a station shift that are tried at most.
     pub shift_times: usize,
@@ -85,6 +85,8 @@ pub struct SelectionRules {
     pub drawn_again: u64,
     /// Of so many configurations one is left out in each of them.
     pub left_out: usize,
+    /// Poses, each of which alone carries an effect, that are left out of the weighing at most.
+    pub mainstays: usize,
     /// Odds to another effect from which on it is named as an alternative.
     pub beside: f64,
     /// |r|² of an outlier in units of the others' scatter of a coordinate: ten times that scatter, for what a cause does to single ones of
@@ -182,6 +184,7 @@ impl SelectionRules {
         resamples: 2000,
         drawn_again: 20,
         left_out: 5,
+        mainstays: 3,
         beside: 0.05,
         gross: 100.0,
         few: 0.1,

@@ -112,7 +112,7 @@ pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Ev
     loop {
         let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
         match carried_by_one(fitted, data, (&evidence, &hypotheses)) {
-            Some(pose) if left_out.len() < data.rules.least_side => left_out.push(pose),
+            Some(pose) if left_out.len() < data.rules.mainstays => left_out.push(pose),
             _ => return Some(evidence),
         }
     }

@@ -110,6 +110,10 @@ impl Evidence {
     /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
     /// first.
     pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
+        let all = || self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
+        if !all().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect)) {
+            return Vec::new();
+        }
         let others: Vec<Effect> = best.effects().into_iter().filter(|own| own != effect).collect();
         // What an explanation holds beside these; of one that is searched another value stands for it where its own is not there.
         let beside_others = |explanation: &Explanation| {

@@ -5,12 +5,17 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::block::Block;
 use super::marginal::{Noise, over_noise};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
 use crate::identify::Stop;
+use crate::numeric::inverse_factor;
+
+/// Hypotheses whose gains are worked out together: one product of many columns is fast.
+const TOGETHER: usize = 16;
 
 /// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
@@ -90,15 +95,22 @@ impl<'a> Products<'a> {
                 });
             }
         }
-        let lower = inner.cholesky()?.l();
-        let within = lower.solve_lower_triangular(&DMatrix::from_diagonal(&DVector::from_row_slice(&scales)))?;
-        if !lower.solve_lower_triangular_mut(&mut taken) {
-            return None;
-        }
+        let mut within = inverse_factor(&inner)?;
+        let ln_determinant = -within.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let taken = &within * taken;
+        within.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= scale);
         let squares = self.squares - taken.norm_squared();
         let without = self.over_noise(squares);
-        let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum();
-        Some(Left { products: self, members: members.to_vec(), within, taken, squares, without, ln_determinant })
+        Some(Left {
+            products: self,
+            members: members.to_vec(),
+            within,
+            taken,
+            squares,
+            without,
+            ln_determinant,
+            reach: OnceLock::new(),
+        })
     }
 }
 
@@ -116,6 +128,8 @@ pub(super) struct Left<'p, 'a> {
     without: f64,
     /// ln det L.
     ln_determinant: f64,
+    /// Z, once columns that are none of the others' ask for it.
+    reach: OnceLock<DMatrix<f64>>,
 }
 
 impl Left<'_, '_> {
@@ -137,35 +151,76 @@ impl Left<'_, '_> {
         left
     }
 
+    /// Z.
+    fn reach(&self) -> &DMatrix<f64> {
+        self.reach.get_or_init(|| {
+            let mut all = DMatrix::zeros(self.taken.len(), self.products.target.fit.residual().len());
+            let mut first = 0;
+            for &member in &self.members {
+                let transposed = &self.products.member(member).transposed;
+                all.gemm(1.0, &self.within.columns(first, transposed.nrows()), transposed, 1.0);
+                first += transposed.nrows();
+            }
+            all
+        })
+    }
+
     /// ln p(r | set and a hypothesis) − ln p(r | set), and its most probable size.
     pub fn gain(&self, block: usize) -> (f64, f64) {
-        let products = self.members.iter().map(|&member| Cow::Borrowed(self.products.product(member, block)));
-        self.gain_with(&self.products.blocks[block], products)
+        self.gains_together(&[block])[0]
     }
 
-    /// The gain of a hypothesis that is none of the others, with its prior.
-    pub fn odds_of(&self, block: &Block) -> f64 {
-        let with = |&member: &usize| {
-            let Member { columns, transposed, .. } = self.products.member(member);
-            Cow::Owned(block.times((columns, transposed)))
-        };
-        self.gain_with(block, self.members.iter().map(with)).0 + block.ln_prior
+    /// The same of several; none where it is stopped.
+    pub fn gains(&self, tried: &[usize]) -> Vec<(f64, f64)> {
+        let stop = &self.products.target.stop;
+        let of = |some: &[usize]| if stop.is_requested() { Vec::new() } else { self.gains_together(some) };
+        let gains: Vec<(f64, f64)> = tried.par_chunks(TOGETHER).flat_map_iter(of).collect();
+        if gains.len() == tried.len() { gains } else { Vec::new() }
     }
 
-    /// The same with AᵀC of every member.
-    fn gain_with<'m>(&self, block: &Block, with: impl Iterator<Item = Cow<'m, DMatrix<f64>>>) -> (f64, f64) {
+    fn gains_together(&self, tried: &[usize]) -> Vec<(f64, f64)> {
+        let Products { blocks, .. } = *self.products;
+        let counts = || tried.iter().map(|&block| blocks[block].product().len());
+        let mut all = DMatrix::zeros(self.taken.len(), counts().sum());
+        let mut first = 0;
+        for &member in &self.members {
+            let count = self.products.member(member).columns.ncols();
+            let mut own = all.rows_mut(first, count);
+            let mut column = 0;
+            for &block in tried {
+                let with = self.products.product(member, block);
+                own.columns_mut(column, with.ncols()).copy_from(with);
+                column += with.ncols();
+            }
+            first += count;
+        }
+        self.gains_along(tried.iter().map(|&block| &blocks[block]), &(&self.within * all))
+    }
+
+    /// The gains of hypotheses that are none of the others, with their priors.
+    pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
+        let columns: Vec<Cow<DMatrix<f64>>> =
+            blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
+        let all: Vec<_> = columns.iter().flat_map(|own| own.column_iter()).collect();
+        if all.is_empty() {
+            return Vec::new();
+        }
+        let along = self.reach() * DMatrix::from_columns(&all);
+        let gains = self.gains_along(blocks.iter(), &along);
+        gains.into_iter().zip(blocks).map(|((gain, _), block)| gain + block.ln_prior).collect()
+    }
+
+    /// The gains of hypotheses of whose columns C, side by side, the set takes Z C = `along`.
+    fn gains_along<'b>(&self, blocks: impl Iterator<Item = &'b Block>, along: &DMatrix<f64>) -> Vec<(f64, f64)> {
         let Products { target, grid, rules, .. } = self.products;
         let left = ((self.squares, target.noise.freedom), self.without);
-        if self.members.is_empty() {
-            return block.gain(None, left, grid, rules);
-        }
-        let (mut all, mut first) = (DMatrix::zeros(self.taken.len(), block.product().len()), 0);
-        for with in with {
-            all.rows_mut(first, with.nrows()).copy_from(&with);
-            first += with.nrows();
-        }
-        let along = &self.within * all;
-        block.gain(Some((&along, &self.taken)), left, grid, rules)
+        let mut first = 0;
+        let gain = |block: &Block| {
+            let own = along.columns(first, block.product().len()).into_owned();
+            first += own.ncols();
+            block.gain((!self.members.is_empty()).then_some((&own, &self.taken)), left, grid, rules)
+        };
+        blocks.map(gain).collect()
     }
 }
 
@@ -211,6 +266,6 @@ mod tests {
         assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
         // One more gains as much whether it is among the blocks or not.
         let two = products.left(&members[..2], &sizes[..2]).unwrap();
-        assert!((two.gain(2).0 - two.odds_of(&blocks[2])).abs() < 1e-9);
+        assert!((two.gain(2).0 - two.odds_of(&blocks[2..])[0]).abs() < 1e-9);
     }
 }

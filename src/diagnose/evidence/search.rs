@@ -61,19 +61,24 @@ impl Set {
             return self;
         }
         let mut summed = vec![0.0; self.members.len()];
-        for _ in 0..SETTLING {
-            let mut changed = false;
+        // When each size changed, and when it was last worked out: beside others that stayed it stays.
+        let (mut changed, mut known) = (vec![1; self.members.len()], vec![0; self.members.len()]);
+        for now in 1..=SETTLING {
             for (k, &member) in self.members.iter().enumerate() {
+                if (0..changed.len()).all(|j| j == k || changed[j] <= known[k]) {
+                    continue;
+                }
                 let others = [&self.members[..k], &self.members[k + 1..]].concat();
                 let sizes = [&self.sizes[..k], &self.sizes[k + 1..]].concat();
                 let Some(others) = products.left(&others, &sizes) else { return self };
                 let (gain, size) = others.gain(member);
-                changed |= size.to_bits() != self.sizes[k].to_bits();
+                let time = now * self.members.len() + k;
+                if size.to_bits() != self.sizes[k].to_bits() {
+                    changed[k] = time;
+                }
+                known[k] = time;
                 self.sizes[k] = size;
                 summed[k] = others.ln_likelihood() + gain;
-            }
-            if !changed {
-                break;
             }
         }
         let Some(all) = products.left(&self.members, &self.sizes) else { return self };
@@ -138,7 +143,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             break;
         }
     }
-    changed(&mut known, &promising.unwrap_or(every), products);
+    changed(&mut known, products);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
@@ -158,20 +163,22 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// A set with each of some further members.
 fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let Some(left) = products.left(&set.members, &set.sizes) else { return Vec::new() };
-    let is_new = |block: &&usize| !set.members.contains(block) && !products.target.stop.is_requested();
-    let gains: Vec<(usize, (f64, f64))> =
-        tried.par_iter().filter(is_new).map(|&block| (block, left.gain(block))).collect();
-    gains.into_iter().map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
+    let new: Vec<usize> = tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
+    let gains = left.gains(&new);
+    new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
 }
 
 /// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without their function of several
-/// covariates, the best one without one or two of its members, with another in their place, and with two others there. So two things that act beside one another are found where a third, or
-/// a function of several covariates, does for both as well as one hypothesis can, or a third with a function beside it.
-fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products: &Products) {
+/// covariates, the best one without one or two of its members, with another in their place, and with two others there. So two things that
+/// act beside one another are found where a third, or a function of several covariates, does for both as well as one hypothesis can, or a
+/// third with a function beside it. In the place of two members effects alone are tried: any function does for two better than for one.
+fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let Products { blocks, rules, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
-    let plain: Vec<usize> = every.iter().copied().filter(|&block| !blocks[block].is_surface).collect();
-    let laws: Vec<usize> = promising.iter().copied().filter(|&block| blocks[block].is_law).collect();
+    let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
+        every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
+    };
+    let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law));
     let mut tried: BTreeSet<Vec<usize>> = BTreeSet::new();
     for _ in 0..CHANGES {
         let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks, rules)).collect();
@@ -195,13 +202,18 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, promising: &[usize], products:
         }
         for (rest, gone) in rests {
             let Some(rest) = assembled(&rest, products) else { continue };
-            let others = if gone.iter().any(is_surface) { &plain } else { &laws };
-            let others: Vec<usize> = others.iter().copied().filter(|other| !gone.contains(other)).collect();
-            let mut one = extended(&rest, &every, products);
+            let mut one = extended(&rest, if gone.len() > 1 { &laws } else { &every }, products);
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+            let others = if gone.len() == 1 && is_surface(&gone[0]) { &plain } else { &laws };
+            let others: BTreeSet<usize> = others.iter().copied().filter(|other| !gone.contains(other)).collect();
             let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
-            let narrow = one.iter().filter(is_other).filter(|set| !set.has_wide(blocks, rules)).take(rules.extended);
-            let two: Vec<Set> = narrow.flat_map(|set| extended(set, &others, products)).collect();
+            let near: Vec<&Set> = one.iter().filter(is_other).take(rules.extending).collect();
+            let (all, near_by): (Vec<usize>, Vec<usize>) =
+                (others.into_iter().collect(), near.iter().filter_map(|set| set.members.last().copied()).collect());
+            let narrow = near.iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).enumerate();
+            let longer =
+                |(place, set): (usize, &&Set)| extended(set, if place == 0 { &all } else { &near_by }, products);
+            let two: Vec<Set> = narrow.flat_map(longer).collect();
             let mut new: Vec<Set> = one.into_iter().chain(two).collect();
             new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             // At settled sizes a set may be far more probable than with its members taken one after the other.
@@ -241,11 +253,8 @@ pub(super) fn left_by<'p, 'a>(members: &[usize], products: &'p Products<'a>) -> 
 /// For each hypothesis that is tried the gain beside some others, its prior among it, and its most probable size.
 pub(super) fn gains_beside(others: &[usize], tried: &[usize], products: &Products) -> Vec<(usize, f64, f64)> {
     let Some(left) = left_by(others, products) else { return Vec::new() };
-    let gain = |&block: &usize| {
-        let (gain, size) = left.gain(block);
-        (block, gain + products.blocks[block].ln_prior, size)
-    };
-    tried.par_iter().map(gain).collect()
+    let gain = |(&block, (gain, size)): (&usize, (f64, f64))| (block, gain + products.blocks[block].ln_prior, size);
+    tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
 /// A set with these members, one after the other.

@@ -15,7 +15,6 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::block::Block;
 use super::candidate::{Candidate, TOGETHER, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
@@ -180,8 +179,9 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let (orders, waves): (Vec<f64>, Vec<Candidate>) = orders.iter().filter_map(wave).unzip();
             let fit = (self.fitted, &self.products.target.fit);
             let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
-            let odds = |block: &Block| left.iter().map(|left| left.odds_of(block)).collect();
-            orders.into_iter().zip(blocks.iter().map(odds)).collect()
+            let of_sets: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
+            let odds = |k: usize| of_sets.iter().map(|own| own[k]).collect();
+            orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
         let all: Vec<(f64, Vec<f64>)> = orders.par_chunks(TOGETHER).flat_map_iter(of).collect();
         let of_set = |k: usize| {

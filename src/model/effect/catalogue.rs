@@ -119,7 +119,8 @@ impl Effect {
 
     /// Whether it is the same effect, whatever the value of the argument that is searched.
     pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
-        self == other || (self.is_searched() && self.name_and_place() == other.name_and_place())
+        let is_alike = || self.name() == other.name() && self.name_and_place() == other.name_and_place();
+        self == other || (self.is_searched() && is_alike())
     }
 
     /// Whether it remembers the poses before, as another effect of its family at the same place does for another time or distance.
