@@ -122,7 +122,7 @@ pub struct SelectionRules {
     pub together: usize,
     /// Explanations with as many hypotheses that are extended by a further one.
     pub extended: usize,
-    /// Hypotheses, those that explain most alone, that extend any but the best of them, which all extend.
+    /// Hypotheses, those that explain most alone or beside the rest of a set, that extend any but the best of them, which all extend.
     pub extending: usize,
     /// Columns of a hypothesis with another error in every pose up to which it is extended by further ones: what that costs grows with
     /// their cube.

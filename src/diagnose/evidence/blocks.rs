@@ -32,7 +32,7 @@ pub(super) fn blocks(
         (!data.stop.is_requested()).then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
     };
     let blocks: Vec<Vec<Block>> = own.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
-    let mut blocks = blocks.concat();
+    let mut blocks: Vec<Block> = blocks.into_iter().flatten().collect();
     let rows = data.weighed();
     let is_aside = |&(pose, row): &(usize, &usize)| !left_out.contains(&pose) && fitted.set_aside.contains(row);
     let numbers = |row: usize| data.measurements.observation(row).coordinates();

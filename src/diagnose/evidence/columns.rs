@@ -118,6 +118,21 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
+    /// One of the functions of a hypothesis, by a number that is the same whichever others there are.
+    fn add_variant(
+        &mut self,
+        family: &str,
+        hypothesis: &Hypothesis,
+        variant: usize,
+        columns: impl FnOnce() -> DMatrix<f64>,
+    ) {
+        let known = self.candidates.len();
+        self.add(family, 1.0, hypothesis.clone(), columns);
+        if let Some(own) = self.candidates.get_mut(known) {
+            own.variant = variant;
+        }
+    }
+
     fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
         let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
         let (tries, _) = tries(&only, self.problem);
@@ -261,31 +276,34 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.candidates.iter().any(acts)
     }
 
-    /// Smooth functions of one covariate at some columns that belong together: any, which changes over some length, and of what is neither a
-    /// command nor a load a straight line, unless that is a law.
+    /// Smooth functions of one covariate at some columns that belong together: any, which changes over some length, and of what is no
+    /// command, direction of approach or load a straight line, unless that is a law.
     fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
-        let hypothesis =
-            |law| Hypothesis { law, part: Part::of(slot), slot: Some(slot), depends_on: vec![of.covariate.clone()] };
-        for &length in lengths.iter().filter(|_| of.levels > 3) {
-            self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, length)));
-        }
-        let longest = self.rules.smooth_lengths[0];
-        if of.levels == 3 {
-            self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&of.scaled, longest)));
+        let (part, depends_on) = (Part::of(slot), vec![of.covariate.clone()]);
+        let hypothesis = Hypothesis { law: Law::Smooth, part, slot: Some(slot), depends_on };
+        let [warped, line] = [lengths.len(), lengths.len() + 1];
+        // Of few values the longest alone.
+        let told = match of.levels {
+            ..3 => 0,
+            3 => 1,
+            _ => lengths.len(),
+        };
+        for (variant, &length) in lengths.iter().take(told).enumerate() {
+            self.add_variant(family, &hypothesis, variant, || times(at, &basis(&of.scaled, length)));
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
             // What settles changes fast at first.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
-            if let Some(warped) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
-                self.add(family, 1.0, hypothesis(Law::Smooth), || times(at, &basis(&warped.scaled, 0.25)));
+            if let Some(of) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
+                self.add_variant(family, &hypothesis, warped, || times(at, &basis(&of.scaled, 0.25)));
             }
         }
-        // The last: where it is a law, and is not there, all others have the same number. Of two values any function is a line.
+        // Of two values any function is a line.
         let is_of_arm = matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load);
         if !is_of_arm && !self.has_law(slot, of) {
-            let line = || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
-            self.add(family, 1.0, hypothesis(Law::Smooth), line);
+            let column = || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
+            self.add_variant(family, &hypothesis, line, column);
         }
     }
 

@@ -7,7 +7,7 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law};
 use super::marginal::Coefficients;
 use super::products::{Products, Target};
-use super::search::{Weighted, gains_beside};
+use super::search::{Weighted, left_by};
 use crate::diagnose::rules::SelectionRules;
 use crate::problem::{Effect, Problem};
 
@@ -26,15 +26,18 @@ const BETTER: f64 = 0.5;
 pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
-    (blocks, target): (&mut Vec<Block>, &Target),
+    (blocks, target): (&[Block], &Target),
     blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
     (problem, rules): (&Problem, &SelectionRules),
 ) -> Vec<Candidate> {
-    let known = blocks.len();
+    let products = Products::new((blocks, target), rules);
     let mut found: Vec<Candidate> = Vec::new();
     for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK).take(MOST) {
         for &member in &set.members {
             let own = &hypotheses.all[member];
+            if own.hypothesis.effect().is_none_or(|effect| effect.scaled(FARTHEST[0]).is_none()) {
+                continue;
+            }
             // Beside everything else, and beside what is no such effect of that place: one may do for two.
             let place = |k: usize| hypotheses.all[k].hypothesis.effect().map(Effect::name_and_place);
             let without_own = set.members.iter().copied().filter(|&other| other != member).collect();
@@ -42,22 +45,18 @@ pub(super) fn finer(
             let mut rests: Vec<Vec<usize>> = vec![without_own, without_alike];
             rests.dedup();
             for rest in &rests {
+                let Some(left) = left_by(rest, &products) else { continue };
                 let mut best: Option<Candidate> = None;
-                let mut least = f64::NEG_INFINITY;
+                let mut least = left.gain(member).0 + blocks[member].ln_prior + BETTER;
                 for farthest in FARTHEST {
                     let near = hypotheses.near(best.as_ref().unwrap_or(own), farthest, problem, rules);
-                    if near.is_empty() || target.stop.is_requested() {
+                    if target.stop.is_requested() {
                         break;
                     }
-                    blocks.extend(blocks_of(&near));
-                    let all: Vec<usize> = std::iter::once(member).chain(known..blocks.len()).collect();
-                    let mut gains = gains_beside(rest, &all, &Products::new((blocks, target), rules));
-                    blocks.truncate(known);
-                    gains.sort_by(|a, b| b.1.total_cmp(&a.1));
-                    let of_own = gains.iter().find(|(k, ..)| *k == member).map_or(least, |(_, gain, _)| gain + BETTER);
-                    least = least.max(of_own);
-                    if let Some(&(k, gain, _)) = gains.first().filter(|(k, gain, _)| *k != member && *gain > least) {
-                        (best, least) = (near.into_iter().nth(k - known), gain);
+                    for (candidate, odds) in std::iter::zip(near.iter(), left.odds_of(&blocks_of(&near))) {
+                        if odds > least {
+                            (best, least) = (Some(candidate.clone()), odds);
+                        }
                     }
                 }
                 found.extend(best.filter(|best| !found.iter().any(|other| other.hypothesis == best.hypothesis)));

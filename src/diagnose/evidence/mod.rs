@@ -147,7 +147,7 @@ fn weighed_without<'a>(
         hypotheses.all.extend(waves);
         weighted = search(&Products::new((&blocks, &target), data.rules), &present);
     }
-    let finer = finer::finer(&hypotheses, &weighted, (&mut blocks, &target), blocks_of, (&fitted.problem, data.rules));
+    let finer = finer::finer(&hypotheses, &weighted, (&blocks, &target), blocks_of, (&fitted.problem, data.rules));
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
         hypotheses.all.extend(finer);

@@ -110,8 +110,9 @@ impl Evidence {
     /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
     /// first.
     pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
-        let all = || self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
-        if !all().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect)) {
+        // Of very many effects in a model most are in no explanation: nothing else need be looked at.
+        let mut all = self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
+        if !all.by_ref().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect)) {
             return Vec::new();
         }
         let others: Vec<Effect> = best.effects().into_iter().filter(|own| own != effect).collect();

@@ -1,5 +1,5 @@
 //! Products of the columns of hypotheses with one another and with the residual: what a set leaves, and what a further hypothesis gains
-//! beside it, is told by these alone. Each is made once, when the first set asks for it.
+//! beside it, is told by these alone. Each is made when the first set asks for it, and kept as long as the hypotheses stay the same.
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -44,7 +44,7 @@ struct Member<'a> {
     columns: Cow<'a, DMatrix<f64>>,
     /// Aᵀ.
     transposed: DMatrix<f64>,
-    /// AᵀC of every other one.
+    /// AᵀC of every one.
     products: Vec<OnceLock<DMatrix<f64>>>,
 }
 
@@ -128,7 +128,7 @@ pub(super) struct Left<'p, 'a> {
     without: f64,
     /// ln det L.
     ln_determinant: f64,
-    /// Z, once columns that are none of the others' ask for it.
+    /// Z, made when columns of hypotheses that are none of these are asked for.
     reach: OnceLock<DMatrix<f64>>,
 }
 
@@ -266,6 +266,10 @@ mod tests {
         assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
         // One more gains as much whether it is among the blocks or not.
         let two = products.left(&members[..2], &sizes[..2]).unwrap();
+        for (block, (gain, size)) in two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(own, block)| (block, own)) {
+            let alone = two.gain(block);
+            assert!((gain - alone.0).abs() < 1e-9 && (size - alone.1).abs() < 1e-12);
+        }
         assert!((two.gain(2).0 - two.odds_of(&blocks[2..])[0]).abs() < 1e-9);
     }
 }

@@ -61,22 +61,21 @@ impl Set {
             return self;
         }
         let mut summed = vec![0.0; self.members.len()];
-        // When each size changed, and when it was last worked out: beside others that stayed it stays.
-        let (mut changed, mut known) = (vec![1; self.members.len()], vec![0; self.members.len()]);
-        for now in 1..=SETTLING {
+        // Beside others that stayed a size stays.
+        let mut stale = vec![true; self.members.len()];
+        for _ in 0..SETTLING {
             for (k, &member) in self.members.iter().enumerate() {
-                if (0..changed.len()).all(|j| j == k || changed[j] <= known[k]) {
+                if !std::mem::take(&mut stale[k]) {
                     continue;
                 }
                 let others = [&self.members[..k], &self.members[k + 1..]].concat();
                 let sizes = [&self.sizes[..k], &self.sizes[k + 1..]].concat();
                 let Some(others) = products.left(&others, &sizes) else { return self };
                 let (gain, size) = others.gain(member);
-                let time = now * self.members.len() + k;
                 if size.to_bits() != self.sizes[k].to_bits() {
-                    changed[k] = time;
+                    stale.fill(true);
+                    stale[k] = false;
                 }
-                known[k] = time;
                 self.sizes[k] = size;
                 summed[k] = others.ln_likelihood() + gain;
             }
@@ -179,7 +178,9 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
     };
     let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law));
-    let mut tried: BTreeSet<Vec<usize>> = BTreeSet::new();
+    // What is tried first and second in the place of a function of several covariates, of any other hypothesis, and of two.
+    let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
+    let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
     for _ in 0..CHANGES {
         let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks, rules)).collect();
         likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
@@ -190,37 +191,41 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             likely.iter().filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
         let of_best =
             likely.iter().take(1).flat_map(|set| one_or_two(&set.members).into_iter().map(move |gone| (gone, *set)));
-        let mut rests: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
+        let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
         for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
             let rest: Vec<usize> = set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
-            if tried.insert(sorted(&rest)) {
-                rests.push((rest, gone));
+            let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
+            if tried.insert((sorted(&rest), kind)) {
+                rests.push((rest, gone, kind));
             }
         }
         if rests.is_empty() {
             return;
         }
-        for (rest, gone) in rests {
+        for (rest, gone, kind) in rests {
+            if products.target.stop.is_requested() {
+                return;
+            }
             let Some(rest) = assembled(&rest, products) else { continue };
-            let mut one = extended(&rest, if gone.len() > 1 { &laws } else { &every }, products);
+            let [first, second] = instead[kind];
+            let mut one = extended(&rest, first, products);
             one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-            let others = if gone.len() == 1 && is_surface(&gone[0]) { &plain } else { &laws };
-            let others: BTreeSet<usize> = others.iter().copied().filter(|other| !gone.contains(other)).collect();
-            let is_other = |set: &&Set| set.members.last().is_some_and(|last| others.contains(last));
-            let near: Vec<&Set> = one.iter().filter(is_other).take(rules.extending).collect();
-            let (all, near_by): (Vec<usize>, Vec<usize>) =
-                (others.into_iter().collect(), near.iter().filter_map(|set| set.members.last().copied()).collect());
-            let narrow = near.iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).enumerate();
+            let second: BTreeSet<usize> = second.iter().copied().filter(|other| !gone.contains(other)).collect();
+            let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
+            let near: Vec<&Set> = one.iter().filter(is_near).take(rules.extending).collect();
+            let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
+            let second: Vec<usize> = second.into_iter().collect();
+            let narrow = near.into_iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).enumerate();
             let longer =
-                |(place, set): (usize, &&Set)| extended(set, if place == 0 { &all } else { &near_by }, products);
+                |(place, set): (usize, &Set)| extended(set, if place == 0 { &second } else { &promising }, products);
             let two: Vec<Set> = narrow.flat_map(longer).collect();
             let mut new: Vec<Set> = one.into_iter().chain(two).collect();
             new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
             // At settled sizes a set may be far more probable than with its members taken one after the other.
-            let (first, others) = new.split_at(new.len().min(rules.extended));
-            let settled = first.par_iter().map(|set| set.clone().settled(products)).collect::<Vec<_>>();
-            let others = others.iter().filter(|set| set.ln_posterior > best - rules.hopeless);
-            for set in std::iter::once(rest).chain(settled).chain(others.cloned()) {
+            let rest_of_new = new.split_off(new.len().min(rules.extended));
+            let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
+            let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > best - rules.hopeless);
+            for set in std::iter::once(rest).chain(settled).chain(probable) {
                 let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
                 if set.ln_posterior > own.ln_posterior {
                     *own = set;

@@ -119,6 +119,7 @@ impl Effect {
 
     /// Whether it is the same effect, whatever the value of the argument that is searched.
     pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
+        // Names without places are compared first: they are at hand.
         let is_alike = || self.name() == other.name() && self.name_and_place() == other.name_and_place();
         self == other || (self.is_searched() && is_alike())
     }
