@@ -99,6 +99,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
         let (named, estimate) = (common.named(), results.path("estimate.json"));
         let next = match identification.is_trusted() {
+            // Of what says so little neither a cause nor a correction can be told.
+            true if report::tells_little(&identification) => {
+                format!("flexcal check {named} says what the poses can tell")
+            }
             true if report::lacks_something(&identification) => {
                 format!("flexcal loop {named} looks for what the model lacks")
             }

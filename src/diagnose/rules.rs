@@ -105,6 +105,10 @@ pub struct SelectionRules {
     pub weighed_poses: usize,
     /// Chance of a family of functions of unknown law, over that of a family of effects: the catalogue holds what is common.
     pub unknown_law: f64,
+    /// Chance that links declared rigid bend, over that of another family of effects: most of what an arm gives way by is in its joints.
+    pub rigid_links: f64,
+    /// Chance that a further effect is of a family that is there already: what gives way at one joint does at others.
+    pub of_a_kind: f64,
     /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds.
     pub sure: f64,
     /// Probability of a law from which on an effect is named as found; below it is a place with a law such as this one.
@@ -193,6 +197,8 @@ impl SelectionRules {
         led_poses: 1500,
         weighed_poses: 240,
         unknown_law: 0.25,
+        rigid_links: 0.1,
+        of_a_kind: 0.25,
         sure: 0.95,
         stated: 0.9,
         displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
@@ -249,6 +255,8 @@ impl SelectionRules {
             ("led_poses", self.led_poses >= self.weighed_poses),
             ("weighed_poses", self.weighed_poses >= 1),
             ("unknown_law", size(self.unknown_law)),
+            ("rigid_links", size(self.rigid_links)),
+            ("of_a_kind", part(self.of_a_kind)),
             ("sure", part(self.sure)),
             ("stated", part(self.stated)),
             ("drawn_again", self.drawn_again >= 1),

@@ -30,11 +30,21 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
     text_within(&blocks, columns)
 }
 
+/// Whether the data, rather than its prior, say what a parameter is.
+fn is_well(own: &Estimate) -> bool {
+    own.at_bound.is_none() && own.fitted && own.identified > 0.9
+}
+
+/// Whether a fit found no parameter well.
+pub fn tells_little(found: &Identification) -> bool {
+    !found.estimates.iter().any(is_well)
+}
+
 /// How many parameters are known how well.
 fn parameters(estimates: &[Estimate]) -> String {
     let count = |is: fn(&Estimate) -> bool| estimates.iter().filter(|own| is(own)).count();
     let held = count(|own| own.at_bound.is_some() || !own.fitted);
-    let well = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.9);
+    let well = count(is_well);
     let in_part = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.1) - well;
     let parts = [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
     let rest: Vec<String> = parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
@@ -107,7 +117,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
         let few = found.len() <= FEW;
-        let title = |found| if few { called(closure, found) } else { cut(&called(closure, found)) };
+        let title =
+            |found| if few { called(closure, found) + &untold(closure, found) } else { cut(&called(closure, found)) };
         let titles = found.iter().map(|found| Point::from(title(found)));
         blocks.push(Block::heading("What was found"));
         blocks.push(Block::Ranking(titles.take(room).collect()));
@@ -116,6 +127,14 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         return text(&blocks) + &more + &end;
     }
     text(&blocks) + &end
+}
+
+/// What the data do not tell an effect from, in a few words.
+fn untold(closure: &ClosedLoop, found: &Found) -> String {
+    let Some(first) = found.alternatives.first() else { return String::new() };
+    let more = found.alternatives.len() - 1;
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("; not told from: {}{more}", closure.before.describe(first))
 }
 
 /// Effects whose titles may take two lines each.

@@ -43,7 +43,7 @@ mod unexplained;
 mod verdict;
 
 pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
-pub use brief::{estimate_brief, loop_brief};
+pub use brief::{estimate_brief, loop_brief, tells_little};
 pub use check::{check_json, check_text, why_not_sufficient};
 pub use closed_loop::{loop_report, loop_text};
 pub use closed_problem::closed_problem;

@@ -114,8 +114,8 @@ pub(super) struct Block {
     coefficients: Coefficients,
     /// Whether it is of a function of several covariates.
     pub is_surface: bool,
-    /// Whether it is of an effect.
-    pub is_law: bool,
+    /// The family of its effect; `None` of a function without a law.
+    pub family: Option<String>,
 }
 
 #[derive(Debug, Clone)]
@@ -159,9 +159,14 @@ impl Block {
                     (Columns::Grouped { levers, groups }, normal)
                 }
             };
-            Self { columns, normal, ln_prior, coefficients, is_surface: false, is_law: false }
+            Self { columns, normal, ln_prior, coefficients, is_surface: false, family: None }
         };
         designs.into_iter().map(of).collect()
+    }
+
+    /// Whether it is of an effect.
+    pub fn is_law(&self) -> bool {
+        self.family.is_some()
     }
 
     /// Whether it has more columns than a set that is extended may hold.

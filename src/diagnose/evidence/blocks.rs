@@ -43,7 +43,8 @@ pub(super) fn blocks(
         trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
         least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
     };
-    let target = Target { fit: neighbourhood, noise, stop: data.stop.clone() };
+    let alike = (data.rules.of_a_kind.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
+    let target = Target { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
     let is_added = |&k: &usize| own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
     let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();

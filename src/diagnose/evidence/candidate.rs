@@ -43,8 +43,8 @@ impl Candidate {
         };
         let mut blocks = Block::all(all.iter().map(design).collect(), fit);
         for (block, own) in blocks.iter_mut().zip(all) {
-            block.is_law = own.hypothesis.effect().is_some();
-            block.is_surface = !block.is_law && own.hypothesis.depends_on.len() > 1;
+            block.family = own.hypothesis.effect().map(|effect| effect.name().to_owned());
+            block.is_surface = !block.is_law() && own.hypothesis.depends_on.len() > 1;
         }
         blocks
     }

@@ -447,7 +447,11 @@ impl<'a, 'l> Columns<'a, 'l> {
             if let Some((_, _, sum)) = families.iter_mut().find(|(known, ..)| *known == family.as_str()) {
                 *sum += share;
             } else {
-                let weight = if candidate.hypothesis.effect().is_some() { 1.0 } else { self.rules.unknown_law };
+                let weight = match candidate.hypothesis.effect() {
+                    Some(Effect::LinkBending { .. }) => self.rules.rigid_links,
+                    Some(_) => 1.0,
+                    None => self.rules.unknown_law,
+                };
                 families.push((family, weight, *share));
             }
         }

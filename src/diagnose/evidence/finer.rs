@@ -47,7 +47,7 @@ pub(super) fn finer(
             for rest in &rests {
                 let Some(left) = left_by(rest, &products) else { continue };
                 let mut best: Option<Candidate> = None;
-                let mut least = left.gain(member).0 + blocks[member].ln_prior + BETTER;
+                let mut least = left.gain(member).0 + products.ln_prior(&blocks[member], rest) + BETTER;
                 for farthest in FARTHEST {
                     let near = hypotheses.near(best.as_ref().unwrap_or(own), farthest, problem, rules);
                     if target.stop.is_requested() {

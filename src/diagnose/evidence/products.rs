@@ -22,6 +22,8 @@ const TOGETHER: usize = 16;
 pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
+    /// ln of how much more often a further effect is of a family that is there than of any one of the others.
+    pub alike: f64,
     /// The wish that the search end early.
     pub stop: Stop,
 }
@@ -58,6 +60,12 @@ impl<'a> Products<'a> {
     /// ln of the density of a residual of such squares, up to a constant.
     pub fn over_noise(&self, squares: f64) -> f64 {
         over_noise(squares, &self.grid)
+    }
+
+    /// ln of the chance of a hypothesis beside others.
+    pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
+        let is_alike = block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
+        block.ln_prior + if is_alike { self.target.alike } else { 0.0 }
     }
 
     fn member(&self, block: usize) -> &Member<'a> {
@@ -207,7 +215,11 @@ impl Left<'_, '_> {
         }
         let along = self.reach() * DMatrix::from_columns(&all);
         let gains = self.gains_along(blocks.iter(), &along);
-        gains.into_iter().zip(blocks).map(|((gain, _), block)| gain + block.ln_prior).collect()
+        gains
+            .into_iter()
+            .zip(blocks)
+            .map(|((gain, _), block)| gain + self.products.ln_prior(block, &self.members))
+            .collect()
     }
 
     /// The gains of hypotheses of whose columns C, side by side, the set takes Z C = `along`.
@@ -248,7 +260,7 @@ mod tests {
         let designs = designs.map(|own| (own.scaled(40).unwrap(), 0.0, Coefficients::default()));
         let blocks = Block::all(designs.to_vec(), &fit);
         let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
-        let target = Target { fit, noise, stop: Stop::default() };
+        let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
         let products = Products::new((&blocks, &target), rules);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
         let left = products.left(&members, &sizes).unwrap();

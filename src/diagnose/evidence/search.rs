@@ -39,11 +39,11 @@ struct Set {
 
 impl Set {
     /// The set with one more, which gains so much at this size.
-    fn with(&self, block: usize, (gain, size): (f64, f64), blocks: &[Block]) -> Self {
+    fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
         Self {
             members: [self.members.as_slice(), &[block]].concat(),
             sizes: [self.sizes.as_slice(), &[size]].concat(),
-            ln_posterior: self.ln_posterior + gain + blocks[block].ln_prior,
+            ln_posterior: self.ln_posterior + gain + products.ln_prior(&products.blocks[block], &self.members),
         }
     }
 
@@ -81,7 +81,8 @@ impl Set {
             }
         }
         let Some(all) = products.left(&self.members, &self.sizes) else { return self };
-        let prior: f64 = self.members.iter().map(|&member| products.blocks[member].ln_prior).sum();
+        let further = |(k, &member)| products.ln_prior(&products.blocks[member], &self.members[..k]);
+        let prior: f64 = self.members.iter().enumerate().map(further).sum();
         let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
         self.ln_posterior = all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
         self
@@ -164,7 +165,7 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let Some(left) = products.left(&set.members, &set.sizes) else { return Vec::new() };
     let new: Vec<usize> = tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
     let gains = left.gains(&new);
-    new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products.blocks)).collect()
+    new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
 }
 
 /// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely sets without their function of several
@@ -177,7 +178,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
         every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
     };
-    let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law));
+    let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law()));
     // What is tried first and second in the place of a function of several covariates, of any other hypothesis, and of two.
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
@@ -258,7 +259,9 @@ pub(super) fn left_by<'p, 'a>(members: &[usize], products: &'p Products<'a>) -> 
 /// For each hypothesis that is tried the gain beside some others, its prior among it, and its most probable size.
 pub(super) fn gains_beside(others: &[usize], tried: &[usize], products: &Products) -> Vec<(usize, f64, f64)> {
     let Some(left) = left_by(others, products) else { return Vec::new() };
-    let gain = |(&block, (gain, size)): (&usize, (f64, f64))| (block, gain + products.blocks[block].ln_prior, size);
+    let gain = |(&block, (gain, size)): (&usize, (f64, f64))| {
+        (block, gain + products.ln_prior(&products.blocks[block], others), size)
+    };
     tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
@@ -267,7 +270,7 @@ fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {
         let gain = products.left(&set.members, &set.sizes)?.gain(member);
-        set = set.with(member, gain, products.blocks);
+        set = set.with(member, gain, products);
     }
     Some(set.settled(products))
 }
@@ -309,7 +312,7 @@ mod tests {
         };
         let blocks = names.iter().map(block).collect();
         let noise = Noise { freedom: 89.0, trust: 0.1, least: 0.0 };
-        (blocks, Target { fit, noise, stop: Stop::default() })
+        (blocks, Target { fit, noise, alike: 0.0, stop: Stop::default() })
     }
 
     #[test]
@@ -337,12 +340,16 @@ mod tests {
         let block = |columns: &DMatrix<f64>| {
             let design = Design::Dense(columns.clone()).scaled(30).unwrap();
             let mut block = Block::new(design, &fit, -5.0, Coefficients::default());
-            block.is_law = true;
+            block.family = Some(String::new());
             block
         };
         let blocks = [&third, &one, &other].map(block);
-        let target =
-            Target { fit: fit.clone(), noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 }, stop: Stop::default() };
+        let target = Target {
+            fit: fit.clone(),
+            noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 },
+            alike: 0.0,
+            stop: Stop::default(),
+        };
         let found = search(&Products::new((&blocks, &target), rules), &[]);
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
