@@ -1,7 +1,7 @@
 //! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
 
 use super::around::unsteady;
-use super::closed_loop::{errors, quality_flag, set_aside};
+use super::closed_loop::{cautions, errors, set_aside};
 use super::document::{Block, Point};
 use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
@@ -106,7 +106,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::lines(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
-    blocks.extend(quality_flag(closure));
+    blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(table), Block::Text(gain(closure))]);

@@ -26,6 +26,8 @@ const SHOWN_ALTERNATIVES: usize = 4;
 const SHOWN: usize = 8;
 /// Rows that are named of those that took no part.
 const SHOWN_ROWS: usize = 3;
+/// Limits of the declared problem that are named.
+const LIMITS: usize = 3;
 
 /// Rows that took no part in the choice of effects; nothing to say without any.
 pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
@@ -51,7 +53,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
-    blocks.extend(quality_flag(closure));
+    blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
@@ -88,7 +90,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
-    blocks.extend(quality_flag(closure));
+    blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
     blocks.extend(beware(after, plots));
@@ -174,10 +176,22 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
     Headline { states, unit: unit(&last), of, facts }
 }
 
-/// Why the final fit is not to be trusted.
-pub(super) fn quality_flag<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
-    let after = &closure.after;
-    (!after.is_trusted()).then(|| Block::Note(format!("Beware: {}.", why_not_trusted(after))))
+/// Why the final fit is not to be trusted, and limits of the declared problem that effects may stand for.
+pub(super) fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
+    let (before, after) = (&closure.before.fit, &closure.after);
+    let untrusted = (!after.is_trusted()).then(|| format!("Beware: {}.", why_not_trusted(after)));
+    let bounds = before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
+    let held = bounds.chain(before.active_constraints.iter().map(|own| own.words.clone()));
+    let (named, more) = some_of(held, LIMITS);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let limits = (!named.is_empty() && !closure.effects.is_empty()).then(|| {
+        format!(
+            "Limits hold the fit as declared ({}{more}): where one is wrong, an effect that was found may only stand for it. \
+             flexcal identify -v shows what each costs.",
+            named.join(", ")
+        )
+    });
+    untrusted.into_iter().chain(limits).map(Block::Note).collect()
 }
 
 /// Errors of the nominal arm, the declared problem and the closed one.
