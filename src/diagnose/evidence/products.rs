@@ -284,4 +284,28 @@ mod tests {
         }
         assert!((two.gain(2).0 - two.odds_of(&blocks[2..])[0]).abs() < 1e-9);
     }
+
+    #[test]
+    fn a_further_effect_of_a_family_that_is_there_is_likelier() {
+        let (jacobian, residual) = (matrix(30, 1, 0.5), matrix(30, 1, 9.0).column(0).into_owned());
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        let families = [Some("joint-compliance"), Some("joint-compliance"), Some("link-bending"), None, None];
+        let block = |family: Option<&str>| {
+            let mut own = Block::new(Design::Dense(matrix(30, 1, 1.0)), &fit, -3.0, Coefficients::default());
+            own.family = family.map(str::to_owned);
+            own
+        };
+        let blocks: Vec<Block> = families.map(block).to_vec();
+        let noise = Noise { freedom: 29.0, trust: 0.1, least: 0.0 };
+        let target = Target { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
+        let products = Products::new((&blocks, &target), &SelectionRules::DEFAULT);
+        let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
+        let is = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-12, "{value} {expected}");
+        is(of(1, &[]), -3.0);
+        is(of(1, &[2, 3]), -3.0);
+        is(of(1, &[2, 0]), -1.5);
+        // Functions without a law are no family of effects.
+        is(of(4, &[3, 0]), -3.0);
+    }
 }
