@@ -212,12 +212,23 @@ impl Block {
         grid: &[(f64, f64)],
         rules: &SelectionRules,
     ) -> (f64, f64) {
-        let prior = (&rules.displacements[..], &self.coefficients);
         let (with, size) = match set {
-            None => of_block(&self.normal, left, grid, prior),
-            Some((along, taken)) => of_block(&self.normal.beside(along, taken), left, grid, prior),
+            None => self.over_sizes(&self.normal, left, grid, rules),
+            Some((along, taken)) => self.over_sizes(&self.normal.beside(along, taken), left, grid, rules),
         };
         (with - without, size)
+    }
+
+    /// ln p(r | block) up to a constant, of columns and a residual of which `normal` and `left` are what others leave, and the most probable
+    /// size.
+    pub fn over_sizes(
+        &self,
+        normal: &Normal,
+        left: (f64, f64),
+        grid: &[(f64, f64)],
+        rules: &SelectionRules,
+    ) -> (f64, f64) {
+        of_block(normal, left, grid, (&rules.displacements, &self.coefficients))
     }
 }
 

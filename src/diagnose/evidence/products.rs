@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::marginal::{Noise, over_noise};
+use super::marginal::{Noise, Normal, over_noise};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
 use crate::identify::Stop;
@@ -16,6 +16,9 @@ use crate::numeric::inverse_factor;
 
 /// Hypotheses whose gains are worked out together: one product of many columns is fast.
 const TOGETHER: usize = 16;
+
+/// Size below which Pₖₖ⁻¹ is too close to 1 to tell what a member's columns are beside the others.
+const LEAST: f64 = 1e-3;
 
 /// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
 #[derive(Debug, Clone)]
@@ -117,6 +120,8 @@ impl<'a> Products<'a> {
             squares,
             without,
             ln_determinant,
+            sizes: sizes.to_vec(),
+            begins,
             reach: OnceLock::new(),
         })
     }
@@ -127,6 +132,9 @@ impl<'a> Products<'a> {
 pub(super) struct Left<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
+    sizes: Vec<f64>,
+    /// The first column of each member among all.
+    begins: Vec<usize>,
     /// L⁻¹D.
     within: DMatrix<f64>,
     /// Z r.
@@ -144,6 +152,34 @@ impl Left<'_, '_> {
     /// ln p(r | set) at its sizes.
     pub fn ln_likelihood(&self) -> f64 {
         self.without - self.ln_determinant
+    }
+
+    /// ln p(r | set), the size of the k-th member summed over, and its most probable size beside the others at theirs.
+    ///
+    /// With P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of k: beside the others its columns have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c;
+    /// without it the set leaves tₖᵀPₖₖ⁻¹tₖ more squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
+    pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
+        let Products { blocks, target, grid, rules, .. } = self.products;
+        let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
+        if size < LEAST {
+            let others = [&self.members[..k], &self.members[k + 1..]].concat();
+            let others = self.products.left(&others, &[&self.sizes[..k], &self.sizes[k + 1..]].concat())?;
+            let (gain, size) = others.gain(self.members[k]);
+            return Some((others.ln_likelihood() + gain, size));
+        }
+        // Of the lower L⁻¹D, columns of k have rows from the first of these on.
+        let (first, count) = (self.begins[k], block.product().len());
+        let own = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
+        let inner = (own.transpose() * &own).cholesky()?;
+        let ln_determinant = inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let along = own.tr_mul(&self.taken.rows_range(first..));
+        let product = inner.solve(&along);
+        let squares = self.squares + along.dot(&product);
+        let mut gram = inner.inverse();
+        (0..count).for_each(|j| gram[(j, j)] -= 1.0);
+        let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
+        let (ln_summed, size) = block.over_sizes(&normal, (squares, target.noise.freedom), grid, rules);
+        Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
     /// What is left of the residual, everything fitted projected out.
@@ -276,6 +312,17 @@ mod tests {
         assert!((left.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
         let ln_determinant: f64 = factor.l().diagonal().iter().map(|value| value.ln()).sum();
         assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
+        // Of all together one is told from the others as of the others alone, also of next to no size.
+        for (k, least) in [(0, 1.0), (1, 1.0), (2, 1.0), (1, 1e-6)] {
+            let mut sizes = sizes;
+            sizes[k] *= least;
+            let others: Vec<usize> = (0..3).filter(|&other| other != k).collect();
+            let beside = products.left(&others, &others.iter().map(|&other| sizes[other]).collect::<Vec<_>>()).unwrap();
+            let (gain, size) = beside.gain(k);
+            let own = products.left(&members, &sizes).unwrap().of_member(k).unwrap();
+            let expected = beside.ln_likelihood() + gain;
+            assert!((own.0 / expected - 1.0).abs() < 1e-9 && (own.1 - size).abs() < 1e-12, "{own:?} {expected} {size}");
+        }
         // One more gains as much whether it is among the blocks or not.
         let two = products.left(&members[..2], &sizes[..2]).unwrap();
         for (block, (gain, size)) in two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(own, block)| (block, own)) {

@@ -60,27 +60,26 @@ impl Set {
         if self.members.len() < 2 || self.has_wide(products.blocks, products.rules) {
             return self;
         }
+        let Some(mut all) = products.left(&self.members, &self.sizes) else { return self };
         let mut summed = vec![0.0; self.members.len()];
         // Beside others that stayed a size stays.
         let mut stale = vec![true; self.members.len()];
         for _ in 0..SETTLING {
-            for (k, &member) in self.members.iter().enumerate() {
+            for k in 0..self.members.len() {
                 if !std::mem::take(&mut stale[k]) {
                     continue;
                 }
-                let others = [&self.members[..k], &self.members[k + 1..]].concat();
-                let sizes = [&self.sizes[..k], &self.sizes[k + 1..]].concat();
-                let Some(others) = products.left(&others, &sizes) else { return self };
-                let (gain, size) = others.gain(member);
+                let Some((ln_summed, size)) = all.of_member(k) else { return self };
+                summed[k] = ln_summed;
                 if size.to_bits() != self.sizes[k].to_bits() {
                     stale.fill(true);
                     stale[k] = false;
+                    self.sizes[k] = size;
+                    let Some(at_new) = products.left(&self.members, &self.sizes) else { return self };
+                    all = at_new;
                 }
-                self.sizes[k] = size;
-                summed[k] = others.ln_likelihood() + gain;
             }
         }
-        let Some(all) = products.left(&self.members, &self.sizes) else { return self };
         let further = |(k, &member)| products.ln_prior(&products.blocks[member], &self.members[..k]);
         let prior: f64 = self.members.iter().enumerate().map(further).sum();
         let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
@@ -196,7 +195,10 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
             let rest: Vec<usize> = set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
-            if tried.insert((sorted(&rest), kind)) {
+            let key = sorted(&rest);
+            // Laws were tried there among others.
+            let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
+            if !is_tried && tried.insert((key, kind)) {
                 rests.push((rest, gone, kind));
             }
         }
