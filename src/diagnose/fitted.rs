@@ -120,6 +120,11 @@ impl Fitted {
         poses
     }
 
+    /// Rows of the active constraints, shape = (constraints, unknowns).
+    pub fn active(&self) -> &DMatrix<f64> {
+        &self.active
+    }
+
     /// Residuals of some rows, measuring frame \[m\].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.model.residuals(self.poses(data, rows), &self.found.x)

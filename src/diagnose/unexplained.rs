@@ -88,7 +88,8 @@ pub(super) fn without_law(
     let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
     all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
     // What misses the arm altogether is no prediction to improve: a function of the measured position would hold the answer itself.
-    let first = all.iter().position(|(hypothesis, _)| hypothesis.law != Law::PerPose);
+    // Nor is a limit that is wrong a function to add.
+    let first = all.iter().position(|(hypothesis, _)| !matches!(hypothesis.law, Law::PerPose | Law::Limit(_)));
     if let Some(first) = first.filter(|_| fitted.found.is_trusted()) {
         let hypothesis = all[first].0.clone();
         all[first].1.correction = correction(fitted, data, best, &hypothesis);

@@ -13,7 +13,8 @@ use super::noise::size;
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};
-use super::unexplained::{correction, not_looked_for, unexplained};
+use super::trace::percent;
+use super::unexplained::{correction, not_looked_for, unexplained, wrong_limits};
 use super::verdict::{called, counts, is_beside, stand_in, verdict, verdict_word};
 use super::{effect, findings, trace};
 use crate::diagnose::{ClosedLoop, Found, Round, Witness, WitnessVerdict};
@@ -191,7 +192,14 @@ pub(super) fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
             named.join(", ")
         )
     });
-    untrusted.into_iter().chain(limits).map(Block::Note).collect()
+    let wrong = wrong_limits(closure).map(|(limit, probability)| {
+        format!(
+            "The limit that holds {limit} is most probably wrong, or hides a cause ({}): flexcal identify -v shows what it costs; moved out or \
+             left away, it lets the loop look further.",
+            percent(probability)
+        )
+    });
+    untrusted.into_iter().chain(wrong).chain(limits).map(Block::Note).collect()
 }
 
 /// Errors of the nominal arm, the declared problem and the closed one.

@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 use super::document::code;
 use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
-use crate::diagnose::{ClosedLoop, Correction, Covariate, HELD_FIXED, Law, Part, REFUSED, Unexplained};
+use super::verdict::EVEN;
+use crate::diagnose::{
+    Claims, ClosedLoop, Correction, Covariate, HELD_FIXED, Hypothesis, Law, Part, REFUSED, Unexplained,
+};
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
@@ -109,11 +112,30 @@ fn is_sag(left: &Unexplained) -> bool {
     left.claims.as_ref().is_some_and(|claims| claims.law.0.law == Law::Sag)
 }
 
+/// The limit of the declared problem that is wrong, in words, by what is left, and how probable that is.
+fn wrong_limit(left: &Unexplained) -> Option<(&str, f64)> {
+    let Claims { law: (Hypothesis { law: Law::Limit(limit), .. }, probability), .. } = left.claims.as_ref()? else {
+        return None;
+    };
+    Some((limit, *probability))
+}
+
+/// Limits of the declared problem that are wrong, each with its probability, where that is more than even.
+pub(super) fn wrong_limits(closure: &ClosedLoop) -> impl Iterator<Item = (&str, f64)> {
+    closure.unexplained.iter().filter_map(wrong_limit).filter(|(_, probability)| *probability >= EVEN)
+}
+
 /// One finding without a law.
 fn located(left: &Unexplained) -> String {
     let on = left.depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let chance = format!("p-value at most {}", p_value(left.p_value));
     let of = |probability: f64| number(probability, 2);
+    if let Some((limit, probability)) = wrong_limit(left) {
+        return format!(
+            "The limit that holds {limit} is wrong or hides a cause, probability {} ({chance}).",
+            of(probability)
+        );
+    }
     match (&left.claims, on.as_str()) {
         (Some(claims), "") => {
             format!(

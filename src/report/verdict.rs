@@ -7,7 +7,7 @@ use super::unexplained::size_alone;
 use crate::diagnose::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
 
 /// Probability of a law from which on it is the most probable one, and of a place from which on something acts there.
-const EVEN: f64 = 0.5;
+pub(super) const EVEN: f64 = 0.5;
 /// Probability of a law below which it is not even an example.
 const NONE: f64 = 0.005;
 /// Residual in units of the declared σ below which little could be found.

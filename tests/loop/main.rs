@@ -11,5 +11,6 @@ mod command;
 mod custom_effect;
 mod evidence;
 mod harmonics;
+mod limits;
 mod screening;
 mod selection_rules;

@@ -8,6 +8,7 @@ use super::columns::{Columns, slots};
 use super::explanation::Explanation;
 use super::functions::{Known, Shape};
 use super::hypothesis::Hypothesis;
+use super::limits::limits;
 use super::marginal::Coefficients;
 use crate::diagnose::candidates::Candidates;
 use crate::diagnose::covariate::Covariate;
@@ -53,6 +54,7 @@ impl<'a> Hypotheses<'a> {
         let entered = |(effect, columns)| own.entered(&effect, columns, (&fitted.problem, data.rules));
         let waves: Vec<Candidate> = waves.into_iter().filter_map(entered).collect();
         own.all.extend(waves);
+        own.all.extend(limits(fitted, &own.linearised, weighed, (own.ln_family, data.rules)));
         own
     }
 

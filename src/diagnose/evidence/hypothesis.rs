@@ -80,6 +80,8 @@ pub enum Law {
     Linear,
     /// Gives way under the weight of links whose masses nobody declared.
     Sag,
+    /// A limit of the declared problem, in words, that holds the fit is wrong.
+    Limit(String),
 }
 
 impl Law {

@@ -16,6 +16,7 @@ mod finer;
 mod functions;
 mod hypotheses;
 mod hypothesis;
+mod limits;
 mod marginal;
 mod posterior;
 mod products;

@@ -102,6 +102,12 @@ impl<'a> Linearised<'a> {
         &self.relaxed
     }
 
+    /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N, parameters).
+    pub fn of_parameters(&self, model: &Model, parameters: &[usize], x: &DVector<f64>) -> DMatrix<f64> {
+        let residuals = PoseResiduals::new(model, self.poses.clone(), parameters.to_vec(), x.clone());
+        linearise(&residuals, &residuals.reduced(x)).0
+    }
+
     /// Whitened residual, 3 N.
     pub fn residual(&self) -> &DVector<f64> {
         &self.residual
