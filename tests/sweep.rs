@@ -17,6 +17,8 @@ mod calibration;
 mod families;
 #[path = "sweep/full.rs"]
 mod full;
+#[path = "sweep/industrial.rs"]
+mod industrial;
 #[path = "sweep/judged.rs"]
 mod judged;
 #[path = "sweep/outside.rs"]

@@ -1,9 +1,10 @@
 //! Whether what is stated is true as often as its probability says, and whether noise of many kinds is taken for an effect:
 //! `cargo test --release --test sweep calibration -- --ignored --nocapture`; `FLEXCAL_SWEEP=1 FLEXCAL_FIRST=5027` judges one set.
 
-use flexcal::diagnose::{Verdict, close};
+use flexcal::diagnose::{Part, Verdict, close};
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, Measurements};
+use flexcal::problem::{Effect, Problem};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -31,7 +32,7 @@ fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
         let mut one = all[rng.random_range(0..all.len())].clone();
         // From half the size to twice it, where it has one.
         let factor = 2.0_f64.powf(rng.random_range(-1.0..1.0));
-        let is_size = !matches!(one.effect, flexcal::problem::Effect::UnmodelledMass { .. });
+        let is_size = !matches!(one.effect, Effect::UnmodelledMass { .. });
         one.values.iter_mut().take(if is_size { usize::MAX } else { 1 }).for_each(|value| *value *= factor);
         if !chosen.iter().any(|known| known.effect.name() == one.effect.name()) {
             chosen.push(one);
@@ -40,7 +41,7 @@ fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
     chosen
 }
 
-struct Set {
+pub struct Set {
     laws: Vec<Statement>,
     places: Vec<Statement>,
     shown: usize,
@@ -56,59 +57,68 @@ fn judge(first: &[Lacking], seed: u64) -> Set {
     let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
     let judged = Judged::of(&lacking, size, seed);
     println!("{}", judged.line(&name(&lacking), size, seed));
-    if std::env::var_os("FLEXCAL_FIRST").is_some() {
-        for found in &judged.closure.effects {
-            let others: Vec<String> = found.alternatives.iter().map(named).collect();
-            println!("  {} instead of {}: {:?}", named(&found.effect), others.join(", "), found.claims);
+    let effects: Vec<Effect> = lacking.into_iter().map(|one| one.effect).collect();
+    Set::of(&judged, &effects, (&lunar(), seed))
+}
+
+impl Set {
+    /// What is stated of a problem's data, beside the effects that are true.
+    pub fn of(judged: &Judged, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
+        if std::env::var_os("FLEXCAL_FIRST").is_some() {
+            for found in &judged.closure.effects {
+                let others: Vec<String> = found.alternatives.iter().map(named).collect();
+                println!("  {} instead of {}: {:?}", named(&found.effect), others.join(", "), found.claims);
+            }
         }
-    }
-    if let Some(flag) = &judged.closure.after.quality_flag {
-        println!("  {seed} is not to be trusted: {flag}");
-    }
-    let true_law = |effect: &flexcal::problem::Effect| lacking.iter().any(|own| is_the_same(effect, &own.effect));
-    let found = &judged.closure.effects;
-    let problem = lunar();
-    let part = |effect: &flexcal::problem::Effect| {
-        effect.terms(&problem).first().map(|term| flexcal::diagnose::Part::of(term.slot))
-    };
-    let true_place = |place: flexcal::diagnose::Part| lacking.iter().any(|own| part(&own.effect) == Some(place));
-    let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
-    let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
-    let [shown, named, stated] = judged.counts();
-    let stands = found.iter().filter(|found| found.is_named(STATED));
-    Set {
-        laws: claims().map(|(found, claims)| (claims.law.1, true_law(&found.effect))).collect(),
-        places: claims()
-            .map(|(_, claims)| claims)
-            .chain(others)
-            .map(|claims| (claims.place.1, true_place(claims.place.0)))
-            .collect(),
-        shown,
-        named,
-        stated,
-        ghosts: stands.filter(|found| !true_law(&found.effect)).count(),
-        exact: judged.places.iter().zip(&judged.chance).all(|(place, chance)| *place == Place::Found || *chance > 1e-4)
-            && found.iter().all(|found| true_law(&found.effect)),
-        close: [judged.best, judged.alike].map(|truth| judged.after < 1.25 * truth),
+        if let Some(flag) = &judged.closure.after.quality_flag {
+            println!("  {seed} is not to be trusted: {flag}");
+        }
+        let true_law = |effect: &Effect| truth.iter().any(|own| is_the_same(effect, own));
+        let found = &judged.closure.effects;
+        let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.slot));
+        let true_place = |place: Part| truth.iter().any(|own| part(own) == Some(place));
+        let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
+        let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
+        let [shown, named, stated] = judged.counts();
+        let stands = found.iter().filter(|found| found.is_named(STATED));
+        Self {
+            laws: claims().map(|(found, claims)| (claims.law.1, true_law(&found.effect))).collect(),
+            places: claims()
+                .map(|(_, claims)| claims)
+                .chain(others)
+                .map(|claims| (claims.place.1, true_place(claims.place.0)))
+                .collect(),
+            shown,
+            named,
+            stated,
+            ghosts: stands.filter(|found| !true_law(&found.effect)).count(),
+            exact: judged
+                .places
+                .iter()
+                .zip(&judged.chance)
+                .all(|(place, chance)| *place == Place::Found || *chance > 1e-4)
+                && found.iter().all(|found| true_law(&found.effect)),
+            close: [judged.best, judged.alike].map(|truth| judged.after < 1.25 * truth),
+        }
     }
 }
 
 #[test]
 #[ignore = "minutes"]
 fn what_is_stated_is_as_true_as_it_is_probable() {
-    calibrated(&catalogue(), 5000, 300);
+    calibrated(|seed| judge(&catalogue(), seed), 5000, 300);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn what_is_stated_of_the_newest_effects() {
-    calibrated(&newest(), 7000, 120);
+    calibrated(|seed| judge(&newest(), seed), 7000, 120);
 }
 
 /// Judges so many sets from a seed on, and prints how true and how probable statements are.
-fn calibrated(first: &[Lacking], seed: u64, count: u64) {
+pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u64) {
     let begin = std::env::var("FLEXCAL_FIRST").map_or(seed, |seed| seed.parse().unwrap());
-    let all: Vec<Set> = (begin..begin + sets(count)).into_par_iter().map(|seed| judge(first, seed)).collect();
+    let all: Vec<Set> = (begin..begin + sets(count)).into_par_iter().map(judge).collect();
     let count = |of: &dyn Fn(&Set) -> usize| all.iter().map(of).sum::<usize>();
     let bins = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)];
     for (what, statements) in [

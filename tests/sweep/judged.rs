@@ -47,14 +47,18 @@ impl Judged {
     pub fn of(lacking: &[Lacking], size: Size, seed: u64) -> Self {
         let on_the_rig: Vec<_> = lacking.iter().filter_map(Lacking::on_the_rig).collect();
         let set = measured(&on_the_rig, size, seed);
-        let problem = declared(lacking);
-        let closure = close(&problem, &set.data, &Options::default()).unwrap();
         let all: Vec<Effect> = lacking.iter().map(|one| one.effect.clone()).collect();
-        let full = Squares::of(&problem, &all, &set);
+        Self::with(declared(lacking), &set, &all)
+    }
+
+    /// The same of a problem, with the effects `all` in the data that it lacks.
+    pub fn with(problem: Problem, set: &Set, all: &[Effect]) -> Self {
+        let closure = close(&problem, &set.data, &Options::default()).unwrap();
+        let full = Squares::of(&problem, all, set);
         let without = |k: usize| {
             let others: Vec<Effect> =
                 all.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, effect)| effect.clone()).collect();
-            Squares::of(&problem, &others, &set).chance_beside(&full)
+            Squares::of(&problem, &others, set).chance_beside(&full)
         };
         let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
         let others: Vec<&Effect> = closure.effects.iter().flat_map(|found| &found.alternatives).collect();
@@ -72,7 +76,7 @@ impl Judged {
             before: ratio(&closure.before.fit),
             after: ratio(&closure.after),
             best: full.held_out / NOISE,
-            alike: ratio(&identify(&with(problem, &all), &set.data, &Options::default()).unwrap()),
+            alike: ratio(&identify(&with(problem, all), &set.data, &Options::default()).unwrap()),
             closure,
         }
     }
