@@ -99,7 +99,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
         let (named, estimate) = (common.named(), results.path("estimate.json"));
         let next = match report::look_at_carriers(&identification, &common.problem_file()) {
-            Some(look) => look,
+            Some(look) => {
+                format!("{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks")
+            }
             // Of what says so little neither a cause nor a correction can be told.
             None if !identification.is_trusted() || report::tells_little(&identification) => {
                 format!("flexcal check {named} says what the poses can tell")

@@ -3,8 +3,9 @@
 use super::outcome::{Identification, Noise};
 use super::outliers::{Carriers, Outlier};
 
-/// Without its carriers a fit leaves no more than this part of the variance, or what the declared σ explains.
-const FAR_BETTER: f64 = 0.1;
+/// Without its carriers a fit leaves no more than this part of the variance, or what the declared σ explains: rows that an effect
+/// touches alone, as the few with a payload, are off by less.
+const FAR_BETTER: f64 = 0.01;
 /// More than one row in so many carry nothing: the model misses them all.
 const ONE_IN: usize = 5;
 /// Rows left out in one round: one in so many, at least one. A gross one makes others look far off, and hides smaller ones.

@@ -112,3 +112,14 @@ fn quiet_says_in_one_line_why_the_status_is_1() {
         assert!(err.lines().count() == 1 && err.contains("the fit is not to be trusted: "), "{command}: {err}");
     }
 }
+
+#[test]
+fn rows_that_an_effect_touches_alone_are_no_gross_ones() {
+    let bench = Bench::new();
+    let cases = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    fs::copy(cases.join("e-payload-mass.csv"), bench.path("a-none.csv")).unwrap();
+    let (_, out, _) = run(&bench, "identify . --out out");
+    assert!(!out.contains("carr") && out.contains("\nNext: flexcal loop . looks for what the model lacks"), "{out}");
+    let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap()).unwrap();
+    assert!(json["misfit_carried_by"].is_null() && !json["outliers"].as_array().unwrap().is_empty());
+}
