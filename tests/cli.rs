@@ -11,6 +11,8 @@ use assert_cmd::Command;
 mod compensate;
 #[path = "cli/example.rs"]
 mod example;
+#[path = "cli/gross.rs"]
+mod gross;
 #[path = "cli/input.rs"]
 mod input;
 #[cfg(target_os = "linux")]

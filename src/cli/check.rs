@@ -63,9 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if check.suffices() {
         return Ok(Outcome::Done);
     }
-    if !common.quiet {
-        diagnostic::warn(&report::why_not_sufficient(&check));
-    }
+    diagnostic::warn(&report::why_not_sufficient(&check));
     Ok(Outcome::NotTrusted)
 }
 

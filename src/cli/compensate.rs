@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let estimate = SavedEstimate::read(&arguments.estimate)?;
     let model = estimate.model(model);
     let (x, trusted) = (estimate.vector(&problem, &model)?, estimate.trusted);
-    if !trusted && !common.quiet {
+    if !trusted {
         diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
     }
     // Waypoints go with the base, wherever it is.
@@ -115,5 +115,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&format!("\nWritten to {}\n", results.path("commands.csv").display()))?;
     }
     let all = commands.iter().all(identify::Command::is_reached);
+    if !all && common.quiet {
+        diagnostic::warn("a target is not reached; without --quiet it is named");
+    }
     Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
 }

@@ -54,14 +54,14 @@ pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
-/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on priors.
+/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on priors. Exit status 1 has its
+/// reason in one line even where the command is to be quiet.
 pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
+    if !fit.is_trusted() {
+        warn(&report::why_not_trusted(fit));
+    }
     if !quiet {
-        match (fit.is_trusted(), fit.too_few_poses) {
-            (false, _) => warn(&report::why_not_trusted(fit)),
-            (true, Some(few)) => warn(&few.to_string()),
-            (true, None) => {}
-        }
+        fit.too_few_poses.iter().filter(|_| fit.is_trusted()).for_each(|few| warn(&few.to_string()));
         fit.cautions.iter().for_each(|caution| warn(&caution.to_string()));
     }
     if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }

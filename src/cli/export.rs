@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     } else if flags.talks() {
         output::print(&report::export_text(&exported))?;
     }
-    if !estimates.trusted && !flags.quiet {
+    if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, and so is this file not");
     }
     Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })

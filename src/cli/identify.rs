@@ -98,19 +98,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names = "estimate.json, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
         let (named, estimate) = (common.named(), results.path("estimate.json"));
-        let next = match identification.is_trusted() {
+        let next = match report::look_at_carriers(&identification, &common.problem_file()) {
+            Some(look) => {
+                format!("{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks")
+            }
             // Of what says so little neither a cause nor a correction can be told.
-            true if report::tells_little(&identification) => {
+            None if !identification.is_trusted() || report::tells_little(&identification) => {
                 format!("flexcal check {named} says what the poses can tell")
             }
-            true if report::lacks_something(&identification) => {
+            None if report::lacks_something(&identification) => {
                 format!("flexcal loop {named} looks for what the model lacks")
             }
-            true => {
+            None => {
                 let [problem, estimate] = [common.problem(), &estimate].map(shell_word);
                 format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
             }
-            false => format!("flexcal check {named} says what the poses can tell"),
         };
         output::print(&format!("Next: {next}\n"))?;
     }

@@ -83,7 +83,7 @@ impl Common {
     /// Reads the measurements of a problem.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
         let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
-        warnings.extend(measurements.repeated_rows());
+        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
         if !self.quiet {
             diagnostic::print_warnings(&warnings);

@@ -80,13 +80,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         output::print(&told)?;
         let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
         output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
-        if closure.after.is_trusted() {
+        if let Some(look) = report::look_at_carriers(&closure.before.fit, &common.problem_file()) {
+            output::print(&format!("Next: {look}\n"))?;
+        } else if closure.after.is_trusted() {
             let closed = shell_word(&results.path("problem.closed.toml"));
             output::print(&format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n"))?;
         }
     }
     let outcome = diagnostic::judged(&closure.after, common.quiet);
-    if closure.interrupted && !common.quiet {
+    if closure.interrupted {
         diagnostic::warn(&report::interrupted(&closure));
     }
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })

@@ -179,9 +179,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if plan.suffices {
         return Ok(Outcome::Done);
     }
-    if !common.quiet {
-        diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
-    }
+    diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
     Ok(Outcome::NotTrusted)
 }
 

@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
-    if !trusted && !common.quiet {
+    if !trusted {
         diagnostic::warn("the estimate is not to be trusted, and so are the predictions not");
     }
     // Rows that nobody divided are predicted all the same; chance divides those that were fitted, no others.

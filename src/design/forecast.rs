@@ -28,6 +28,8 @@ pub struct Expected {
     pub std_error: Option<f64>,
     /// Part of the value that the data will give, 0…1.
     pub identified: f64,
+    /// The same at the nominal arm, where parameters may go together that other arms tell apart.
+    pub identified_at_nominal: f64,
     /// Whether it belongs to a base or a target rather than to the arm.
     pub is_placement: bool,
 }
@@ -78,11 +80,13 @@ impl Forecast {
                     prior: parameter.sigma.map(|sigma| parameter.value_error(0.0, sigma)),
                     std_error: None,
                     identified: identifiability.visible[k],
+                    identified_at_nominal: identifiability.visible[k],
                     is_placement: parameter.slot.is_placement(),
                 };
                 if visible[k] > 1.0 - PARTLY_OPEN {
                     expected.learn(parameter, variances[k]);
                 }
+                expected.identified_at_nominal = expected.identified;
                 expected
             })
             .collect();

@@ -82,6 +82,10 @@ pub struct Plan {
     pub value: f64,
     /// Of the poses given and the planned ones together.
     pub planned: Forecast,
+    /// Combinations of parameters that all candidates together see, priors left out.
+    pub attainable_rank: usize,
+    /// Planned poses without which they cannot all be seen, whichever poses they are.
+    pub least_poses: usize,
     /// Numbers that the poses given and the planned ones measure together.
     pub coordinates: usize,
     /// Of the poses given and as many others, drawn at random again and again.
@@ -151,6 +155,7 @@ pub fn plan(
         return Err(DesignError::NothingSeen);
     }
     let attainable = attainable.saturating_sub(untouched(parameters, &[Some(&all)]));
+    let (attainable_rank, least_poses) = attainable_rank(parameters, given.as_ref(), &all);
     let exchange =
         Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
     let (ends, starts) = starts(&exchange, options);
@@ -190,7 +195,26 @@ pub fn plan(
     let open = planned.open.saturating_sub(untouched(parameters, &[Some(&told), given.as_ref()]));
     let suffices = open <= attainable && apart >= without_prior;
     let given = of_arm.map_or(0, |own| own.len());
-    Ok(Plan { poses: chosen, given, candidates: tried, starts, value, planned, coordinates, random, suffices })
+    Ok(Plan {
+        poses: chosen,
+        given,
+        candidates: tried,
+        starts,
+        value,
+        planned,
+        attainable_rank,
+        least_poses,
+        coordinates,
+        random,
+        suffices,
+    })
+}
+
+/// Combinations that the poses given and all candidates see together, and poses without which they cannot be seen.
+fn attainable_rank(parameters: &[Parameter], given: Option<&Sensitivity>, all: &Sensitivity) -> (usize, usize) {
+    let rank = |own: &Sensitivity| Forecast::new(parameters, own).identifiability.rank;
+    let (most, before) = given.map_or_else(|| (rank(all), 0), |given| (rank(&given.and(all)), rank(given)));
+    (most, most.saturating_sub(before).div_ceil(all.coordinates))
 }
 
 /// What is measured in any case, with the known distances between points that only the candidates touch.

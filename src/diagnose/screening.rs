@@ -180,6 +180,12 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         covariates: &data.covariates(&fitted.problem),
     };
     let mut findings = test_residual(&fit, data.rules.seed);
+    // The tests count poses; people count rows of files.
+    for own in &mut findings.tests {
+        if let Test::Outliers { worst: Some(pose) } = own.test {
+            own.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
+        }
+    }
     // Against the σ declared, not the smaller one that the scatter speaks for.
     let size = findings.tests.iter_mut().find(|own| own.test == Test::ReducedChiSquared);
     if let Some(outcome) = size.and_then(|own| own.outcome.as_mut().ok()) {

@@ -159,7 +159,7 @@ pub enum InputErrorKind {
     NoSigmaOfKind { write: String },
 
     // Effects.
-    #[error("an effect is one key, as in `payload-mass = {{}}`; found {found}")]
+    #[error("an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}")]
     NotOneEffect { found: usize },
     #[error("needs arguments; write {write}")]
     NeedsArguments { write: String },
@@ -338,6 +338,8 @@ pub enum InputErrorKind {
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
     #[error("{} has several columns of this name; say which by its place, as in \"#{place}\"", file.display())]
     AmbiguousColumn { file: PathBuf, place: usize },
+    #[error("the table has a column {name} of its own, and none that is {write}; is that meant here?")]
+    ColumnHidden { name: String, write: String },
     #[error("not a column that flexcal knows{}", question(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
     #[error("the position of every row is the one that stands for nothing measured")]
@@ -412,8 +414,13 @@ pub enum WarningKind {
     JointIgnored { joint: usize },
     #[error("not a column that is known; ignored (write {write})")]
     UnitIgnored { write: String },
-    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", more(*rows))]
-    RowsRepeated { rows: usize, first: String },
+    #[error(
+        "{value:?} is no date and time such as 2024-05-31T14:03:20.5; ignored, so that the order of the rows is the time (write {write} for \
+         seconds)"
+    )]
+    NotADate { value: String, write: String },
+    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", more(*rows, others))]
+    RowsRepeated { rows: usize, first: String, others: Vec<String> },
     #[error("the time goes back by {back} s from the row before{}; rows are taken in the order of their times", further(*rows))]
     TimeGoesBack { rows: usize, back: String },
     #[error(
@@ -428,8 +435,15 @@ pub enum WarningKind {
     FarTarget { distance: String, links: String },
 }
 
-fn more(rows: usize) -> String {
-    if rows > 1 { format!(", and {} further rows repeat others", rows - 1) } else { String::new() }
+fn more(rows: usize, named: &[String]) -> String {
+    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
+    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    let named = named.join(", ");
+    match further {
+        0 => String::new(),
+        1 => format!(", and 1 further row repeats another ({named})"),
+        _ => format!(", and {further} further rows repeat others ({named}{left})"),
+    }
 }
 
 fn further(rows: usize) -> String {

@@ -6,6 +6,7 @@ use std::time::Instant;
 use nalgebra::{DMatrix, DVector};
 
 use super::active::ActiveConstraint;
+use super::carriers::carriers;
 use super::covariance::Collected;
 use super::fitting::{FitEnd, Fitting};
 use super::judgement::Judgement;
@@ -23,7 +24,7 @@ use super::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strat
 use crate::error::{InputError, InputErrorKind};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
-use crate::measurement::Dataset;
+use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
 use crate::problem::{Effect, Problem, Robust, RobustLoss};
@@ -194,7 +195,7 @@ pub fn identify(problem: &Problem, data: &Dataset, options: &Options) -> Result<
 }
 
 /// Data without a row to fit and configurations of another arm are mistakes, and what is declared and not measured.
-fn check_data(problem: &Problem, Dataset { measurements, split }: &Dataset) -> Result<(), IdentifyError> {
+fn check_data(problem: &Problem, measurements: &Measurements, split: &Split) -> Result<(), IdentifyError> {
     let (found, joints) = (measurements.joints, problem.joints.len());
     if found != joints {
         return Err(IdentifyError::JointCount { found, joints });
@@ -223,8 +224,29 @@ pub fn identify_model(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
+    let mut found = fit_rows(model, problem, (measurements, split), options)?;
+    // A robust loss sets such rows aside by itself.
+    if !options.in_passing && problem.robust.is_none() {
+        let passing = Options { progress: None, predecessor: None, in_passing: true, ..options.clone() };
+        let without = |rows: &[usize]| {
+            let kept = split.identification.iter().copied().filter(|row| !rows.contains(row)).collect();
+            let split = Split { identification: kept, held_out: split.held_out.clone() };
+            fit_rows(model, problem, (measurements, &split), &passing).ok()
+        };
+        found.carriers = carriers(&found, without);
+    }
+    Ok(found)
+}
+
+/// Fits the identification rows of a split.
+fn fit_rows(
+    model: &Model,
+    problem: &Problem,
+    (measurements, split): (&Measurements, &Split),
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
     let (clock, memory) = (Instant::now(), Memory::default());
-    check_data(problem, data)?;
+    check_data(problem, measurements, split)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
     if !solver.keeps(model) {
@@ -316,6 +338,7 @@ pub fn identify_model(
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
         active_constraints: ActiveConstraint::all(&statistics.constraints, &statistics.prices.constraints, model),
         outliers,
+        carriers: None,
         x: end.x,
         registered_x: start,
         first_time: measurements.time.iter().copied().fold(f64::INFINITY, f64::min),

@@ -10,8 +10,8 @@ use super::noise_model::NoiseModel;
 use super::stage::Stage;
 use super::statistics::Statistics;
 use super::{
-    ActiveConstraint, Alternation, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag, ShadowPrice,
-    SolverChoice, Strategy, TooFewPoses,
+    ActiveConstraint, Alternation, Carriers, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag,
+    ShadowPrice, SolverChoice, Strategy, TooFewPoses,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
@@ -135,6 +135,8 @@ pub struct Identification {
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
+    /// Those that carry what the fit does not explain, if a few do; not looked for with a robust loss, or in passing.
+    pub carriers: Option<Carriers>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,
     /// The same of the nominal arm with base and target fitted where they are free, whose errors are `registered`.

@@ -67,6 +67,17 @@ impl Outlier {
     }
 }
 
+/// A few rows too far off to be noise, without which the fit would explain the others far better.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carriers {
+    /// The rows, in their order.
+    pub rows: Vec<Outlier>,
+    /// χ² over its degrees of freedom of the fit without them; `None` with the noise estimated.
+    pub reduced_chi2: Option<f64>,
+    /// 1 σ of a coordinate that the fit without them takes \[m\]; of tilts \[rad\].
+    pub sigma_taken: f64,
+}
+
 /// Lengths of the whitened residuals of some poses, and what counts as too long.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {

@@ -7,7 +7,7 @@ use super::mapped::Names;
 use super::role::{MEASURED, PLAIN, Role};
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
-use crate::problem::{HeldOut, Joint, JointKind, JointSource, Problem};
+use crate::problem::{ColumnRule, HeldOut, Joint, JointKind, JointSource, Problem};
 use crate::quantity::Unit;
 
 /// Unknown columns of which is asked what they are meant to be; who has more means none.
@@ -52,19 +52,22 @@ impl Columns {
         let named = Names::of(table, &problem.data.dialect)?;
         let numbering = Numbering::of(named.all(), problem);
         let there: BTreeSet<&str> = named.all().map(|name| split_unit(name).0).collect();
-        let mut found: BTreeMap<Role, &str> = BTreeMap::new();
-        let mut names = BTreeSet::new();
+        let mut found: BTreeMap<Role, (String, Option<&ColumnRule>)> = BTreeMap::new();
+        let mut names = BTreeMap::new();
         let file = named.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
         let ours = named.all().map(str::to_owned).collect();
         let mut columns = Self { read: Vec::new(), marked: None, file: None, names: ours };
         let (mut unknown, mut mistyped, mut unmapped) = (Vec::new(), None, Vec::new());
+        let (mut shifted, mut hidden) = (None, None);
         for (place, &(name, rule)) in named.of_place.iter().chain(&file).enumerate() {
             let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
             let error = |kind| location().error(kind);
             let own = problem.data.covariates.iter().position(|own| own.name == name);
             let foreign = named.mapped && rule.is_none() && own.is_none();
-            if !name.is_empty() && !names.insert(name) && !foreign {
-                return Err(error(InputErrorKind::RepeatedColumn { first: name.to_owned() }));
+            let called = called(name, table.header.get(place));
+            let first = names.insert(name, called.clone()).filter(|_| !name.is_empty() && !foreign);
+            if let Some(first) = first {
+                return Err(error(InputErrorKind::RepeatedColumn { first }));
             }
             let is_marked = marked_name == Some(name);
             if is_marked {
@@ -79,7 +82,10 @@ impl Columns {
                 (_, Some(own)) => Ok(Meaning::Read(Role::Covariate(own), identity)),
                 // What another program calls by our name need not be ours.
                 (Err(_), _) if foreign => Ok(Meaning::Unknown),
-                (Ok(Meaning::Read(role, _)), _) if foreign && found.contains_key(&role) => Ok(Meaning::Unknown),
+                (Ok(Meaning::Read(role, _)), _) if foreign && found.contains_key(&role) => {
+                    hidden = hidden.or_else(|| Some((found.get(&role)?.1?, name)));
+                    Ok(Meaning::Unknown)
+                }
                 (other, _) => other.map_err(error),
             }?;
             match meaning {
@@ -87,12 +93,17 @@ impl Columns {
                     columns.file = Some(word_of_row(role).map_err(error)?);
                 }
                 Meaning::Read(role, to_si) => {
-                    if let Some(first) = found.insert(role, name) {
-                        return Err(error(InputErrorKind::RepeatedColumn { first: first.to_owned() }));
+                    if let Some((first, _)) = found.insert(role, (called, rule)) {
+                        return Err(error(InputErrorKind::RepeatedColumn { first }));
                     }
                     columns.read.push(Column { role, place, to_si });
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
+                // Numbers count joints otherwise where another name is misspelt.
+                Meaning::Ignored(WarningKind::JointIgnored { .. }) if rule.is_some() => {
+                    let meant = numbering.meant(name, &there, problem);
+                    shifted = shifted.or_else(|| Some(error(InputErrorKind::UnknownMeaning { meant })));
+                }
                 Meaning::Ignored(WarningKind::UnitIgnored { write }) if rule.is_some() => {
                     return Err(error(InputErrorKind::UnknownMeaning { meant: Some(write) }));
                 }
@@ -126,7 +137,14 @@ impl Columns {
             warnings.push(Warning { location, kind: WarningKind::Unmapped { names: unmapped } });
         }
         columns.read.sort_by_key(|column| column.role);
-        columns.require(table, problem, measured, &numbering, &unknown)?;
+        if let Some(error) = shifted {
+            return Err(error);
+        }
+        let required = columns.require(table, problem, measured, &numbering, &unknown);
+        required.map_err(|error| match hidden {
+            Some(hidden) => blamed(error, hidden),
+            None => error,
+        })?;
         mistyped.map_or(Ok(columns), Err)
     }
 
@@ -261,16 +279,6 @@ impl Columns {
         self.read.get(index).map(|column| column.place)
     }
 
-    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out with a warning.
-    pub fn settle_time(&mut self, table: &Table, warnings: &mut Vec<Warning>) {
-        let dated = |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
-        if let Some(place) = self.read.iter().position(|column| column.role == Role::Time && !dated(column)) {
-            let column = self.read.remove(place);
-            let kind = WarningKind::UnitIgnored { write: Unit::Time.spelled("time") };
-            warnings.push(Warning { location: table.column(table.name_of(column.place)), kind });
-        }
-    }
-
     /// What flexcal calls a column.
     pub fn name_of(&self, column: &Column) -> &str {
         self.names.get(column.place).map_or("", String::as_str)
@@ -295,6 +303,22 @@ impl Columns {
 
     pub fn has(&self, role: Role) -> bool {
         self.file == Some(role) || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+    }
+}
+
+/// A name of ours, with theirs where that is another.
+fn called(name: &str, theirs: Option<&String>) -> String {
+    let theirs = theirs.filter(|theirs| *theirs != name).map(|theirs| format!(" ({theirs})"));
+    name.to_owned() + &theirs.unwrap_or_default()
+}
+
+/// A column that is missing is the fault of an entry of the map that gives its name to one which the table has itself.
+fn blamed(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
+    match *error.kind {
+        InputErrorKind::MissingColumn { write, .. } => {
+            rule.location.clone().error(InputErrorKind::ColumnHidden { name: name.to_owned(), write })
+        }
+        kind => error.location.error(kind),
     }
 }
 

@@ -57,7 +57,7 @@ impl Dataset {
     /// The first mistake found in the files or in their division.
     pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
-        warnings.extend(measurements.repeated_rows());
+        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
         Ok((Self::of(problem, measurements)?, warnings))
     }
@@ -68,7 +68,7 @@ impl Dataset {
     /// The first mistake found in the table or in its division.
     pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
-        warnings.extend(measurements.repeated_rows());
+        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
         Ok((Self::of(problem, measurements)?, warnings))
     }

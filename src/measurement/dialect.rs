@@ -24,8 +24,8 @@ pub(super) struct Layout {
 impl Layout {
     /// Of a table that begins with `beginning`.
     ///
-    /// The header is the first line that holds every name of the map, or else the first that says something; columns are set apart
-    /// by the one of `,` `;` and tab that it has most of, else by spaces if it has any.
+    /// The header is the first line that holds most of the names of the map, or else the first that says something; columns are
+    /// set apart by the one of `,` `;` and tab that it has most of, else by spaces if it has any.
     pub fn of(beginning: &[u8], dialect: &Dialect) -> Self {
         let text = String::from_utf8_lossy(beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning));
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
@@ -42,13 +42,15 @@ impl Layout {
         let speaking: Vec<(usize, &str)> =
             lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line)).collect();
         let apart = |line: &str| dialect.delimiter.unwrap_or_else(|| most_of(line));
-        let holds_all = |line: &str| {
+        let held = |line: &str| {
             let cells = cells(line, apart(line));
-            names.iter().all(|name| cells.iter().any(|cell| cell == name))
+            names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count()
         };
-        let named = speaking.iter().find(|(_, line)| !names.is_empty() && holds_all(line));
+        // Of equals the first: the last of the lines from the end.
+        let counted = speaking.iter().rev().map(|&own| (held(own.1), own)).filter(|(count, _)| *count > 0);
+        let named = counted.max_by_key(|(count, _)| *count).map(|(_, own)| own);
         match (named, speaking.first()) {
-            (Some(&(skipped, line)), _) => Self { delimiter: apart(line), skipped },
+            (Some((skipped, line)), _) => Self { delimiter: apart(line), skipped },
             // Lines that say nothing are passed over anyway.
             (None, Some((_, line))) => Self { delimiter: apart(line), skipped: 0 },
             (None, None) => Self { delimiter: dialect.delimiter.unwrap_or(Delimiter::Byte(b',')), skipped: 0 },
@@ -195,6 +197,18 @@ mod tests {
         ] {
             assert_eq!(Layout::of(text.as_bytes(), &Dialect::default()), Layout { delimiter, skipped }, "{text:?}");
         }
+    }
+
+    #[test]
+    fn a_misspelt_name_of_the_map_does_not_hide_the_header() {
+        let rule = |name: &str| crate::problem::ColumnRule {
+            theirs: ColumnOf::Name(name.to_owned()),
+            ours: String::new(),
+            location: crate::error::Location::file("problem.toml"),
+        };
+        let dialect = Dialect { columns: ["a", "b", "misspelt"].map(rule).to_vec(), ..Dialect::default() };
+        let text = "day 1, tool b\nb,c\na;b;c\n1;2;3\n";
+        assert_eq!(Layout::of(text.as_bytes(), &dialect), Layout { delimiter: Delimiter::Byte(b';'), skipped: 2 });
     }
 
     #[test]

@@ -29,6 +29,7 @@ mod read;
 mod repeats;
 #[deny(clippy::indexing_slicing)]
 mod role;
+mod settled;
 mod split;
 #[deny(clippy::indexing_slicing)]
 mod table;

@@ -104,7 +104,7 @@ impl<'a> Tables<'a> {
             let line = table.line();
             return Err(Location::file(&table.file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
         }
-        columns.settle_time(&table, &mut self.warnings);
+        columns.settle_time(&table, &mut self.warnings)?;
         let rows = self.builder.get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.seen(), LeftOut::default());

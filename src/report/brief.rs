@@ -6,7 +6,7 @@ use super::document::{Block, Point};
 use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
 use super::identify::{errors_by_axis, headline};
-use super::noise::noise;
+use super::noise::{carried, noise};
 use super::parameters::correlated;
 use super::quantity::{counted, number};
 use super::render::text_within;
@@ -21,12 +21,10 @@ const LINES: usize = 22;
 
 /// A fit on one screen of so many columns, ending in a line break: errors, how large the residual is, and what to look at.
 pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
-    let blocks = [
-        headline(problem, found),
-        Block::Table(errors_by_axis(found)),
-        Block::lines(noise(problem, found)),
-        Block::Lines(parameters(&found.estimates), worth_a_look(found)),
-    ];
+    let mut blocks =
+        vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    blocks.extend(carried(found));
+    blocks.push(Block::Lines(parameters(&found.estimates), worth_a_look(found)));
     text_within(&blocks, columns)
 }
 
@@ -106,6 +104,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::lines(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
+    blocks.extend(carried(&closure.before.fit));
     blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));

@@ -7,7 +7,7 @@ use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
-use crate::design::{Check, Elsewhere, GrowthStep, Prediction};
+use crate::design::{Check, Elsewhere, Expected, Forecast, GrowthStep, Prediction};
 use crate::identify::rows_of_kind;
 use crate::problem::Problem;
 
@@ -76,10 +76,18 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     let names: Vec<String> = forecast.expected.iter().map(|expected| expected.name.clone()).collect();
     let rows = forecast.expected.iter().map(|expected| {
         let (mut row, unit) = cells(expected, &[expected.prior, expected.std_error]);
-        row.extend([unit, format!("{:3.0} %", expected.identified * 100.0)]);
+        row.extend([unit, share(expected)]);
         row
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
+    let mut notes = vec![
+        "± 1 σ: to be expected of the estimate; identified: the share that the data will give, the rest is prior or choice",
+    ];
+    if forecast.expected.iter().any(goes_with_others) {
+        notes.push(
+            "a share with “to”: at the nominal arm, where the parameter goes with others (below), and of arms drawn from the priors",
+        );
+    }
     let mut blocks = vec![
         Block::lines(format!(
             "{}\n{}, {}",
@@ -87,9 +95,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
             counted(names.len(), "parameter"),
             counted(forecast.poses, "pose")
         )),
-        Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&[
-            "± 1 σ: to be expected of the estimate; identified: the share that the data will give, the rest is prior or choice",
-        ])),
+        Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         conditioning(&forecast.identifiability, names.len(), check.coordinates),
         unidentifiable(&forecast.identifiability, &names, "check.json"),
         Block::lines(prediction(check)),
@@ -104,6 +110,26 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     blocks.extend(assumptions(problem, &forecast.expected, all));
     blocks.extend(detection::blocks(&check.detection));
     text(&blocks)
+}
+
+/// Shares of the data that differ by more than this are shown both.
+const APART: f64 = 0.05;
+
+/// Whether the poses hardly tell a parameter at the nominal arm, and tell it at arms drawn from the priors.
+fn goes_with_others(expected: &Expected) -> bool {
+    let nominal = expected.identified_at_nominal;
+    nominal < Forecast::WELL && expected.identified - nominal > APART
+}
+
+/// The share of a parameter that the data will give.
+fn share(expected: &Expected) -> String {
+    let percent = |share: f64| format!("{:3.0}", share * 100.0);
+    let own = percent(expected.identified);
+    if goes_with_others(expected) {
+        format!("{} to {} %", percent(expected.identified_at_nominal), own.trim_start())
+    } else {
+        format!("{own} %")
+    }
 }
 
 /// Why poses do not suffice, in one line.

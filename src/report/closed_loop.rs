@@ -9,7 +9,7 @@ use super::errors::{
 };
 use super::figures::{Figure, PlotData};
 use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, spread, told, why_not_trusted};
-use super::noise::size;
+use super::noise::{carried, size};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};
@@ -54,6 +54,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
+    blocks.extend(carried(&closure.before.fit));
     blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
@@ -91,6 +92,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
+    blocks.extend(carried(fit));
     blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));

@@ -19,6 +19,7 @@ object! {
         prior_sigma: Option<f64> = expected.prior,
         std_error: Option<f64> = expected.std_error,
         identified: f64 = expected.identified,
+        identified_at_nominal: f64 = expected.identified_at_nominal,
     }
 }
 

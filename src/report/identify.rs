@@ -11,14 +11,15 @@ use super::figures::{Figure, PlotData};
 use super::findings;
 use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
 use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
-use super::noise::{noise, outliers, size};
+use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
 };
 use super::quantity::{counted, decimals, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
-    ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors, Outlier,
+    ActiveConstraint, Carriers, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors,
+    Outlier,
 };
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
@@ -70,6 +71,7 @@ object! {
         correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
         active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
         outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
+        misfit_carried_by: Option<CarriersEntry> = found.carriers.as_ref().map(CarriersEntry::of),
         cautions: Vec<String> = found.reasons_to_ask(),
     }
 }
@@ -137,6 +139,13 @@ object! {
         sigmas: f64 = outlier.distance,
     }
 }
+object! {
+    /// A few rows without which the fit would explain the others far better.
+    CarriersEntry(carriers: &Carriers) {
+        rows: Vec<OutlierEntry> = carriers.rows.iter().map(OutlierEntry::of).collect(),
+        reduced_chi2_without: Option<f64> = carriers.reduced_chi2,
+    }
+}
 
 fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
     if bound == AtBound::Lower { lower } else { upper }
@@ -151,6 +160,7 @@ pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks =
         vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    blocks.extend(carried(found));
     blocks.extend(around(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
@@ -313,6 +323,7 @@ pub(super) fn remainder<'a>(
     file: &str,
 ) -> Vec<Block<'a>> {
     let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
+    blocks.extend(carried(found));
     blocks.extend(outliers(problem, found));
     let figures = [Figure::Histogram(plots), Figure::Order(plots), Figure::JointMap(plots)];
     blocks.push(Block::Figures(figures.to_vec()));

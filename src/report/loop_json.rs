@@ -2,6 +2,7 @@
 
 use super::closed_loop::says;
 use super::errors::in_unit;
+use super::identify::CarriersEntry;
 use super::json::{Both, Kind, Summary, object, to_text};
 use super::unexplained::place;
 use super::verdict::verdict_word;
@@ -47,6 +48,7 @@ object! {
         #[serde(flatten)]
         errors: Both = Both::of(&fit.fitted),
         reduced_chi2: Option<f64> = fit.reduced_chi2,
+        misfit_carried_by: Option<CarriersEntry> = fit.carriers.as_ref().map(CarriersEntry::of),
         /// Of each kind of rows, where there are several.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         kinds: Vec<Kind> = fit.kinds.iter().map(Kind::of).collect(),

@@ -57,7 +57,7 @@ pub use figures::{
 pub use identify::{estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted};
 pub use init::{init_json, init_text};
 pub use loop_json::loop_json;
-pub use noise::lacks_something;
+pub use noise::{lacks_something, look_at_carriers};
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
 pub use predict::{errors_json, prediction_text, predictions_csv};

@@ -1,6 +1,8 @@
 //! How large the residual of a fit is against the declared σ, and which rows are beyond it.
 
-use super::document::{Block, first_of};
+use std::path::Path;
+
+use super::document::{Block, first_of, some_of};
 use super::errors::{brief, noun, rows_in, unit, with_unit};
 use super::quantity::{counted, decimals, mm, number};
 use crate::identify::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
@@ -8,6 +10,8 @@ use crate::problem::Problem;
 
 /// Outliers that fit on a screen.
 const SHOWN_OUTLIERS: usize = 20;
+/// Rows that are named of those that carry the misfit.
+const SHOWN_CARRIERS: usize = 3;
 /// The file that holds them all.
 const FILE: &str = "estimate.json";
 
@@ -44,9 +48,16 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 format!("; chance gives {} to {}", number(low, 2), number(high, 2))
             });
             let (size, cause) = if found.noise_factor > 1.0 {
-                (format!("{size} times the declared σ{declared}"), "so the model lacks something")
+                let cause = match &found.carriers {
+                    Some(own) if own.rows.len() == 1 => {
+                        format!("which 1 {} too far off to be noise carries", noun(found))
+                    }
+                    Some(own) => format!("which {} {}s too far off to be noise carry", own.rows.len(), noun(found)),
+                    None => "so the model lacks something".to_owned(),
+                };
+                (format!("{size} times the declared σ{declared}"), cause)
             } else {
-                (format!("{size} of the declared σ{declared}"), "which is too large")
+                (format!("{size} of the declared σ{declared}"), "which is too large".to_owned())
             };
             format!(
                 "Reduced χ² is {}{chance}: the scatter is {size},\n\
@@ -97,6 +108,36 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     let are = if n == 1 { "is" } else { "are" };
     let words = format!("{n} of {} {are} too far off to be noise ({treatment}):", counted(all, noun(found)));
     (n > 0).then_some(Block::Lines(words, points))
+}
+
+/// The rows that carry what the fit does not explain, and what it would leave without them; nothing to say without any.
+pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
+    let own = found.carriers.as_ref()?;
+    let row = |own: &Outlier| format!("{} ({})", own.location, size_of_kind(own.kind, own.error.norm(), 3));
+    let (named, more) = some_of(own.rows.iter().map(row), SHOWN_CARRIERS);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let (carry, them) = if own.rows.len() == 1 { ("carries", "it") } else { ("carry", "them") };
+    let of = &found.fitted.identification;
+    let left = match (own.reduced_chi2, found.reduced_chi2) {
+        (Some(without), Some(all)) => format!("χ²/ν is {} instead of {}", short(without), short(all)),
+        _ => {
+            format!("the scatter is {} instead of {}", with_unit(of, own.sigma_taken), with_unit(of, found.sigma_taken))
+        }
+    };
+    Some(Block::Text(format!(
+        "{} {carry} most of what the fit leaves: {}{more}. Without {them} {left}.",
+        counted(own.rows.len(), noun(found)),
+        named.join(", ")
+    )))
+}
+
+/// What to do about such rows, for a problem of that name, in one line.
+pub fn look_at_carriers(found: &Identification, problem: &Path) -> Option<String> {
+    let own = found.carriers.as_ref()?;
+    let (named, more) = some_of(own.rows.iter().map(|own| own.location.to_string()), SHOWN_CARRIERS);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let problem = problem.display();
+    Some(format!("look at {}{more}; a section [robust] in {problem} limits what such rows do", named.join(", ")))
 }
 
 /// How large the residual is, in brief.

@@ -34,6 +34,10 @@ object! {
         gain: Option<f64> = plan.gain(&plan.meaningful()),
         gain_over: Vec<&'a str> = plan.meaningful().iter().map(|&k| plan.planned.expected[k].name.as_str()).collect(),
         rank: usize = plan.planned.identifiability.rank,
+        /// With all candidates.
+        attainable_rank: usize = plan.attainable_rank,
+        /// Poses without which that rank cannot be reached.
+        least_poses: usize = plan.least_poses,
         #[serde(flatten)]
         conditioning: Conditioning<'a> = Conditioning::of(&plan.planned.identifiability, plan.coordinates),
         parameters: Vec<PlannedEntry<'a>> =
@@ -65,6 +69,24 @@ pub fn plan_json(
     to_text(&Document::of(problem, criterion, seed, plan, separated))
 }
 
+/// That the poses are fewer than it takes to see all that such poses can; nothing to say where they are not.
+fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
+    let Plan { attainable_rank, least_poses, .. } = *plan;
+    let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
+    let at_least = if least_poses > poses {
+        format!("it takes {} at least, and a few more to judge them by", counted(least_poses, "pose"))
+    } else {
+        "more poses see more".to_owned()
+    };
+    (rank < attainable_rank).then(|| {
+        Block::Text(format!(
+            "Too few poses: they see {rank} of the {attainable_rank} combinations of the {} that such poses can see; {at_least}. What \
+             they do not see rests on priors alone.",
+            counted(plan.planned.expected.len(), "parameter")
+        ))
+    })
+}
+
 /// A plan in words; `separated` where it tells two effects apart; ending in a line break.
 pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separated: Option<&Separated>) -> String {
     let planned = &plan.planned;
@@ -92,17 +114,16 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
         ))
     });
     let names: Vec<String> = planned.expected.iter().map(|expected| expected.name.clone()).collect();
-    let mut blocks = vec![
-        Block::lines(format!(
-            "{}\n{}{besides}, from {}; criterion {}, best of {}",
-            problem.title,
-            counted(poses, "pose"),
-            counted(plan.candidates, "candidate"),
-            criterion.as_str(),
-            counted(plan.starts.len(), "start"),
-        )),
-        Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])),
-    ];
+    let mut blocks = vec![Block::lines(format!(
+        "{}\n{}{besides}, from {}; criterion {}, best of {}",
+        problem.title,
+        counted(poses, "pose"),
+        counted(plan.candidates, "candidate"),
+        criterion.as_str(),
+        counted(plan.starts.len(), "start"),
+    ))];
+    blocks.extend(too_few(plan));
+    blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.extend(gain);
     blocks.push(conditioning(&planned.identifiability, names.len(), plan.coordinates));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));

@@ -221,7 +221,7 @@ pub(super) fn claimed(claims: &Claims) -> String {
     };
     let on = match claims.depends_on.0.as_slice() {
         [] => String::new(),
-        some => format!("; depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
+        some => format!("; there and depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
     };
     format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
 }
@@ -383,4 +383,25 @@ pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
         blocks.push(Block::list(effect::listed(&trace.absorbed)));
     }
     blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Part;
+    use crate::problem::Effect;
+
+    /// Other explanations may depend on the same elsewhere: the probability is of both together.
+    #[test]
+    fn what_it_depends_on_is_said_of_its_place() {
+        let law = Law::Effect(Effect::GearRatio { joint: 2 });
+        let own = Hypothesis { law, part: Part::Joint(1), slot: None, depends_on: vec![Covariate::Load] };
+        let claims =
+            Claims { place: (Part::Joint(1), 0.5), depends_on: (vec![Covariate::Load], 0.14), law: (own, 0.1) };
+        let words = claimed(&claims);
+        assert_eq!(
+            words,
+            format!("{} 50 %; there and depends on {} 14 %; law gear-ratio 10 %", Part::Joint(1), Covariate::Load)
+        );
+    }
 }

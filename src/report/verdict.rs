@@ -34,7 +34,9 @@ pub fn interrupted(closure: &ClosedLoop) -> String {
 /// The outcome in a sentence or two, after a word that it is not the last one where the search ended early.
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
     let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
-    end + &came_to(closure)
+    let carried = closure.before.fit.carriers.is_some() && closure.after.is_trusted();
+    let first = if carried { "Look first at what carries the misfit: beside it causes are hardly told. " } else { "" };
+    end + first + &came_to(closure)
 }
 
 /// What was found, as surely as it is known.
@@ -87,8 +89,9 @@ fn came_to(closure: &ClosedLoop) -> String {
     let found = found(closure, &kinds);
     if let (Verdict::Unexplained, Some(size)) = (closure.verdict, size_alone(closure)) {
         let size = number(size, 1);
+        let beside = if closure.findings.outliers.is_empty() { "" } else { ", outliers left out," };
         return format!(
-            "Unexplained: the residual is {size} × the declared σ, and no structure is seen in it. {found}."
+            "Unexplained: the residual{beside} is {size} × the declared σ, and no structure is seen in it. {found}."
         );
     }
     match (closure.verdict, closure.findings.is_testable()) {

@@ -162,3 +162,47 @@ fn the_readme_shows_what_is_printed() {
     }
     assert!(readme.borrow().lines().count() < 120, "one page");
 }
+
+/// What a command prints in the folder of the package, its line breaks taken for spaces.
+fn screen(arguments: &[&str]) -> String {
+    let out = tempfile::tempdir().unwrap();
+    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+    flexcal.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).arg("--out").arg(out.path());
+    let printed = text(&flexcal.output().unwrap().stdout);
+    printed.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn the_screen_of_a_loop_says_what_an_effect_is_not_told_from() {
+    let data = ["--data", "tests/cases/c-link-thermal-bending.csv"];
+    let printed = screen(&[&["loop", "tests/cases"], &data[..]].concat());
+    let expected = "link-thermal-bending = { link = \"B\" }; not told from: zero of joint 3 drifts with temperature";
+    assert!(printed.contains(expected), "{printed}");
+}
+
+#[test]
+fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
+    let printed = screen(&["loop", "problems/service-arm"]);
+    let expected =
+        "Limits hold the fit as declared (joint4.a, upper.EI, fore.EI and 1 more): where one is wrong, an effect";
+    assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
+    // Where nothing was found no effect stands for a limit.
+    let printed = screen(&["loop", "tests/cases", "--data", "tests/cases/a-none.csv"]);
+    assert!(!printed.contains("Limits hold"), "{printed}");
+}
+
+#[test]
+fn a_fit_that_tells_little_is_followed_by_a_check() {
+    let bench = Bench::new();
+    let mut rows = 0;
+    let mut kept = |row: &str| {
+        rows += usize::from(row.contains(",identification,"));
+        rows <= 1 || !row.contains(",identification,")
+    };
+    let table = fs::read_to_string(bench.path("a-none.csv")).unwrap();
+    let kept: Vec<&str> = table.lines().filter(|row| kept(row)).collect();
+    fs::write(bench.path("a-none.csv"), kept.join("\n") + "\n").unwrap();
+    let out = text(&bench.identify(&["-o", "out"]).success().get_output().stdout);
+    assert!(out.contains("\n0 of 32 parameters identified well"), "{out}");
+    assert!(out.contains("\nNext: flexcal check . says what the poses can tell\n"), "{out}");
+}

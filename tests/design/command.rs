@@ -324,3 +324,40 @@ fn colours_are_for_terminals_and_no_color_forbids_them() {
     assert!(coloured(&[("CLICOLOR_FORCE", "1")]));
     assert!(!coloured(&[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]));
 }
+
+#[test]
+fn a_plan_of_too_few_poses_says_how_many_it_takes() {
+    let bench = Bench::new();
+    let plan = |poses: &str| {
+        let (out, _) = bench.run(0, "plan problems/panda --truth problems/panda/TRUTH.toml --poses", &[poses]);
+        let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("plan.json")).unwrap()).unwrap();
+        (out.split_whitespace().collect::<Vec<_>>().join(" "), json)
+    };
+    let (few, json) = plan("5");
+    let (rank, attainable) = (json["rank"].as_u64().unwrap(), json["attainable_rank"].as_u64().unwrap());
+    assert!(rank == 15 && attainable > 25 && json["least_poses"] == attainable.div_ceil(3), "{json}");
+    let words = format!("Too few poses: they see 15 of the {attainable} combinations of the 31 parameters");
+    assert!(
+        few.contains(&words) && few.contains(&format!("it takes {} poses at least", attainable.div_ceil(3))),
+        "{few}"
+    );
+    let (enough, json) = plan("20");
+    assert!(json["rank"] == attainable && !enough.contains("Too few poses"), "{enough}");
+}
+
+#[test]
+fn what_the_nominal_arm_does_not_tell_is_not_said_to_be_identified() {
+    let bench = Bench::new();
+    let (out, _) = bench.run(0, "check problems/ur10-urdf --poses 40", &[]);
+    // joint5.theta and joint6.a go together where the target sits at the origin of the last frame.
+    assert!(out.contains("+ 0.71 joint5.theta + 0.71 joint6.a"), "{out}");
+    let line = |name: &str| out.lines().find(|line| line.trim_start().starts_with(name)).unwrap().to_owned();
+    for name in ["joint5.theta", "joint6.a "] {
+        assert!(line(name).contains(" to 100 %"), "{}", line(name));
+    }
+    assert!(line("joint2.a ").ends_with(" 100 %") && !line("joint2.a ").contains("to"), "{}", line("joint2.a "));
+    let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("check.json")).unwrap()).unwrap();
+    let own = json["parameters"].as_array().unwrap().iter().find(|own| own["name"] == "joint5.theta").unwrap();
+    assert!(own["identified"].as_f64().unwrap() > 0.99, "{own}");
+    assert!(own["identified_at_nominal"].as_f64().unwrap() < 0.5, "{own}");
+}

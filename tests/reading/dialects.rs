@@ -267,3 +267,47 @@ fn a_lost_position_takes_no_contact_with_it() {
         "{warnings:?}"
     );
 }
+
+/// A table under two lines of words, with columns of its own names.
+const UNDER_WORDS: &str = "Tracker 7 of hall 2\nA,B\njoint_1,joint_2,Target X,y_mm,z_mm\n1,2,3,4,5\n";
+
+#[test]
+fn the_entry_of_a_map_that_is_misspelt_is_to_blame_and_no_other() {
+    let joints = "\"joint_1\" = \"q1_deg\"\n\"joint_2\" = \"q2_deg\"\n";
+    let right = format!("{joints}\"Target X\" = \"x_mm\"");
+    let error = |map: &str| read(&problem(map), &[("rows.csv", UNDER_WORDS)]).unwrap_err().to_string();
+    read(&problem(&right), &[("rows.csv", UNDER_WORDS)]).unwrap();
+    // The header is found by the names that are right.
+    let said = error(&right.replace("Target X", "Traget X"));
+    assert!(said.contains("data.columns.\"Traget X\"") && said.contains("did you mean Target X?"), "{said}");
+    // A name that the table has itself.
+    let said = error(&right.replace("\"x_mm\"", "\"y_mm\""));
+    assert!(said.contains("data.columns.\"Target X\": the table has a column y_mm of its own"), "{said}");
+    assert!(said.contains("none that is x_m or x_mm"), "{said}");
+    // A name that another entry has.
+    let said = error(&right.replace("\"q2_deg\"", "\"q1_deg\""));
+    assert!(said.contains("data.columns.joint_2: given already as column q1_deg (joint_1)"), "{said}");
+}
+
+#[test]
+fn a_misspelt_joint_of_a_map_does_not_put_the_blame_on_another() {
+    let arm = "name = 'arm'\n[[joint]]\nkind = 'fixed'\n[[joint]]\na_m = 1\n[[joint]]\na_m = 1\n[data.columns]\n\
+               \"first\" = \"q1_deg\"\n\"second\" = \"p2_deg\"\n";
+    let problem = Problem::parse(arm, Path::new("problem.toml")).unwrap();
+    let said = read(&problem, &[("rows.csv", "first,second,x_mm,y_mm,z_mm\n1,2,3,4,5\n")]).unwrap_err().to_string();
+    assert!(said.contains("data.columns.second: not a column that flexcal knows"), "{said}");
+}
+
+#[test]
+fn times_that_are_no_dates_are_named_with_what_is_expected() {
+    let table = "q1_deg,q2_deg,x_mm,y_mm,z_mm,when\n1,2,3,4,5,31.05.2024 14:00\n";
+    let warnings = read(&problem(""), &[("rows.csv", &table.replace("when", "time"))]).unwrap().1;
+    let said = warnings.iter().map(ToString::to_string).collect::<String>();
+    for words in ["column time: \"31.05.2024 14:00\" is no date and time such as 2024-05-31T14:03", "write time_s"] {
+        assert!(said.contains(words), "{said}");
+    }
+    // What a map names is meant.
+    let map = "\"when\" = \"time\"\n\"q1_deg\" = \"q1_deg\"";
+    let said = read(&problem(map), &[("rows.csv", table)]).unwrap_err().to_string();
+    assert!(said.contains("rows.csv:2: column when: \"31.05.2024 14:00\" is neither a number nor a time"), "{said}");
+}

@@ -31,7 +31,7 @@ fn arm() -> Problem {
 /// Effects of a realistic size.
 fn catalogue() -> Vec<Lacking> {
     let mut all = vec![
-        Lacking::new(Effect::BaseCompliance, &[3e-7, -2e-7]),
+        Lacking::new(Effect::BaseCompliance, &[3e-7, 2e-7]),
         Lacking::new(Effect::TrackerScale, &[1.5e-4]),
         Lacking::new(Effect::TrackerDrift, &[3e-8, 2e-8, -2e-8]),
         Lacking::new(Effect::JointCoupling { joint: 6, from: 5 }, &[8e-4]),
@@ -42,7 +42,7 @@ fn catalogue() -> Vec<Lacking> {
         all.push(Lacking::new(Effect::JointCompliance { joint }, &[compliance]));
     }
     for joint in 2..=4 {
-        all.push(Lacking::new(Effect::JointLateralCompliance { joint }, &[6e-7, -4e-7]));
+        all.push(Lacking::new(Effect::JointLateralCompliance { joint }, &[6e-7, 4e-7]));
     }
     for joint in 1..=5 {
         all.push(Lacking::new(Effect::JointHarmonic { joint, orders: vec![2] }, &[1.5e-4, -1e-4]));

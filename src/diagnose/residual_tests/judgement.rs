@@ -50,7 +50,7 @@ pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
             p_value: p_values[k].unwrap_or(1.0),
             failed: failed[k],
         });
-        ResidualTest { test, outcome }
+        ResidualTest { test, outcome, row: None }
     };
     Findings { tests: tried.into_iter().enumerate().map(judged).collect(), outliers }
 }

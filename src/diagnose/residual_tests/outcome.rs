@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::diagnose::covariate::Covariate;
+use crate::error::Location;
 
 /// An order of the poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -98,6 +99,8 @@ pub struct ResidualTest {
     pub test: Test,
     /// What came of it, or why nothing did.
     pub outcome: Result<Outcome, Untestable>,
+    /// Of outliers the row that is farthest off, where that is known.
+    pub row: Option<Location>,
 }
 
 impl ResidualTest {
@@ -185,13 +188,13 @@ impl Findings {
 impl fmt::Display for ResidualTest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.outcome {
-            Ok(outcome) => tested(&self.test, outcome, f),
+            Ok(outcome) => tested(self, outcome, f),
             Err(why) => write!(f, "{} not tested: {why}", untested(&self.test)),
         }
     }
 }
 
-fn tested(test: &Test, outcome: &Outcome, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+fn tested(ResidualTest { test, row, .. }: &ResidualTest, outcome: &Outcome, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let Outcome { statistic, bounds: (from, to), failed, .. } = outcome;
     let chance = format!("chance gives up to {to:.2}");
     match test {
@@ -227,7 +230,11 @@ fn tested(test: &Test, outcome: &Outcome, f: &mut fmt::Formatter<'_>) -> fmt::Re
             write!(f, "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {chance})")
         }
         Test::Outliers { worst } => {
-            let pose = worst.map_or_else(String::new, |pose| format!("pose {} ", pose + 1));
+            let pose = match (row, worst) {
+                (Some(row), _) => format!("{row} "),
+                (None, Some(pose)) => format!("pose {} ", pose + 1),
+                (None, None) => String::new(),
+            };
             let far = if *failed { "is too far off to be noise" } else { "is farthest off, not beyond chance" };
             write!(f, "{pose}{far} ({statistic:.1} times the scatter, chance gives up to {to:.1})")
         }

@@ -1,0 +1,70 @@
+//! Rows that carry what a fit does not explain.
+
+use super::outcome::{Identification, Noise};
+use super::outliers::{Carriers, Outlier};
+
+/// Without its carriers a fit leaves no more than this part of the variance, or what the declared σ explains: rows that an effect
+/// touches alone, as the few with a payload, are off by less.
+const FAR_BETTER: f64 = 0.01;
+/// More than one row in so many carry nothing: the model misses them all.
+const ONE_IN: usize = 5;
+/// Rows left out in one round: one in so many, at least one. A gross one makes others look far off, and hides smaller ones.
+const ONE_A_ROUND_IN: usize = 100;
+/// A round that leaves more than this part of the variance shows that the outliers are no gross ones.
+const NO_GAIN: f64 = 0.95;
+
+/// The rows that carry what `found` does not explain; `without` fits the identification rows but for some.
+///
+/// Those farthest off are left out and the rest fitted again, until the declared σ explains it or nothing more is too far off. A fit that
+/// fails tells nothing.
+pub(super) fn carriers(
+    found: &Identification,
+    without: impl Fn(&[usize]) -> Option<Identification>,
+) -> Option<Carriers> {
+    if explains(found) {
+        return None;
+    }
+    let count = found.fitted.identification.n;
+    let (most, a_round) = ((count / ONE_IN).max(1), (count / ONE_A_ROUND_IN).max(1));
+    let mut rows: Vec<Outlier> = Vec::new();
+    let mut rest: Option<Identification> = None;
+    loop {
+        let last = rest.as_ref().unwrap_or(found);
+        let mut far = of_arm(&last.outliers);
+        far.sort_by(|a, b| b.distance.total_cmp(&a.distance));
+        far.truncate(a_round);
+        if explains(last) || far.is_empty() || rows.len() + far.len() > most {
+            break;
+        }
+        let numbers: Vec<usize> = rows.iter().chain(&far).map(|own| own.row).collect();
+        let next = without(&numbers).filter(|fit| fit.termination.converged())?;
+        if part(&next, last) > NO_GAIN {
+            break;
+        }
+        rows.extend(far);
+        rest = Some(next);
+    }
+    let rest = rest?;
+    rows.sort_by_key(|own| own.row);
+    let is_better = explains(&rest) || part(&rest, found) < FAR_BETTER;
+    let Identification { reduced_chi2, sigma_taken, .. } = rest;
+    is_better.then_some(Carriers { rows, reduced_chi2, sigma_taken })
+}
+
+/// Whether the declared σ explains what a fit leaves.
+fn explains(fit: &Identification) -> bool {
+    fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
+}
+
+/// Variance that a fit leaves over that of another.
+fn part(fit: &Identification, other: &Identification) -> f64 {
+    match (fit.reduced_chi2, other.reduced_chi2) {
+        (Some(own), Some(other)) => own / other,
+        _ => (fit.sigma_taken / other.sigma_taken).powi(2),
+    }
+}
+
+/// Those that measure the arm; known distances stay.
+fn of_arm(outliers: &[Outlier]) -> Vec<Outlier> {
+    outliers.iter().filter(|own| own.kind != "known distance").cloned().collect()
+}

@@ -1,0 +1,30 @@
+//! What a column `time` holds, as its first cell says.
+
+use super::columns::Columns;
+use super::role::Role;
+use super::table::Table;
+use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
+use crate::quantity::Unit;
+
+impl Columns {
+    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out with a warning.
+    ///
+    /// # Errors
+    /// A map says that it holds times, and its first cell is none.
+    pub fn settle_time(&mut self, table: &Table, warnings: &mut Vec<Warning>) -> Result<(), InputError> {
+        let dated = |column: &super::columns::Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
+        if let Some(place) = self.read.iter().position(|column| column.role == Role::Time && !dated(column)) {
+            let column = self.read.remove(place);
+            let (theirs, value) = (table.name_of(column.place), table.text(column.place)?.to_owned());
+            let is_number = value.is_empty() || table.number(column.place).is_ok();
+            if !is_number && theirs != "time" {
+                return Err(table.column(theirs).at_line(table.line()).error(InputErrorKind::NotATime { value }));
+            }
+            let write = Unit::Time.spelled("time");
+            let kind =
+                if is_number { WarningKind::UnitIgnored { write } } else { WarningKind::NotADate { value, write } };
+            warnings.push(Warning { location: table.column(theirs), kind });
+        }
+        Ok(())
+    }
+}
