@@ -1,5 +1,6 @@
 //! From measurements to estimates with their errors.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
@@ -52,6 +53,8 @@ pub struct Options {
     pub(crate) predecessor: Option<Arc<Predecessor>>,
     /// Whether another fit follows, so that nobody asks of this one what it can be trusted in.
     pub(crate) in_passing: bool,
+    /// Whether a fit of the same data came before this one, of which was asked what rows carry its misfit.
+    pub(crate) onwards: bool,
 }
 
 impl Options {
@@ -226,10 +229,11 @@ pub fn identify_model(
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
     // A robust loss sets such rows aside by itself.
-    if !options.in_passing && problem.robust.is_none() {
+    if !options.in_passing && !options.onwards && problem.robust.is_none() {
         let passing = Options { progress: None, predecessor: None, in_passing: true, ..options.clone() };
         let without = |rows: &[usize]| {
-            let kept = split.identification.iter().copied().filter(|row| !rows.contains(row)).collect();
+            let left_out: BTreeSet<usize> = rows.iter().copied().collect();
+            let kept = split.identification.iter().copied().filter(|row| !left_out.contains(row)).collect();
             let split = Split { identification: kept, held_out: split.held_out.clone() };
             fit_rows(model, problem, (measurements, &split), &passing).ok()
         };
