@@ -182,11 +182,13 @@ fn the_screen_of_a_loop_says_what_an_effect_is_not_told_from() {
 
 #[test]
 fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
-    let printed = screen(&["loop", "problems/service-arm"]);
-    let expected =
-        "Limits hold the fit as declared (joint4.a, upper.EI, fore.EI and 1 more): where one is wrong, an effect";
+    let printed = screen(&["loop", "tests/cases/bounded/stiffness.toml"]);
+    let expected = "Limits hold the fit as declared (joint3.stiffness, A.GJ): where one is wrong, an effect";
     assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
-    // Where nothing was found no effect stands for a limit.
+    // Where nothing was found no effect stands for a limit; one that is wrong is said to be.
+    let printed = screen(&["loop", "problems/service-arm"]);
+    let expected = "The limit that holds joint4.a is most probably wrong, or hides a cause";
+    assert!(printed.contains(expected) && !printed.contains("Limits hold"), "{printed}");
     let printed = screen(&["loop", "tests/cases", "--data", "tests/cases/a-none.csv"]);
     assert!(!printed.contains("Limits hold"), "{printed}");
 }
