@@ -113,7 +113,8 @@ impl Problem {
         let found = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| {
-                let options = Options::default().with_strategy(strategy).with_solver(solver).with_progress(sink);
+                let options =
+                    Options::default().with_carriers().with_strategy(strategy).with_solver(solver).with_progress(sink);
                 identify::identify(&problem, &data, &options)
             }
         })?;
@@ -126,7 +127,7 @@ impl Problem {
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let closure = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
-            move |sink| diagnose::close(&problem, &data, &Options::default().with_progress(sink))
+            move |sink| diagnose::close(&problem, &data, &Options::default().with_carriers().with_progress(sink))
         })?;
         let closure = closure.map_err(|error| raised(&error))?;
         Ok(ClosedLoop { problem, text: Arc::clone(&self.text), data, closure: Arc::new(closure) })

@@ -61,7 +61,9 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
         warn(&report::why_not_trusted(fit));
     }
     if !quiet {
-        fit.too_few_poses.iter().filter(|_| fit.is_trusted()).for_each(|few| warn(&few.to_string()));
+        if let Some(few) = fit.too_few_poses.filter(|_| fit.is_trusted()) {
+            warn(&few.to_string());
+        }
         fit.cautions.iter().for_each(|caution| warn(&caution.to_string()));
     }
     if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }

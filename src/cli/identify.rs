@@ -62,6 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = Options::default()
         .with_strategy(arguments.strategy)
         .with_solver(arguments.solver)
+        .with_carriers()
         .with_stop(stop)
         .with_progress(line.as_ref().map(Line::sink));
     let result = identify::identify(&problem, &data, &options).and_then(|found| {

@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.say_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
     let line = common.talks().then(|| Line::until(stop.clone()));
-    let options = Options::default().with_stop(stop).with_progress(line.as_ref().map(Line::sink));
+    let options = Options::default().with_carriers().with_stop(stop).with_progress(line.as_ref().map(Line::sink));
     let result = diagnose::close(&problem, &data, &options);
     if let Some(line) = line {
         line.clear();

@@ -85,7 +85,7 @@ impl Fitted {
     /// Options to fit a problem that differs by a few effects: from where this fit ended.
     pub fn onwards(&self, options: &Options) -> Options {
         let values = self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
-        Options { start: values.collect(), onwards: true, ..options.clone() }
+        Options { start: values.collect(), carriers: false, ..options.clone() }
     }
 
     /// The same, with what need not be found anew: the registered nominal arm, and of a fit that is `alike` the σ that this one took.

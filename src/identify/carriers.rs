@@ -3,9 +3,10 @@
 use super::outcome::{Identification, Noise};
 use super::outliers::{Carriers, Outlier};
 
-/// Without its carriers a fit leaves no more than this part of the variance, or what the declared σ explains: rows that an effect
-/// touches alone, as the few with a payload, are off by less.
+/// Without its carriers a fit leaves no more than this part of the variance, or half of it and what the declared σ explains: then they carry
+/// most of it. Rows that an effect touches alone, as two with a payload, may be such.
 const FAR_BETTER: f64 = 0.01;
+const MOST_OF_IT: f64 = 0.5;
 /// More than one row in so many carry nothing: the model misses them all.
 const ONE_IN: usize = 5;
 /// Rows left out in one round: one in so many, at least one. A gross one makes others look far off, and hides smaller ones.
@@ -30,14 +31,16 @@ pub(super) fn carriers(
     let mut rest: Option<Identification> = None;
     loop {
         let last = rest.as_ref().unwrap_or(found);
-        let mut far = of_arm(&last.outliers);
+        // Known distances stay.
+        let mut far: Vec<&Outlier> = last.outliers.iter().filter(|own| own.kind != "known distance").collect();
         far.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         far.truncate(a_round);
+        let far: Vec<Outlier> = far.into_iter().cloned().collect();
         if explains(last) || far.is_empty() || rows.len() + far.len() > most {
             break;
         }
         let numbers: Vec<usize> = rows.iter().chain(&far).map(|own| own.row).collect();
-        let next = without(&numbers).filter(|fit| fit.termination.converged())?;
+        let Some(next) = without(&numbers).filter(|fit| fit.termination.converged()) else { break };
         if part(&next, last) > NO_GAIN {
             break;
         }
@@ -46,7 +49,8 @@ pub(super) fn carriers(
     }
     let rest = rest?;
     rows.sort_by_key(|own| own.row);
-    let is_better = explains(&rest) || part(&rest, found) < FAR_BETTER;
+    let left = part(&rest, found);
+    let is_better = left < FAR_BETTER || (left < MOST_OF_IT && explains(&rest));
     let Identification { reduced_chi2, sigma_taken, .. } = rest;
     is_better.then_some(Carriers { rows, reduced_chi2, sigma_taken })
 }
@@ -62,9 +66,4 @@ fn part(fit: &Identification, other: &Identification) -> f64 {
         (Some(own), Some(other)) => own / other,
         _ => (fit.sigma_taken / other.sigma_taken).powi(2),
     }
-}
-
-/// Those that measure the arm; known distances stay.
-fn of_arm(outliers: &[Outlier]) -> Vec<Outlier> {
-    outliers.iter().filter(|own| own.kind != "known distance").cloned().collect()
 }

@@ -53,8 +53,8 @@ pub struct Options {
     pub(crate) predecessor: Option<Arc<Predecessor>>,
     /// Whether another fit follows, so that nobody asks of this one what it can be trusted in.
     pub(crate) in_passing: bool,
-    /// Whether a fit of the same data came before this one, of which was asked what rows carry its misfit.
-    pub(crate) onwards: bool,
+    /// Whether rows are looked for that carry what the fit does not explain, by further fits.
+    pub(crate) carriers: bool,
 }
 
 impl Options {
@@ -68,6 +68,13 @@ impl Options {
     #[must_use]
     pub fn with_solver(self, solver: SolverChoice) -> Self {
         Self { solver, ..self }
+    }
+
+    /// The same, with a look at whether a few rows carry what the fit does not explain ([`Identification::carriers`]), by further fits; of a
+    /// loop at the problem as declared.
+    #[must_use]
+    pub fn with_carriers(self) -> Self {
+        Self { carriers: true, ..self }
     }
 
     /// The same, telling `progress` of every step; `None`: nobody.
@@ -229,8 +236,9 @@ pub fn identify_model(
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
     // A robust loss sets such rows aside by itself.
-    if !options.in_passing && !options.onwards && problem.robust.is_none() {
-        let passing = Options { progress: None, predecessor: None, in_passing: true, ..options.clone() };
+    if options.carriers && !options.in_passing && problem.robust.is_none() {
+        let start = found.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+        let passing = Options { progress: None, predecessor: None, in_passing: true, start, ..options.clone() };
         let without = |rows: &[usize]| {
             let left_out: BTreeSet<usize> = rows.iter().copied().collect();
             let kept = split.identification.iter().copied().filter(|row| !left_out.contains(row)).collect();

@@ -135,7 +135,7 @@ pub struct Identification {
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
-    /// Those that carry what the fit does not explain, if a few do; not looked for with a robust loss, or in passing.
+    /// Those that carry what the fit does not explain, if a few do; looked for where [`super::Options::with_carriers`] asks, but not with a robust loss.
     pub carriers: Option<Carriers>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,

@@ -1,8 +1,8 @@
 //! What a column `time` holds, as its first cell says.
 
-use super::columns::Columns;
+use super::columns::{Column, Columns};
 use super::role::Role;
-use super::table::Table;
+use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
@@ -12,10 +12,10 @@ impl Columns {
     /// # Errors
     /// A map says that it holds times, and its first cell is none.
     pub fn settle_time(&mut self, table: &Table, warnings: &mut Vec<Warning>) -> Result<(), InputError> {
-        let dated = |column: &super::columns::Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
+        let dated = |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
         if let Some(place) = self.read.iter().position(|column| column.role == Role::Time && !dated(column)) {
             let column = self.read.remove(place);
-            let (theirs, value) = (table.name_of(column.place), table.text(column.place)?.to_owned());
+            let (theirs, value) = (table.name_of(column.place), shortened(table.text(column.place)?));
             let is_number = value.is_empty() || table.number(column.place).is_ok();
             if !is_number && theirs != "time" {
                 return Err(table.column(theirs).at_line(table.line()).error(InputErrorKind::NotATime { value }));

@@ -196,7 +196,7 @@ pub(super) fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     });
     let wrong = wrong_limits(closure).map(|(limit, probability)| {
         format!(
-            "The limit that holds {limit} is most probably wrong, or hides a cause ({}): flexcal identify -v shows what it costs; moved out or \
+            "The limit {limit}, which holds the fit, is most probably wrong, or hides a cause ({}): flexcal identify -v shows what it costs; moved out or \
              left away, it lets the loop look further.",
             percent(probability)
         )

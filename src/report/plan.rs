@@ -76,12 +76,12 @@ fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     let at_least = if least_poses > poses {
         format!("it takes {} at least, and a few more to judge them by", counted(least_poses, "pose"))
     } else {
-        "more poses see more".to_owned()
+        "more poses may see more".to_owned()
     };
     (rank < attainable_rank).then(|| {
         Block::Text(format!(
             "Too few poses: they see {rank} of the {attainable_rank} combinations of the {} that such poses can see; {at_least}. What \
-             they do not see rests on priors alone.",
+             they do not see rests on priors, if on anything.",
             counted(plan.planned.expected.len(), "parameter")
         ))
     })

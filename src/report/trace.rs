@@ -173,7 +173,7 @@ fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
         Law::PerPose => format!("{part}: another error in every pose, by nothing that is known of the poses"),
         Law::Linear => format!("{part}: linear in the position, as scale by axis and shear are"),
         Law::Sag => format!("{part}: gives way under weight that is not declared"),
-        Law::Limit(limit) => format!("{part}: the limit that holds the fit is wrong ({limit})"),
+        Law::Limit(limit) => format!("{part}: the limit {limit}, which holds the fit, is wrong"),
         _ => format!("{part}: a smooth function of {on}; its law is not known"),
     }
 }

@@ -73,6 +73,10 @@ pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String
             sentences.push(words);
         }
     }
+    // A limit that is wrong is no function, and nothing was tried in its place.
+    if closure.unexplained.iter().all(|left| wrong_limit(left).is_some()) {
+        return sentences;
+    }
     let mut catalogue = "No effect of the catalogue explains it better than a function without a law".to_owned();
     for (why, words) in [
         (HELD_FIXED, "[parameters] holds them fixed"),
@@ -132,7 +136,7 @@ fn located(left: &Unexplained) -> String {
     let of = |probability: f64| number(probability, 2);
     if let Some((limit, probability)) = wrong_limit(left) {
         return format!(
-            "The limit that holds {limit} is wrong or hides a cause, probability {} ({chance}).",
+            "The limit {limit}, which holds the fit, is wrong or hides a cause, probability {} ({chance}).",
             of(probability)
         );
     }

@@ -35,7 +35,11 @@ pub fn interrupted(closure: &ClosedLoop) -> String {
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
     let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
     let carried = closure.before.fit.carriers.is_some() && closure.after.is_trusted();
-    let first = if carried { "Look first at what carries the misfit: beside it causes are hardly told. " } else { "" };
+    let first = if carried {
+        "Look first at the rows that carry the misfit: wrong ones hide causes, and a cause that acts in them alone looks like wrong ones. "
+    } else {
+        ""
+    };
     end + first + &came_to(closure)
 }
 
@@ -99,7 +103,13 @@ fn came_to(closure: &ClosedLoop) -> String {
         (Verdict::Unexplained, _) => format!("Unexplained: structure is left in the residual. {found}."),
         (_, false) => format!("{found}; whether structure is left could not be tested."),
         (Verdict::NothingFound, true) => closure.findings.overstated_sigma().map_or_else(
-            || "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
+            || match closure.set_aside.len() {
+                0 => "Nothing found: what the declared problem leaves looks like noise.".to_owned(),
+                some => format!(
+                    "Nothing found: but for {} too far off, what the declared problem leaves looks like noise.",
+                    counted(some, "pose")
+                ),
+            },
             nothing_below,
         ),
         (Verdict::Explained, true) if kinds.named.is_empty() => {

@@ -7,13 +7,13 @@ use serde_json::Value;
 
 use super::{Bench, text};
 
-/// Moves x of a line of the data by 200 mm.
-fn spoil(bench: &Bench, spoiled: usize) {
+/// Moves x of a line of the data by so much [mm].
+fn spoil(bench: &Bench, spoiled: usize, by: f64) {
     let place = header(bench).iter().position(|name| name == "x_mm").unwrap();
     bench.map_data(|line, row| {
         let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
         if line == spoiled {
-            cells[place] = (cells[place].parse::<f64>().unwrap() + 200.0).to_string();
+            cells[place] = (cells[place].parse::<f64>().unwrap() + by).to_string();
         }
         Some(cells.join(","))
     });
@@ -33,7 +33,7 @@ fn run(bench: &Bench, arguments: &str) -> (i32, String, String) {
 #[test]
 fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     let bench = Bench::new();
-    spoil(&bench, 16);
+    spoil(&bench, 16, 200.0);
     let (_, out, _) = run(&bench, "identify . --out out");
     let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
     for expected in [
@@ -52,7 +52,9 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     assert!(with.as_f64().unwrap() > 1e3 && without.as_f64().unwrap() < 2.0, "{with} {without}");
 
     let (_, out, _) = run(&bench, "loop . --out out");
-    for expected in ["Look first at what carries the misfit", "Next: look at ./a-none.csv:16; a section [robust]"] {
+    for expected in
+        ["Look first at the rows that carry the misfit", "Next: look at ./a-none.csv:16; a section [robust]"]
+    {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
     // The robust loss that is advised leaves nothing to say.
@@ -122,4 +124,18 @@ fn rows_that_an_effect_touches_alone_are_no_gross_ones() {
     assert!(!out.contains("carr") && out.contains("\nNext: flexcal loop . looks for what the model lacks"), "{out}");
     let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap()).unwrap();
     assert!(json["misfit_carried_by"].is_null() && !json["outliers"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn a_row_that_carries_little_of_the_misfit_is_not_said_to() {
+    let bench = Bench::new();
+    let cases = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    fs::copy(cases.join("h-none-large.csv"), bench.path("a-none.csv")).unwrap();
+    bench.edit("problem.toml", "position_sigma_mm = 0.05", "position_sigma_mm = 0.046");
+    for line in [16, 21, 60] {
+        spoil(&bench, line, 0.35);
+        let (_, out, _) = run(&bench, "identify . --out out");
+        assert!(out.contains("times the declared σ") && !out.contains("carr"), "{line} {out}");
+        spoil(&bench, line, -0.35);
+    }
 }

@@ -187,7 +187,7 @@ fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
     assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
     // Where nothing was found no effect stands for a limit; one that is wrong is said to be.
     let printed = screen(&["loop", "problems/service-arm"]);
-    let expected = "The limit that holds joint4.a is most probably wrong, or hides a cause";
+    let expected = "The limit of joint4.a, which holds the fit, is most probably wrong, or hides a cause";
     assert!(printed.contains(expected) && !printed.contains("Limits hold"), "{printed}");
     let printed = screen(&["loop", "tests/cases", "--data", "tests/cases/a-none.csv"]);
     assert!(!printed.contains("Limits hold"), "{printed}");

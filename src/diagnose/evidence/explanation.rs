@@ -1,6 +1,6 @@
 //! Hypotheses that explain a residual together.
 
-use super::hypothesis::{Hypothesis, Law};
+use super::hypothesis::Hypothesis;
 use crate::problem::Effect;
 
 /// Hypotheses that may be at work together.
@@ -18,14 +18,6 @@ impl Explanation {
     /// Its effects.
     pub fn effects(&self) -> Vec<Effect> {
         self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
-    }
-
-    /// Whether it holds every limit of another one for wrong.
-    ///
-    /// A fit with an effect in the place of a limit that holds it may free others as well: it is no fair rival.
-    pub(in crate::diagnose) fn frees_as(&self, other: &Self) -> bool {
-        let is_limit = |own: &&Hypothesis| matches!(own.law, Law::Limit(_));
-        other.hypotheses.iter().filter(is_limit).all(|limit| self.hypotheses.contains(limit))
     }
 
     /// Its functions without a law, each with which one of its hypothesis it is.

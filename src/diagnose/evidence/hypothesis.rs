@@ -126,6 +126,11 @@ impl Hypothesis {
         self.law == other.law && self.part == other.part && self.depends_on == other.depends_on
     }
 
+    /// Whether it is that a limit of the declared problem is wrong.
+    pub(super) fn is_limit(&self) -> bool {
+        matches!(self.law, Law::Limit(_))
+    }
+
     /// Its effect, if its law is one.
     pub fn effect(&self) -> Option<&Effect> {
         match &self.law {

@@ -1,7 +1,8 @@
 //! Limits of the declared problem that hold a fit back: where one is wrong, what it holds back looks like an effect.
 //!
 //! Freed, a parameter p at its bound moves the poses along ∂r/∂p. Of active constraints with rows A the i-th, freed alone, lets the
-//! unknowns move along A⁺eᵢ, and the poses along J A⁺eᵢ.
+//! unknowns move along A⁺eᵢ, and the poses along J A⁺eᵢ; along what A leaves open they are fitted, so that units decide nothing. Rows that
+//! depend on others are freed together. How far a limit may be off is told by the priors: of a freed parameter by its σ from the bound on.
 
 use nalgebra::DMatrix;
 
@@ -42,9 +43,10 @@ pub(super) fn limits(
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     };
     let freed = linearised.of_parameters(&fitted.model, &held, &found.x);
+    let sigma_of = |k: usize| fitted.model.parameters[k].sigma;
     let bounds = held.iter().enumerate().filter_map(|(j, &k)| {
-        let largest = fitted.model.parameters[k].sigma.map_or(f64::INFINITY, |sigma| rules.plausible * sigma);
-        candidate(found.estimates[k].name.clone(), k, freed.columns(j, 1).into_owned(), largest)
+        let largest = sigma_of(k).map_or(f64::INFINITY, |sigma| rules.plausible * sigma);
+        candidate(format!("of {}", found.estimates[k].name), k, freed.columns(j, 1).into_owned(), largest)
     });
     let own = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
     let active = fitted.active();
@@ -54,12 +56,11 @@ pub(super) fn limits(
     let constraints = found.active_constraints.iter().zip(directions.column_iter()).zip(active.row_iter());
     let constraints = constraints.filter_map(|((constraint, along), row)| {
         let first = row.iter().position(|coefficient| *coefficient != 0.0)?;
-        candidate(
-            constraint.words.clone(),
-            fitted.unknowns[first],
-            DMatrix::from_columns(&[&own * along]),
-            f64::INFINITY,
-        )
+        let variance =
+            |(&a, &k): (&f64, &usize)| if a == 0.0 { Some(0.0) } else { sigma_of(k).map(|sigma| (a * sigma).powi(2)) };
+        let variance: Option<f64> = row.iter().zip(&fitted.unknowns).map(variance).sum();
+        let largest = variance.map_or(f64::INFINITY, |variance| rules.plausible * variance.sqrt());
+        candidate(constraint.words.clone(), fitted.unknowns[first], DMatrix::from_columns(&[&own * along]), largest)
     });
     bounds.chain(constraints).collect()
 }

@@ -60,7 +60,8 @@ impl Evidence {
     }
 
     /// Explanations with an effect in the place of another hypothesis of `best`: the most probable ones, and those that do best in the place of
-    /// each, which strong effects decide only at a fit of their own; so do laws in the place of a function without one.
+    /// each, which strong effects decide only at a fit of their own; so do laws in the place of a function without one. A fit with an effect in
+    /// the place of a limit that is wrong may leave other limits too: it is no rival.
     pub(in crate::diagnose) fn exchanged(&self, best: &Explanation, most: usize) -> Vec<Explanation> {
         let differ = |one: &Explanation, other: &Explanation| {
             let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
@@ -68,11 +69,11 @@ impl Evidence {
         };
         let is_exchange = |other: &&Explanation| {
             other.hypotheses.len() == best.hypotheses.len()
-                && differ(best, other).len() == 1
+                && matches!(differ(best, other).as_slice(), [only] if !only.is_limit())
                 && matches!(differ(other, best).as_slice(), [only] if only.effect().is_some())
         };
         let mut all: Vec<Explanation> = self.explanations.iter().filter(is_exchange).take(most).cloned().collect();
-        for (own, other) in &self.stand_ins {
+        for (own, other) in self.stand_ins.iter().filter(|(own, _)| !own.is_limit()) {
             let Some(place) = best.hypotheses.iter().position(|known| known == own) else { continue };
             let mut exchanged = Explanation { probability: 0.0, ..best.clone() };
             exchanged.hypotheses[place] = other.clone();
@@ -162,10 +163,12 @@ impl Evidence {
     pub fn claims(&self, of: &Hypothesis) -> Claims {
         let most = self.explanations.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside = |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
-        let place = self.probability(|other| other.part == of.part);
-        let depends_on = self.probability(|other| other.part == of.part && other.depends_on == of.depends_on);
+        // Where a limit is wrong nothing need act.
+        let is_there = |other: &Hypothesis| other.part == of.part && (of.is_limit() || !other.is_limit());
+        let place = self.probability(is_there);
+        let depends_on = self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
-            let unknown = |other: &Hypothesis| other.part == of.part && other.effect().is_none();
+            let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
             let is_it = |other: &&Hypothesis| other.law.is_of(&of.law) && other.part == of.part;
             explanation.hypotheses.iter().filter(is_it).any(|other| !is_beside(other))
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))

@@ -72,11 +72,14 @@ impl<'a> Products<'a> {
     }
 
     fn member(&self, block: usize) -> &Member<'a> {
-        self.members[block].get_or_init(|| {
-            let columns = self.blocks[block].columns(&self.target.fit);
-            let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
-            Member { transposed: columns.transpose(), columns, products }
-        })
+        if let Some(known) = self.members[block].get() {
+            return known;
+        }
+        // Before the cell waits for it: a thread that helps others with this product may come to the same member.
+        let columns = self.blocks[block].columns(&self.target.fit);
+        let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
+        let new = Member { transposed: columns.transpose(), columns, products };
+        self.members[block].get_or_init(|| new)
     }
 
     /// AᵀC of a member of a set and another hypothesis.

@@ -196,7 +196,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             let rest: Vec<usize> = set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
             let key = sorted(&rest);
-            // Laws were tried there among others.
+            // Most pairs of laws were tried there among others.
             let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
             if !is_tried && tried.insert((key, kind)) {
                 rests.push((rest, gone, kind));
@@ -205,37 +205,51 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         if rests.is_empty() {
             return;
         }
-        for (rest, gone, kind) in rests {
-            if products.target.stop.is_requested() {
-                return;
-            }
-            let Some(rest) = assembled(&rest, products) else { continue };
-            let [first, second] = instead[kind];
-            let mut one = extended(&rest, first, products);
-            one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-            let second: BTreeSet<usize> = second.iter().copied().filter(|other| !gone.contains(other)).collect();
-            let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
-            let near: Vec<&Set> = one.iter().filter(is_near).take(rules.extending).collect();
-            let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
-            let second: Vec<usize> = second.into_iter().collect();
-            let narrow = near.into_iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).enumerate();
-            let longer =
-                |(place, set): (usize, &Set)| extended(set, if place == 0 { &second } else { &promising }, products);
-            let two: Vec<Set> = narrow.flat_map(longer).collect();
-            let mut new: Vec<Set> = one.into_iter().chain(two).collect();
-            new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-            // At settled sizes a set may be far more probable than with its members taken one after the other.
-            let rest_of_new = new.split_off(new.len().min(rules.extended));
-            let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
-            let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > best - rules.hopeless);
-            for set in std::iter::once(rest).chain(settled).chain(probable) {
-                let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
-                if set.ln_posterior > own.ln_posterior {
-                    *own = set;
-                }
+        let least = best - rules.hopeless;
+        let of_rest = |(rest, gone, kind): (Vec<usize>, Vec<usize>, usize)| {
+            replaced((&rest, &gone), instead[kind], least, products)
+        };
+        let new: Vec<Vec<Set>> = rests.into_par_iter().map(of_rest).collect();
+        if products.target.stop.is_requested() {
+            return;
+        }
+        for set in new.into_iter().flatten() {
+            let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+            if set.ln_posterior > own.ln_posterior {
+                *own = set;
             }
         }
     }
+}
+
+/// The rest of a set whose members are `gone`, and beside it one and two others in their place, those of more than the `least` ln of the
+/// posterior.
+fn replaced(
+    (rest, gone): (&[usize], &[usize]),
+    [first, second]: [&[usize]; 2],
+    least: f64,
+    products: &Products,
+) -> Vec<Set> {
+    let Products { blocks, rules, .. } = *products;
+    let rest = if products.target.stop.is_requested() { None } else { assembled(rest, products) };
+    let Some(rest) = rest else { return Vec::new() };
+    let mut one = extended(&rest, first, products);
+    one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let second: BTreeSet<usize> = second.iter().copied().filter(|other| !gone.contains(other)).collect();
+    let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
+    let near: Vec<&Set> = one.iter().filter(is_near).take(rules.extending).collect();
+    let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
+    let second: Vec<usize> = second.into_iter().collect();
+    let narrow = near.into_iter().filter(|set| !set.has_wide(blocks, rules)).take(rules.extended).enumerate();
+    let longer = |(place, set): (usize, &Set)| extended(set, if place == 0 { &second } else { &promising }, products);
+    let two: Vec<Set> = narrow.flat_map(longer).collect();
+    let mut new: Vec<Set> = one.into_iter().chain(two).collect();
+    new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    // At settled sizes a set may be far more probable than with its members taken one after the other.
+    let rest_of_new = new.split_off(new.len().min(rules.extended));
+    let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
+    let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > least);
+    std::iter::once(rest).chain(settled).chain(probable).collect()
 }
 
 /// Each member, and each two of them where they are few.

@@ -300,8 +300,7 @@ fn refitted(rounds: &Rounds, fitted: &Fitted, evidence: Evidence) -> Result<(Evi
     };
     let functions = best.without_law();
     let Some(own) = odds_of(fitted, &functions, fitted.sigma)? else { return Ok((evidence, None)) };
-    let mut rivals = evidence.exchanged(&best, rules.rivals);
-    rivals.retain(|rival| rival.frees_as(&best));
+    let rivals = evidence.exchanged(&best, rules.rivals);
     let mut tried: Vec<(Explanation, f64, Fitted)> = Vec::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
