@@ -226,6 +226,9 @@ pub(super) fn claimed(claims: &Claims) -> String {
     format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
 }
 
+/// Probability of a law from which on it is the most probable one, and of a place from which on something acts there.
+pub(super) const EVEN: f64 = 0.5;
+
 /// A probability for people.
 pub(super) fn percent(probability: f64) -> String {
     match probability {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::code;
 use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
-use super::verdict::EVEN;
+use super::trace::EVEN;
 use crate::diagnose::{
     Claims, ClosedLoop, Correction, Covariate, HELD_FIXED, Hypothesis, Law, Part, REFUSED, Unexplained,
 };

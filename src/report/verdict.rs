@@ -2,12 +2,10 @@
 
 use super::effect;
 use super::quantity::{counted, number};
-use super::trace::percent;
+use super::trace::{EVEN, percent};
 use super::unexplained::size_alone;
 use crate::diagnose::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
 
-/// Probability of a law from which on it is the most probable one, and of a place from which on something acts there.
-pub(super) const EVEN: f64 = 0.5;
 /// Probability of a law below which it is not even an example.
 const NONE: f64 = 0.005;
 /// Residual in units of the declared σ below which little could be found.
