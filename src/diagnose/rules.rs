@@ -135,7 +135,9 @@ pub struct SelectionRules {
     pub hopeless: f64,
     /// Lengths over which smooth functions change, as parts of the range that was measured.
     pub smooth_lengths: [f64; 3],
-    /// The same of functions of two covariates.
+    /// Lengths over which what measures forgets how it erred, as parts of the time that was measured.
+    pub rough_lengths: [f64; 3],
+    /// Length over which functions of two covariates change.
     pub surface_length: f64,
     /// The same of the height and phase of what nearly repeats.
     pub slow_length: f64,
@@ -211,6 +213,7 @@ impl SelectionRules {
         widest: 240,
         hopeless: 12.0,
         smooth_lengths: [0.5, 0.2, 0.08],
+        rough_lengths: [0.15, 0.06, 0.025],
         surface_length: 0.4,
         slow_length: 0.5,
         near_orders: 60,
@@ -274,6 +277,7 @@ impl SelectionRules {
             ("widest", self.widest >= 1),
             ("hopeless", size(self.hopeless)),
             ("smooth_lengths", self.smooth_lengths.iter().all(|&length| size(length))),
+            ("rough_lengths", self.rough_lengths.iter().all(|&length| size(length))),
             ("surface_length", size(self.surface_length)),
             ("slow_length", size(self.slow_length)),
             ("wave_orders", size(self.wave_orders) && self.wave_orders <= HIGHEST_ORDER),

@@ -154,6 +154,7 @@ fn law(own: &Hypothesis) -> &str {
         Law::Effect(effect) => effect.name(),
         Law::NearHarmonic(_) => "near-harmonic",
         Law::PerPose => "per-pose",
+        Law::Wandering => "wandering",
         Law::Linear => "linear",
         Law::Sag => "sag",
         Law::Limit(_) => "limit",
@@ -171,6 +172,11 @@ fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
             format!("{part}: a function of {on} that repeats {cycles} a revolution; its law is not known")
         }
         Law::PerPose => format!("{part}: another error in every pose, by nothing that is known of the poses"),
+        Law::Wandering => {
+            format!(
+                "{part}: wanders with {on}, as noise does in which one reading follows the last, or a drift that has no law"
+            )
+        }
         Law::Linear => format!("{part}: linear in the position, as scale by axis and shear are"),
         Law::Sag => format!("{part}: gives way under weight that is not declared"),
         Law::Limit(limit) => format!("{part}: the limit {limit}, which holds the fit, is wrong"),
@@ -217,6 +223,9 @@ fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
 pub(super) fn claimed(claims: &Claims) -> String {
     let law = match claims.law.0.effect() {
         Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
+        None if claims.law.0.law == Law::Wandering => {
+            "no law: it wanders, as noise does in which one reading follows the last".to_owned()
+        }
         None => "its law is not known".to_owned(),
     };
     let on = match claims.depends_on.0.as_slice() {

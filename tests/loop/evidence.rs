@@ -6,13 +6,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnose::{Evidence, Hypothesis, Law, Verdict, WitnessVerdict, close, trace};
+use flexcal::diagnose::{Covariate, Evidence, Hypothesis, Law, Part, Verdict, WitnessVerdict, close, trace};
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::{Truth, simulate};
 use nalgebra::Vector3;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, StandardNormal};
 use serde_json::Value;
 
 /// A law that is stated: from this probability on.
@@ -143,6 +146,26 @@ const SEVEN: [(f64, f64, f64, f64, [f64; 3]); 7] = [
     (90.0, 0.0, 0.0, 1.7, [0.06, -0.01, -0.01]),
     (90.0, 0.088, 0.107, 0.7, [0.01, 0.0, 0.06]),
 ];
+
+#[test]
+fn noise_in_which_a_reading_follows_the_last_is_called_that() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let (mut data, _) = Dataset::read_files(&[cases.join("h-none-large.csv")], &problem).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut noise = Vector3::zeros();
+    for position in &mut data.measurements.positions {
+        noise = noise * 0.8 + Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) }) * 0.6e-4;
+        *position += noise;
+    }
+    let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
+    let [only] = evidence.best() else { panic!("{:?}", evidence.best()) };
+    assert_eq!(
+        (&only.law, only.part, only.depends_on.as_slice()),
+        (&Law::Wandering, Part::Measurement, &[Covariate::Time][..])
+    );
+    assert!(evidence.claims(only).law.1 >= STATED);
+}
 
 /// The arm with the masses of its links, or without.
 fn seven(masses: bool) -> Problem {

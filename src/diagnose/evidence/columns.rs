@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
-use super::functions::{Known, basis, goes_with, merge, products_of, times};
+use super::functions::{Known, basis, goes_with, merge, products_of, rough_basis, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
@@ -363,6 +363,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         for of in known {
             self.smooth("smooth in the measurement", slot, &at, of, &lengths);
         }
+        let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
+        for of in known.iter().filter(is_time) {
+            self.wandering(slot, &at, of);
+        }
         let poses = self.linearised.poses();
         let coordinate = |axis: usize| {
             Known::of(Covariate::Position, poses.iter().map(|p| p.measured[axis]).collect(), self.weighed)
@@ -384,6 +388,17 @@ impl<'a, 'l> Columns<'a, 'l> {
             self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);
+    }
+
+    /// What measures wanders, or one reading errs as the last did.
+    fn wandering(&mut self, slot: Slot, at: &[&DVector<f64>], of: &Known) {
+        let (part, depends_on) = (Part::Measurement, vec![of.covariate.clone()]);
+        let hypothesis = Hypothesis { law: Law::Wandering, part, slot: Some(slot), depends_on };
+        for (variant, &length) in self.rules.rough_lengths.iter().enumerate() {
+            if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
+                self.add_variant("wandering", &hypothesis, variant, || times(at, &basis));
+            }
+        }
     }
 
     /// How the base leans by what is no command: it stands on a floor that warms, creeps or gives way.

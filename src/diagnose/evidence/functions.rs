@@ -10,6 +10,8 @@ use crate::diagnose::covariate::Covariate;
 const MARGIN: f64 = 0.25;
 /// Variance of a basis function, of that of the first, below which it is left out.
 const NEGLIGIBLE: f64 = 1e-3;
+/// The same of functions that are not smooth: what is below is little beside the noise.
+const SLIGHT: f64 = 0.1;
 
 /// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
 const WIDEST: f64 = 4.0;
@@ -117,6 +119,16 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
     DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
 }
 
+/// The same of exponential covariance exp(−|Δ|/length), of what is anew at every moment and lasts a while: a station that wanders, noise
+/// in which one reading follows the last. `None` where more functions than half the `levels` were needed: those would be the noise itself.
+pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
+    // Of the constant alone the mean square is 1 and not a half.
+    let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
+    let variance = |k: usize| of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2));
+    let count = (0..=levels / 2).find(|&k| variance(k) <= SLIGHT)?;
+    Some(DMatrix::from_fn(scaled.len(), count, |row, k| variance(k).sqrt() * cosine(k, scaled[row])))
+}
+
 fn cosine(k: usize, u: f64) -> f64 {
     (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
 }
@@ -154,6 +166,24 @@ pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_wanders_forgets_within_its_length() {
+        let scaled: Vec<f64> = (0..200).map(|k| f64::from(k) / 199.0).collect();
+        for length in [0.15, 0.06, 0.025] {
+            let basis = rough_basis(&scaled, length, 200).unwrap();
+            let covariance = |a: usize, b: usize| basis.row(a).dot(&basis.row(b));
+            for first in [20, 60, 100] {
+                // exp(−lengths), where what is left out smooths it over part of the first length.
+                for (lengths, expected, within) in [(1.0, 0.37, 0.16), (2.0, 0.14, 0.06), (3.0, 0.05, 0.06)] {
+                    let other = first + (lengths * length * 199.0_f64).round() as usize;
+                    let correlation = covariance(first, other) / covariance(first, first);
+                    assert!((correlation - expected).abs() < within, "{length} {first} {lengths}: {correlation}");
+                }
+            }
+        }
+        assert!(rough_basis(&scaled, 0.025, 60).is_none(), "that would be the noise itself");
+    }
 
     #[test]
     fn values_in_a_short_row_are_one_and_others_stay() {

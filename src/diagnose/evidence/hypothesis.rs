@@ -76,6 +76,8 @@ pub enum Law {
     NearHarmonic(u32),
     /// Another value in every pose: nothing that is known of a pose tells it.
     PerPose,
+    /// Wanders in time: near what it was a little before, and not smooth, as noise is in which one reading follows the last.
+    Wandering,
     /// Linear in the position.
     Linear,
     /// Gives way under the weight of links whose masses nobody declared.

@@ -169,7 +169,11 @@ impl Evidence {
         let depends_on = self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
-            let is_it = |other: &&Hypothesis| other.law.is_of(&of.law) && other.part == of.part;
+            // Functions without a law, smooth or not, say the same of the law.
+            let has_one = of.effect().is_some() || of.is_limit();
+            let is_it = |other: &&Hypothesis| {
+                if has_one { other.law.is_of(&of.law) && other.part == of.part } else { unknown(other) }
+            };
             explanation.hypotheses.iter().filter(is_it).any(|other| !is_beside(other))
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
