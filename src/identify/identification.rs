@@ -18,6 +18,7 @@ use super::outcome::{Estimate, Identification, Noise, enter};
 use super::placement::UNKNOWN_SIGMA;
 use super::pose_sufficiency::PoseSufficiency;
 use super::predecessor::Predecessor;
+use super::prior_sizes::prior_sizes;
 use super::quality::QualityFlag;
 use super::stage::StageError;
 use super::statistics::Statistics;
@@ -315,6 +316,9 @@ fn fit_rows(
     let asked = !options.in_passing;
     let quality_flag = if asked { judgement.flag(enough.flag, not_converged, enough.poses) } else { not_converged };
     let cautions = || judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
+    let told = asked && noise != Noise::Unknown && end.termination.converged();
+    let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
+    let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
     let sight = if asked { whole.data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     Ok(Identification {
         in_passing: options.in_passing,
@@ -347,6 +351,7 @@ fn fit_rows(
         sight: (sight, OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
+        prior_sizes: if told { sizes() } else { Vec::new() },
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
         active_constraints: ActiveConstraint::all(&statistics.constraints, &statistics.prices.constraints, model),
         outliers,

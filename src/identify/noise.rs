@@ -1,11 +1,10 @@
 //! The σ that a fit takes: as declared, or what residual and priors speak for where that contradicts it.
 
 use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::active::confine;
 use super::fitting::{FitEnd, Fitting};
-use super::noise_model::{IMPROBABLE, LEAST_NOISE, NoiseModel};
+use super::noise_model::{LEAST_NOISE, NoiseModel, by_chance};
 use super::outcome::Noise;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
@@ -88,11 +87,6 @@ pub(super) fn fitted(
         }
         fitting.sigma = next;
     }
-}
-
-/// Twice the logarithm of the likelihood ratio that chance gives with the probability of what is improbable.
-fn by_chance() -> f64 {
-    ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE))
 }
 
 /// Whether the variance that a stage took, r times the declared one, contradicts that beyond doubt: N (r − 1 − ln r) of N numbers less

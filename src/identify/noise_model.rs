@@ -1,5 +1,7 @@
 //! What a fit takes for the σ of each row.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
 /// A σ this improbable is not the one declared.
 pub(super) const IMPROBABLE: f64 = 1e-3;
 /// Least σ that is taken: positions are not predicted more exactly than to rounding \[m\].
@@ -46,6 +48,11 @@ impl NoiseModel {
         let scale = (n * ratio / sum).sqrt().clamp((LEAST_NOISE / largest).min(1.0), 1.0);
         Self { scale, model_error: 0.0 }
     }
+}
+
+/// Twice the logarithm of the likelihood ratio that chance gives with the probability of what is improbable.
+pub(super) fn by_chance() -> f64 {
+    ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE))
 }
 
 #[cfg(test)]

@@ -10,8 +10,8 @@ use super::noise_model::NoiseModel;
 use super::stage::Stage;
 use super::statistics::Statistics;
 use super::{
-    ActiveConstraint, Alternation, Carriers, Caution, Errors, OrientationErrors, Outlier, PointSpread, QualityFlag,
-    ShadowPrice, SolverChoice, Strategy, TooFewPoses,
+    ActiveConstraint, Alternation, Carriers, Caution, Errors, OrientationErrors, Outlier, PointSpread, PriorSize,
+    QualityFlag, ShadowPrice, SolverChoice, Strategy, TooFewPoses,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
@@ -131,6 +131,8 @@ pub struct Identification {
     pub estimates: Vec<Estimate>,
     /// Covariance of the estimates.
     pub covariance: Covariance,
+    /// Widths of priors that the deviations found contradict; none of a fit in passing.
+    pub prior_sizes: Vec<PriorSize>,
     /// Constraints that hold the fitted parameters back, in the order of the file.
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::document::{Bar, Block, Table, first_of};
 use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash};
-use crate::identify::{Estimate, Identification};
+use crate::identify::{Estimate, Identification, PriorSize};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_BELOW};
 use crate::model::effect;
@@ -98,6 +98,7 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
          bound, or choice within unidentifiable combinations"
             .to_owned(),
     );
+    notes.extend(sizes(&found.prior_sizes));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
         let on_paper = format!("The lower harmonics are left out on paper: they are in {file}.");
@@ -105,6 +106,29 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
         blocks.push(Block::Folded(format!("The lower harmonics: {count} coefficients"), folded, on_paper));
     }
     blocks
+}
+
+/// What rules of priors the deviations found speak for, where they contradict those declared.
+fn sizes(sizes: &[PriorSize]) -> Option<String> {
+    let rule = |own: &PriorSize| {
+        let unit = own.unit.display(own.declared);
+        let (found, declared) = (figures(own.found * unit.factor), figures(own.declared * unit.factor));
+        format!("{} {found} {} instead of {declared}", own.pattern, unit.symbol)
+    };
+    let rules: Vec<String> = sizes.iter().map(rule).collect();
+    (!rules.is_empty()).then(|| {
+        format!(
+            "priors: the deviations found speak for other sizes, 1 σ of all parameters of a kind: {}; a prior of the right size \
+             may predict better where poses are few",
+            rules.join(", ")
+        )
+    })
+}
+
+/// Two figures that count.
+fn figures(value: f64) -> String {
+    let digits = (1.0 - value.log10().floor()).clamp(0.0, MOST as f64) as usize;
+    number(value, digits)
 }
 
 /// What Markdown says below the table where waves are left out.
