@@ -136,7 +136,7 @@ impl<'a> Data<'a> {
     }
 
     /// Times half way between poses that leave enough of them on either side, thinned evenly.
-    fn shift_times(&self) -> Vec<f64> {
+    pub fn shift_times(&self) -> Vec<f64> {
         let mut times = self.time();
         times.sort_by(f64::total_cmp);
         let (count, side) = (times.len(), self.rules.least_side);

@@ -152,6 +152,8 @@ effects! {
     TrackerDrift "tracker-drift"
     /// Measured positions are moved by d from a time on.
     StationShift "station-shift" { at_time: f64 = time as "at_time_s" }
+    /// Measured positions are turned by (`r_x`, `r_y`, `r_z`) and moved by d from a time on.
+    StationMove "station-move" { at_time: f64 = time as "at_time_s" }
     /// Measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
     TrackerSettling "tracker-settling" { time_constant: f64 = duration as "time_constant_s" }
     /// Δθ of a joint, or a small motion of the base, in proportion to one of the problem's own covariates.
@@ -222,8 +224,13 @@ impl Effect {
 
     /// Whether it follows time, or the order of the poses, rather than what poses can be chosen for.
     pub fn follows_time(&self) -> bool {
-        let measured = matches!(self, Self::TrackerDrift | Self::StationShift { .. } | Self::TrackerSettling { .. });
-        measured || self.has_memory()
+        let measured = matches!(self, Self::TrackerDrift | Self::TrackerSettling { .. });
+        measured || self.steps() || self.has_memory()
+    }
+
+    /// Whether what measures moves at once.
+    pub fn steps(&self) -> bool {
+        matches!(self, Self::StationShift { .. } | Self::StationMove { .. })
     }
 
     /// Whether it depends on the poses before.

@@ -133,7 +133,9 @@ fn of_places(members: &[Effect]) -> String {
 fn group(members: &[Effect]) -> String {
     let name = members[0].name();
     match (&members[0], members.len()) {
-        (Effect::StationShift { .. }, 2..) => return format!("{} at {} times", code(name), members.len()),
+        (Effect::StationShift { .. } | Effect::StationMove { .. }, 2..) => {
+            return format!("{} at {} times", code(name), members.len());
+        }
         (Effect::TrackerSettling { .. }, 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
@@ -143,7 +145,7 @@ fn group(members: &[Effect]) -> String {
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
         Effect::JointWave { joint, order } => format!("{joint} (order {order})"),
-        Effect::StationShift { at_time } => format!("{at_time} s"),
+        Effect::StationShift { at_time } | Effect::StationMove { at_time } => format!("{at_time} s"),
         Effect::TrackerSettling { time_constant } => format!("{time_constant} s"),
         other => other.place(),
     };

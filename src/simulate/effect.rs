@@ -130,6 +130,10 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
         Effect::StationShift { .. } | Effect::TrackerSettling { .. } => xyz(Unit::Length),
+        Effect::StationMove { .. } => {
+            let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::Angle));
+            named(&[["x", "y", "z"].map(|name| (name, Unit::Length)), turns].concat())
+        }
         Effect::FrameStrain => named(&["xx", "yy", "zz", "xy", "xz", "yz"].map(|name| (name, Unit::Ratio))),
         Effect::Covariate { joint: Mount::Joint(joint), .. } => {
             named(&[("rate", if slides(joint) { Unit::LengthPerUnit } else { Unit::AnglePerUnit })])

@@ -126,6 +126,13 @@ impl Rig {
                 turn += Vector3::new(*rx, *ry, *rz) * value;
                 moved += Vector3::new(*x, *y, *z) * value;
             }
+            // To the instrument that was set up anew everything turned.
+            if let (Effect::StationMove { at_time }, [x, y, z, rx, ry, rz]) = part
+                && conditions.time >= *at_time
+            {
+                turn += Vector3::new(*rx, *ry, *rz);
+                moved += Vector3::new(*x, *y, *z);
+            }
         }
         Frame::from_rotation_vector(moved, &turn)
     }

@@ -39,5 +39,6 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
         (Effect::PayloadBacklash { joint: 3 }, vec![4e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+        (Effect::StationMove { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0, 1e-4, -5e-5, 2e-4]),
     ]
 }

@@ -68,6 +68,7 @@ pub fn odd() -> (Problem, Vec<Strong>) {
         (Effect::PayloadBacklash { joint: 4 }, vec![4e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+        (Effect::StationMove { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0, 1e-4, -5e-5, 2e-4]),
         (Effect::Covariate { joint: Mount::Joint(4), of: "tilt_deg".to_owned() }, vec![2e-5]),
         (Effect::Covariate { joint: Mount::Joint(3), of: "oil_bar".to_owned() }, vec![3e-6]),
         (

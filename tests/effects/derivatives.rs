@@ -153,6 +153,7 @@ fn what_drives_the_joints_of_a_rigid_arm() {
         (Effect::TrackerSettling { time_constant: 300.0 }, vec![2e-4, -1e-4, 3e-4]),
         (Effect::TrackerDrift, vec![1e-7, 0.0, 2e-7]),
         (Effect::StationShift { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0]),
+        (Effect::StationMove { at_time: 500.0 }, vec![1e-4, 2e-4, 0.0, 1e-4, -5e-5, 2e-4]),
     ];
     let mut rows = poses(&arm, 16, false, &mut ChaCha8Rng::seed_from_u64(7));
     rows.session = labels((0..16).map(|k| if k < 8 { "A" } else { "B" }));

@@ -179,6 +179,7 @@ fn every_effect_has_its_arguments() {
         ("tracker-settling = { time_constant_s = 600 }", Effect::TrackerSettling { time_constant: 600.0 }),
         ("tracker-drift = {}", Effect::TrackerDrift),
         ("station-shift = { at_time_s = 60 }", Effect::StationShift { at_time: 60.0 }),
+        ("station-move = { at_time_s = 60 }", Effect::StationMove { at_time: 60.0 }),
     ];
     let tables: Vec<_> = effects.iter().map(|(line, _)| format!("[[effect]]\n{line}\n")).collect();
     let text = format!(

@@ -153,4 +153,8 @@ fn the_tracker_scales_drifts_and_shifts() {
     let step = [1e-4, 2e-4, 3e-4];
     is(shift(Effect::StationShift { at_time: 500.0 }, &step, &late), step);
     is(shift(Effect::StationShift { at_time: 501.0 }, &step, &late), [0.0; 3]);
+    // A quarter turn about z brings (2, 0, 0) to (0, 2, 0), and then it is moved.
+    let quarter = [1e-4, 2e-4, 3e-4, 0.0, 0.0, std::f64::consts::FRAC_PI_2];
+    is(shift(Effect::StationMove { at_time: 500.0 }, &quarter, &late), [1e-4 - 2.0, 2.0 + 2e-4, 3e-4]);
+    is(shift(Effect::StationMove { at_time: 501.0 }, &quarter, &late), [0.0; 3]);
 }

@@ -124,7 +124,7 @@ impl Judged {
             self.best,
             self.alike,
             best_p,
-            closure.effects.iter().map(|found| found.p_value).fold(1.0, f64::max),
+            closure.effects.iter().map(|found| found.p_value).fold(0.0, f64::max),
         )
     }
 }

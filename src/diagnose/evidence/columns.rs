@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
-use super::functions::{Known, basis, goes_with, merge, products_of, rough_basis, times};
+use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
 use super::hypothesis::{Hypothesis, Law, Part};
 use super::marginal::Coefficients;
 use crate::diagnose::covariate::Covariate;
@@ -166,6 +166,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             }
             if moving {
                 self.surfaces(slot, &at, &known);
+                self.scaled_by(slot, &at, &known);
                 self.per_pose(slot, &at);
                 if let Slot::Joint { joint, .. } = slot {
                     self.near_harmonics(slot, &at, joint);
@@ -315,6 +316,22 @@ impl<'a, 'l> Columns<'a, 'l> {
                     self.surface("surface", slot, &[at], (one, other));
                 }
             }
+        }
+    }
+
+    /// Functions of a joint's own command that grow evenly with what is no command: a gear or a scale that warms, a payload held out.
+    fn scaled_by(&mut self, slot: Slot, at: &DVector<f64>, known: &[Known]) {
+        let Slot::Joint { joint, .. } = slot else { return };
+        let Some(own) = known.iter().find(|own| own.covariate == Covariate::Command(joint)) else { return };
+        let is_size = |of: &&Known| {
+            use Covariate::{Hoist, Own, Payload, Temperature};
+            matches!(of.covariate, Temperature | Payload | Hoist | Own(_))
+        };
+        for size in known.iter().filter(is_size) {
+            let (part, depends_on) = (Part::of(slot), vec![own.covariate.clone(), size.covariate.clone()]);
+            let hypothesis = Hypothesis { law: Law::Smooth, part, slot: Some(slot), depends_on };
+            let length = self.rules.slow_length;
+            self.add("growing", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, &size.scaled, length)));
         }
     }
 

@@ -140,6 +140,13 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
+/// Functions of one covariate that change evenly with another: those of the basis, and each times the other from its middle.
+pub(super) fn growing(scaled: &[f64], size: &[f64], length: f64) -> DMatrix<f64> {
+    let plain = basis(scaled, length);
+    let k = plain.ncols();
+    DMatrix::from_fn(plain.nrows(), 2 * k, |row, j| plain[(row, j % k)] * if j < k { 1.0 } else { size[row] - 0.5 })
+}
+
 /// Products of cosines, one of each covariate.
 pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
     let weights = weights(length);

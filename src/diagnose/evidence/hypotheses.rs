@@ -32,6 +32,8 @@ pub(in crate::diagnose) struct Hypotheses<'a> {
     /// ln of the chance of a family of effects.
     pub(super) ln_family: f64,
     covariates: Vec<Known>,
+    /// Times at which what measures may have moved.
+    pub(super) times: Vec<f64>,
 }
 
 impl<'a> Hypotheses<'a> {
@@ -44,16 +46,18 @@ impl<'a> Hypotheses<'a> {
         let linearised = fitted.linearised_with(data, rows, &candidates, &slots(&fitted.problem));
         let fit = linearised.fitted();
         let known = added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
-        // Of waves no list holds all: each has its own chance, whichever others are looked at.
-        let (waves, known): (Vec<_>, Vec<_>) = known.partition(|(effect, _)| order_of(effect).is_some());
+        // No list holds all waves and moves: each has its own chance, whichever others are looked at.
+        let is_unlisted = |effect: &Effect| order_of(effect).is_some() || matches!(effect, Effect::StationMove { .. });
+        let (unlisted, known): (Vec<_>, Vec<_>) = known.partition(|(effect, _)| is_unlisted(effect));
         let new = candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
         let how = (data.measurements.time_measured, data.rules, weighed);
         let (all, covariates, ln_family) = Columns::all(&fitted.problem, &linearised, how, &effects, None);
-        let mut own = Self { linearised, added, unknowns, all, weighed, ln_family, covariates };
+        let times = data.shift_times();
+        let mut own = Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times };
         let entered = |(effect, columns)| own.entered(&effect, columns, (&fitted.problem, data.rules));
-        let waves: Vec<Candidate> = waves.into_iter().filter_map(entered).collect();
-        own.all.extend(waves);
+        let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
+        own.all.extend(unlisted);
         own.all.extend(limits(fitted, &own.linearised, weighed, (own.ln_family, data.rules)));
         own
     }
@@ -70,7 +74,11 @@ impl<'a> Hypotheses<'a> {
         let coefficients = Coefficients { largest, ..Coefficients::default() };
         let family =
             self.all.iter().filter_map(|own| own.hypothesis.effect()).filter(|own| own.name() == effect.name());
-        let ln_prior = self.ln_family - effect.tries(&family.collect::<Vec<_>>(), problem).ln();
+        let tries = match effect {
+            Effect::StationMove { .. } => self.times.len().max(1) as f64,
+            _ => effect.tries(&family.collect::<Vec<_>>(), problem),
+        };
+        let ln_prior = self.ln_family - tries.ln();
         let hypothesis = Hypothesis::of_effect(effect, problem, true, true);
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
@@ -80,7 +88,8 @@ impl<'a> Hypotheses<'a> {
         let linearised = fitted.linearised_with(data, rows, &[], &slots(&fitted.problem));
         let how = (data.measurements.time_measured, data.rules, weighed);
         let (all, covariates, ln_family) = Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
-        Self { linearised, added: Vec::new(), unknowns: Vec::new(), all, weighed, ln_family, covariates }
+        let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
+        Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times }
     }
 
     /// The function of a hypothesis that an explanation holds.

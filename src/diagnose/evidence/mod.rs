@@ -18,6 +18,7 @@ mod hypotheses;
 mod hypothesis;
 mod limits;
 mod marginal;
+mod moves;
 mod posterior;
 mod products;
 mod sag;
@@ -132,20 +133,22 @@ fn weighed_without<'a>(
     let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    let (mut weighted, waves) = {
+    let (mut weighted, unlisted) = {
         let products = Products::new((&blocks, &target), data.rules);
         let weighted = search(&products, &present);
         if data.stop.is_requested() {
             return None;
         }
         let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }.promising(&weighted);
-        (weighted, waves)
+        let times = (&products, hypotheses.times.as_slice());
+        let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
+        (weighted, [waves, moves].concat())
     };
     let blocks_of =
         |some: &[Candidate]| Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out);
-    if !waves.is_empty() {
-        blocks.extend(blocks_of(&waves));
-        hypotheses.all.extend(waves);
+    if !unlisted.is_empty() {
+        blocks.extend(blocks_of(&unlisted));
+        hypotheses.all.extend(unlisted);
         weighted = search(&Products::new((&blocks, &target), data.rules), &present);
     }
     let finer = finer::finer(&hypotheses, &weighted, (&blocks, &target), blocks_of, (&fitted.problem, data.rules));

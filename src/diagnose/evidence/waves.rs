@@ -56,7 +56,7 @@ fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
 }
 
 /// Whether the rules of the problem let an effect be looked for.
-fn is_free(effect: &Effect, problem: &Problem) -> bool {
+pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
     let parameters = effect.parameters(problem);
     !holds_all(problem, &parameters) && !refuses(problem, &parameters)
 }

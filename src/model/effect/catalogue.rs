@@ -7,14 +7,14 @@ use super::{
     backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
     hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_hysteresis,
     joint_lateral_compliance, joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending,
-    link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_shift,
-    thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending, unmodelled_mass,
+    link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_move,
+    station_shift, thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending, unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 32] = [
+pub const FAMILIES: [&Family; 33] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &joint_wave::FAMILY,
@@ -45,6 +45,7 @@ pub const FAMILIES: [&Family; 32] = [
     &frame_strain::FAMILY,
     &tracker_drift::FAMILY,
     &station_shift::FAMILY,
+    &station_move::FAMILY,
     &tracker_settling::FAMILY,
     &covariate::FAMILY,
 ];

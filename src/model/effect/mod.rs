@@ -37,6 +37,7 @@ mod payload_backlash;
 mod payload_mass;
 mod place;
 mod slide_bending;
+mod station_move;
 mod station_shift;
 mod thermal_lag;
 mod tracker_drift;

@@ -28,8 +28,10 @@ fn named(found: &Effect, trace: &Trace) -> String {
     };
     let name = found.name();
     match found {
-        Effect::StationShift { at_time } if trace.time_measured => format!("{name} {at_time:.0} s"),
-        Effect::StationShift { at_time } => format!("{name} row {}", at_time.ceil()),
+        Effect::StationShift { at_time } | Effect::StationMove { at_time } if trace.time_measured => {
+            format!("{name} {at_time:.0} s")
+        }
+        Effect::StationShift { at_time } | Effect::StationMove { at_time } => format!("{name} row {}", at_time.ceil()),
         Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
         Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
         own if own.has_memory() => own.name_and_place(),
