@@ -1,11 +1,13 @@
 //! Linear least squares in a polyhedron or box: active-set guess, interior-point solver, polish.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::interior::interior_point;
 pub(super) use super::polyhedron::PolyhedronSolution;
 use super::polyhedron::{Faces, Polyhedron};
+use super::reduced::reduced;
 use super::{AtBound, Factor};
+use crate::least_squares::{Linearisation, Triangle};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 pub(super) const NEAR: f64 = 1e-6;
@@ -28,6 +30,13 @@ impl<'a> PolyhedronProblem<'a> {
     /// `guess`: the faces that the minimiser may lie on.
     pub(super) fn new(factor: &'a Factor, polyhedron: &'a Polyhedron, guess: Faces) -> Self {
         Self { factor, gradient: factor.gradient(), polyhedron, guess }
+    }
+
+    /// Guesses what a step without limits leaves, where no face is known.
+    pub(super) fn begin_at(&mut self, unbounded: &DVector<f64>) {
+        if self.guess.is_empty() {
+            self.guess = self.corrected(&self.guess, unbounded, 0.0);
+        }
     }
 
     /// ‖Bᵀc‖.
@@ -97,16 +106,20 @@ impl<'a> PolyhedronProblem<'a> {
             Some(along) => open * along,
             None => open,
         };
-        let (n, count) = open.shape();
-        if count == 0 {
+        if open.ncols() == 0 {
             return q;
         }
-        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
-        let extra = if lambda > 0.0 { count } else { 0 };
-        let mut matrix = open.resize_vertically(n + extra, 0.0);
-        matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
-        let constant = (self.factor.image(&q) + self.factor.constant()).resize_vertically(n + extra, 0.0);
-        let y = Factor::new(matrix, constant, self.factor.tolerance()).gauss_newton();
+        let (mut triangle, mut projected) = reduced(open, self.factor.image(&q) + self.factor.constant());
+        if lambda > 0.0 {
+            // Further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
+            let diagonal = DVector::from_element(projected.len(), lambda.sqrt());
+            Linearisation { triangle, projected, .. } = Triangle::damped(&triangle, &projected, &diagonal);
+        }
+        let plain = along.is_none() && self.factor.is_well_conditioned();
+        let y = match plain.then(|| solved(&triangle, &projected)).flatten() {
+            Some(y) => y,
+            None => Factor::new(triangle, projected, self.factor.tolerance()).gauss_newton(),
+        };
         let y = match along {
             Some(along) => along * y,
             None => y,
@@ -116,10 +129,14 @@ impl<'a> PolyhedronProblem<'a> {
     }
 }
 
+/// −R⁻¹ c.
+fn solved(triangle: &DMatrix<f64>, projected: &DVector<f64>) -> Option<DVector<f64>> {
+    let y = -triangle.solve_upper_triangular(projected)?;
+    y.iter().all(|value| value.is_finite()).then_some(y)
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
-
     use super::super::{Bounds, Inequalities};
     use super::*;
 
