@@ -102,30 +102,34 @@ impl<'a> PolyhedronProblem<'a> {
         let (mut q, along) = self.polyhedron.flat(faces);
         let free = faces.free();
         let open = self.factor.matrix().select_columns(&free);
-        let open = match &along {
-            Some(along) => open * along,
-            None => open,
-        };
-        if open.ncols() == 0 {
+        if along.as_ref().map_or(open.ncols(), DMatrix::ncols) == 0 {
             return q;
         }
-        let (mut triangle, mut projected) = reduced(open, self.factor.image(&q) + self.factor.constant());
-        if lambda > 0.0 {
-            // Further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
-            let diagonal = DVector::from_element(projected.len(), lambda.sqrt());
-            Linearisation { triangle, projected, .. } = Triangle::damped(&triangle, &projected, &diagonal);
-        }
-        let plain = along.is_none() && self.factor.is_well_conditioned();
-        let y = match plain.then(|| solved(&triangle, &projected)).flatten() {
-            Some(y) => y,
-            None => Factor::new(triangle, projected, self.factor.tolerance()).gauss_newton(),
-        };
+        let constant = self.factor.image(&q) + self.factor.constant();
         let y = match along {
-            Some(along) => along * y,
-            None => y,
+            Some(along) => &along * self.minimiser(open * &along, constant, lambda),
+            None if self.factor.is_well_conditioned() => {
+                let (mut triangle, mut projected) = reduced(open, constant);
+                if lambda > 0.0 {
+                    let diagonal = DVector::from_element(projected.len(), lambda.sqrt());
+                    Linearisation { triangle, projected, .. } = Triangle::damped(&triangle, &projected, &diagonal);
+                }
+                solved(&triangle, &projected).unwrap_or_else(|| self.minimiser(triangle, projected, 0.0))
+            }
+            None => self.minimiser(open, constant, lambda),
         };
         free.iter().zip(y.iter()).for_each(|(&j, value)| q[j] += value);
         q
+    }
+
+    /// The minimiser of ‖A y + c‖² + λ‖y‖².
+    fn minimiser(&self, matrix: DMatrix<f64>, constant: DVector<f64>, lambda: f64) -> DVector<f64> {
+        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
+        let (n, count) = matrix.shape();
+        let extra = if lambda > 0.0 { count } else { 0 };
+        let mut matrix = matrix.resize_vertically(n + extra, 0.0);
+        matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
+        Factor::new(matrix, constant.resize_vertically(n + extra, 0.0), self.factor.tolerance()).gauss_newton()
     }
 }
 
