@@ -235,7 +235,7 @@ impl Triangle {
 /// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg. 5.1.1]
 ///
 /// Returns (β, τ); for v = 0 nothing is done and τ = 0.
-fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
+pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
     let norm = norm(vector);
     if norm == 0.0 {
         return (alpha, 0.0);

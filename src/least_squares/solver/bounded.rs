@@ -26,8 +26,8 @@ pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustR
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
 ///
 /// The unconstrained step is tried first, then the one in the polyhedron (a box without inequalities), each without damping
-/// if that respects the radius: on a guess of the faces that hold, corrected until the optimality conditions do. The problem is
-/// never evaluated outside (inequalities: beyond rounding);
+/// if that respects the radius: on a guess of the faces that hold, corrected until the optimality conditions do. After a step that limits
+/// held back the one in the polyhedron is tried first. The problem is never evaluated outside (inequalities: beyond rounding);
 /// a start outside is moved to the [`nearest`] point within. Converged when the gradient vanishes along all directions that
 /// bounds and inequalities leave open.
 pub fn constrained_levenberg_marquardt(
@@ -92,13 +92,41 @@ pub struct Constrained {
     model: Option<Model>,
     /// Faces that held in the last problem from the same x.
     guess: Option<Faces>,
+    /// The step from x that only limits hold back, once it was asked for.
+    undamped: Option<PolyhedronSolution>,
     /// Whether the last step was held back.
     confined: bool,
 }
 
 impl Constrained {
+    /// The step that limits alone hold back, if some do and the radius does not.
+    fn undamped_step(&mut self, x: &DVector<f64>, radius: f64) -> Option<Step> {
+        let model = self.model.as_ref()?;
+        let undamped = self.undamped.get_or_insert_with(|| {
+            let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
+            PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.touched.clone()).solve(0.0)
+        });
+        let alone = !undamped.faces.is_empty() && undamped.q.norm() <= (1.0 + RADIUS_SLACK) * radius;
+        let solution = alone.then(|| undamped.clone())?;
+        Some(self.along(x, solution, 0.0))
+    }
+
+    /// The step of a solution, exactly on the bounds that hold; the next problem from the same x begins with its faces.
+    fn along(&mut self, x: &DVector<f64>, PolyhedronSolution { q, faces }: PolyhedronSolution, damping: f64) -> Step {
+        let Some(model) = &self.model else { return Step::none(x) };
+        let mut point = x + q.component_div(&model.scale);
+        self.bounds.hold(&mut point, &faces.bounds);
+        self.guess = Some(faces);
+        let slope = -model.factor.gradient().dot(&q);
+        let predicted = slope - 0.5 * model.factor.image(&q).norm_squared();
+        Step { point, length: q.norm(), slope, predicted, damping }
+    }
+
     fn solver(steps: Steps, bounds: Bounds, rows: Inequalities, settings: Settings) -> TrustRegion<Self> {
-        TrustRegion::new(Self { steps, bounds, rows, model: None, guess: None, confined: false }, settings)
+        TrustRegion::new(
+            Self { steps, bounds, rows, model: None, guess: None, undamped: None, confined: false },
+            settings,
+        )
     }
 }
 
@@ -119,7 +147,7 @@ impl Subproblem for Constrained {
 
     fn prepare(&mut self, _x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
         self.model = Some(Model::new(linearisation, scale, settings));
-        self.guess = None;
+        (self.guess, self.undamped) = (None, None);
     }
 
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64 {
@@ -170,6 +198,12 @@ impl Subproblem for Constrained {
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
+        if self.confined && self.steps == Steps::ActiveSet {
+            // Limits that held the last step back hold this one back too, most often.
+            if let Some(step) = self.undamped_step(x, radius) {
+                return step;
+            }
+        }
         let Some(model) = &mut self.model else { return Step::none(x) };
         let step = model.unbounded_step(x, radius);
         let inside = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
@@ -178,12 +212,17 @@ impl Subproblem for Constrained {
             return step;
         }
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let (PolyhedronSolution { q, faces }, damping) = match self.steps {
+        let (solution, damping) = match self.steps {
             Steps::ActiveSet => {
-                let guess = self.guess.take().unwrap_or_else(|| polyhedron.touched.clone());
-                let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, guess);
-                let size = problem.gradient_norm();
-                limited(|lambda| problem.solve(lambda), size, radius)
+                let known = self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
+                let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, known.clone());
+                problem.begin_at(&(&step.point - x).component_mul(&model.scale));
+                let (size, undamped) = (problem.gradient_norm(), &mut self.undamped);
+                let solve = |lambda| match lambda {
+                    0.0 => undamped.get_or_insert_with(|| problem.solve(0.0)).clone(),
+                    _ => problem.solve(lambda),
+                };
+                limited(solve, step.damping, size, radius)
             }
             Steps::InteriorPoint => {
                 let found = interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
@@ -195,38 +234,43 @@ impl Subproblem for Constrained {
                 (polyhedron.within(q, 0.0), step.damping)
             }
         };
-        // Exactly on the bounds that hold.
-        let mut point = x + q.component_div(&model.scale);
-        self.bounds.hold(&mut point, &faces.bounds);
-        self.guess = Some(faces);
-        let slope = -model.factor.gradient().dot(&q);
-        let predicted = slope - 0.5 * model.factor.image(&q).norm_squared();
-        Step { point, length: q.norm(), slope, predicted, damping }
+        self.along(x, solution, damping)
     }
 }
 
-/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ, `size` is ‖Bᵀc‖.
+/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ, `size` is ‖Bᵀc‖, `first` is the λ > 0
+/// that it would need without constraints.
 ///
 /// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ; within the bracket
 /// Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
-fn limited(mut solve: impl FnMut(f64) -> PolyhedronSolution, size: f64, radius: f64) -> (PolyhedronSolution, f64) {
-    let mut solution = solve(0.0);
-    let mut length = solution.q.norm();
-    if length <= (1.0 + RADIUS_SLACK) * radius {
-        return (solution, 0.0);
+fn limited(
+    mut solve: impl FnMut(f64) -> PolyhedronSolution,
+    first: f64,
+    size: f64,
+    radius: f64,
+) -> (PolyhedronSolution, f64) {
+    let is_short = |length: f64| length <= (1.0 + RADIUS_SLACK) * radius;
+    let fills = |length: f64| is_short(length) && length >= (1.0 - RADIUS_SLACK) * radius;
+    let mut known = (first > 0.0).then(|| solve(first));
+    if let Some(solution) = known.take_if(|solution| fills(solution.q.norm())) {
+        return (solution, first);
+    }
+    let undamped = solve(0.0);
+    let mut length = undamped.q.norm();
+    if is_short(length) {
+        return (undamped, 0.0);
     }
     let (mut low, mut high) = (0.0, size / radius);
     let mut last = (0.0, length);
-    let mut lambda = 1e-3 * high;
+    let mut lambda = if known.is_some() { first } else { 1e-3 * high };
     let mut best = None;
     for _ in 0..DAMPINGS {
-        solution = solve(lambda);
+        let solution = known.take().unwrap_or_else(|| solve(lambda));
         length = solution.q.norm();
-        let short = length <= (1.0 + RADIUS_SLACK) * radius;
-        if short {
+        if is_short(length) {
             high = lambda;
             best = Some((solution, lambda));
-            if length >= (1.0 - RADIUS_SLACK) * radius {
+            if fills(length) {
                 break;
             }
         } else {

@@ -1,11 +1,13 @@
 //! Linear least-squares steps with one factorisation: Gauss–Newton, damped, and limited in length.
 
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::pivoted::Pivoted;
+use super::pivoted::{Pivoted, is_well_conditioned};
 use super::spectrum::Spectrum;
 
-/// min ‖B q + c‖ factorised once, to be solved for any damping.
+/// min ‖B q + c‖ factorised once, when first it is needed, to be solved for any damping.
 ///
 /// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
 /// `|Rₙₙ| > tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ, where singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
@@ -15,15 +17,16 @@ pub struct Factor {
     matrix: DMatrix<f64>,
     constant: DVector<f64>,
     tolerance: f64,
-    pivoted: Option<Pivoted>,
+    pivoted: OnceLock<Option<Pivoted>>,
+    well_conditioned: OnceLock<bool>,
     spectrum: Option<Spectrum>,
 }
 
 impl Factor {
     /// Prepares min ‖B q + c‖; singular values up to `tolerance`·σ₁ count as zero.
     pub fn new(matrix: DMatrix<f64>, constant: DVector<f64>, tolerance: f64) -> Self {
-        let pivoted = Pivoted::new(&matrix, &constant, tolerance);
-        Self { matrix, constant, tolerance, pivoted, spectrum: None }
+        let (pivoted, well_conditioned) = (OnceLock::new(), OnceLock::new());
+        Self { matrix, constant, tolerance, pivoted, well_conditioned, spectrum: None }
     }
 
     /// B.
@@ -53,7 +56,7 @@ impl Factor {
 
     /// The Gauss–Newton step: the shortest minimiser of ‖B q + c‖.
     pub fn gauss_newton(&mut self) -> DVector<f64> {
-        match &self.pivoted {
+        match self.pivoted() {
             Some(pivoted) => pivoted.solution(),
             None => self.damped(0.0),
         }
@@ -69,21 +72,33 @@ impl Factor {
 
     /// By how much the minimiser of ‖B q + c‖² + λ‖q‖² moves where its gradient is larger by g; nothing where B lacks rank.
     pub fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
-        self.pivoted.as_ref()?.response(gradient, lambda)
+        self.pivoted()?.response(gradient, lambda)
     }
 
     /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
-        if let Some(found) = self.pivoted.as_ref().and_then(|pivoted| pivoted.limited(radius)) {
+        if let Some(found) = self.pivoted().and_then(|pivoted| pivoted.limited(radius)) {
             return found;
         }
         let lambda = self.spectrum().secular_root(radius);
         (self.damped(lambda), lambda)
     }
 
+    /// Whether B is for certain an upper triangle so well conditioned that any of its columns can do without pivots.
+    pub(super) fn is_well_conditioned(&self) -> bool {
+        *self.well_conditioned.get_or_init(|| match self.pivoted.get() {
+            Some(found) => found.as_ref().is_some_and(|pivoted| pivoted.is_plain),
+            None => is_well_conditioned(&self.matrix, self.tolerance),
+        })
+    }
+
+    fn pivoted(&self) -> Option<&Pivoted> {
+        self.pivoted.get_or_init(|| Pivoted::new(&self.matrix, &self.constant, self.tolerance)).as_ref()
+    }
+
     fn spectrum(&mut self) -> &Spectrum {
-        let Self { matrix, constant, tolerance, pivoted, spectrum } = self;
-        let cut = if pivoted.is_some() { 0.0 } else { spectral_cut(matrix, *tolerance) };
+        let cut = if self.pivoted().is_some() { 0.0 } else { spectral_cut(&self.matrix, self.tolerance) };
+        let Self { matrix, constant, spectrum, .. } = self;
         spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, cut))
     }
 }

@@ -15,6 +15,7 @@ mod pivoted;
 mod polyhedron;
 mod polyhedron_step;
 mod pseudo_inverse;
+mod reduced;
 mod reflective;
 mod run;
 mod second_order;

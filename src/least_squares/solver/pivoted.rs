@@ -24,6 +24,8 @@ pub(super) struct Pivoted {
     permutation: PermutationSequence<Dyn>,
     /// q at λ = 0.
     solution: DVector<f64>,
+    /// Whether B is its own factor.
+    pub(super) is_plain: bool,
 }
 
 impl Pivoted {
@@ -33,19 +35,11 @@ impl Pivoted {
         if n == 0 || matrix.nrows() < n {
             return None;
         }
-        let mut unit = matrix.clone();
-        let mut inverse_sizes = DVector::from_element(n, 1.0);
-        for (mut column, inverse) in unit.column_iter_mut().zip(inverse_sizes.iter_mut()) {
-            let size = column.norm();
-            if size > 0.0 {
-                column /= size;
-                *inverse = size.recip();
-            }
-        }
+        let (unit, mut inverse_sizes) = with_unit_columns(matrix);
         if tolerance <= WELL_CONDITIONED && regular_inverse(&unit, WELL_CONDITIONED).is_some() {
             let (projected, permutation) = (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
             let solution = solve(&unit, &projected, &inverse_sizes)?;
-            return Some(Self { triangle: unit, projected, inverse_sizes, permutation, solution });
+            return Some(Self { triangle: unit, projected, inverse_sizes, permutation, solution, is_plain: true });
         }
         let qr = unit.col_piv_qr();
         let triangle = qr.r();
@@ -59,7 +53,7 @@ impl Pivoted {
         let permutation = qr.p().clone();
         permutation.permute_rows(&mut inverse_sizes);
         let solution = solve(&triangle, &projected, &inverse_sizes)?;
-        Some(Self { triangle, projected, inverse_sizes, permutation, solution })
+        Some(Self { triangle, projected, inverse_sizes, permutation, solution, is_plain: false })
     }
 
     /// The minimiser of ‖B q + c‖.
@@ -110,6 +104,26 @@ impl Pivoted {
         self.permutation.inv_permute_rows(&mut q);
         q
     }
+}
+
+/// Whether B is a well-conditioned upper triangle, by columns brought to length one; then so is the factor of any of its columns, with
+/// damping or without.
+pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
+    tolerance <= WELL_CONDITIONED && regular_inverse(&with_unit_columns(matrix).0, WELL_CONDITIONED).is_some()
+}
+
+/// B S⁻¹, and 1/S.
+fn with_unit_columns(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let mut unit = matrix.clone();
+    let mut inverse_sizes = DVector::from_element(matrix.ncols(), 1.0);
+    for (mut column, inverse) in unit.column_iter_mut().zip(inverse_sizes.iter_mut()) {
+        let size = column.norm();
+        if size > 0.0 {
+            column /= size;
+            *inverse = size.recip();
+        }
+    }
+    (unit, inverse_sizes)
 }
 
 /// −S⁻¹ R⁻¹ c.

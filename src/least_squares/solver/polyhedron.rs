@@ -45,6 +45,11 @@ impl Faces {
         (0..self.bounds.len()).filter(|&j| self.bounds[j].is_none()).collect()
     }
 
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.bounds.iter().all(Option::is_none) && !self.rows.contains(&true)
+    }
+
     /// Half-spaces among the faces.
     fn chosen(&self) -> Vec<usize> {
         (0..self.rows.len()).filter(|&i| self.rows[i]).collect()

@@ -1,11 +1,13 @@
 //! Linear least squares in a polyhedron or box: active-set guess, interior-point solver, polish.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::interior::interior_point;
 pub(super) use super::polyhedron::PolyhedronSolution;
 use super::polyhedron::{Faces, Polyhedron};
+use super::reduced::reduced;
 use super::{AtBound, Factor};
+use crate::least_squares::{Linearisation, Triangle};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 pub(super) const NEAR: f64 = 1e-6;
@@ -28,6 +30,13 @@ impl<'a> PolyhedronProblem<'a> {
     /// `guess`: the faces that the minimiser may lie on.
     pub(super) fn new(factor: &'a Factor, polyhedron: &'a Polyhedron, guess: Faces) -> Self {
         Self { factor, gradient: factor.gradient(), polyhedron, guess }
+    }
+
+    /// Guesses what a step without limits leaves, where no face is known.
+    pub(super) fn begin_at(&mut self, unbounded: &DVector<f64>) {
+        if self.guess.is_empty() {
+            self.guess = self.corrected(&self.guess, unbounded, 0.0);
+        }
     }
 
     /// ‖Bᵀc‖.
@@ -93,33 +102,45 @@ impl<'a> PolyhedronProblem<'a> {
         let (mut q, along) = self.polyhedron.flat(faces);
         let free = faces.free();
         let open = self.factor.matrix().select_columns(&free);
-        let open = match &along {
-            Some(along) => open * along,
-            None => open,
-        };
-        let (n, count) = open.shape();
-        if count == 0 {
+        if along.as_ref().map_or(open.ncols(), DMatrix::ncols) == 0 {
             return q;
         }
-        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
-        let extra = if lambda > 0.0 { count } else { 0 };
-        let mut matrix = open.resize_vertically(n + extra, 0.0);
-        matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
-        let constant = (self.factor.image(&q) + self.factor.constant()).resize_vertically(n + extra, 0.0);
-        let y = Factor::new(matrix, constant, self.factor.tolerance()).gauss_newton();
+        let constant = self.factor.image(&q) + self.factor.constant();
         let y = match along {
-            Some(along) => along * y,
-            None => y,
+            Some(along) => &along * self.minimiser(open * &along, constant, lambda),
+            None if self.factor.is_well_conditioned() => {
+                let (mut triangle, mut projected) = reduced(open, constant);
+                if lambda > 0.0 {
+                    let diagonal = DVector::from_element(projected.len(), lambda.sqrt());
+                    Linearisation { triangle, projected, .. } = Triangle::damped(&triangle, &projected, &diagonal);
+                }
+                solved(&triangle, &projected).unwrap_or_else(|| self.minimiser(triangle, projected, 0.0))
+            }
+            None => self.minimiser(open, constant, lambda),
         };
         free.iter().zip(y.iter()).for_each(|(&j, value)| q[j] += value);
         q
     }
+
+    /// The minimiser of ‖A y + c‖² + λ‖y‖².
+    fn minimiser(&self, matrix: DMatrix<f64>, constant: DVector<f64>, lambda: f64) -> DVector<f64> {
+        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
+        let (n, count) = matrix.shape();
+        let extra = if lambda > 0.0 { count } else { 0 };
+        let mut matrix = matrix.resize_vertically(n + extra, 0.0);
+        matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
+        Factor::new(matrix, constant.resize_vertically(n + extra, 0.0), self.factor.tolerance()).gauss_newton()
+    }
+}
+
+/// −R⁻¹ c.
+fn solved(triangle: &DMatrix<f64>, projected: &DVector<f64>) -> Option<DVector<f64>> {
+    let y = -triangle.solve_upper_triangular(projected)?;
+    y.iter().all(|value| value.is_finite()).then_some(y)
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
-
     use super::super::{Bounds, Inequalities};
     use super::*;
 

@@ -305,6 +305,11 @@ impl Trial {
         }
     }
 
+    /// ρ as far as it speaks of the model: a difference that would not be worth a step is rounding of the cost.
+    fn forecast(&self, tolerance: f64) -> f64 {
+        if (self.actual - self.predicted).abs() <= tolerance { 1.0 } else { self.ratio }
+    }
+
     fn next_radius(&self, radius: f64) -> f64 {
         if self.ratio <= 0.25 {
             // The minimum of the parabola through the two costs and the slope, between a tenth and a half.
@@ -386,11 +391,12 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         }
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
+            let forecast = trial.forecast(self.settings.cost_tolerance);
             if self.subproblem.bends_freely() {
-                self.second_order.watch(trial.ratio);
+                self.second_order.watch(forecast);
             }
             let renew = self.subproblem.is_confined()
-                && self.second_order.judge(trial.ratio, taken, (trial.length, trial.damping), x.len());
+                && self.second_order.judge(forecast, taken, (trial.length, trial.damping), x.len());
             if renew {
                 let within = |x: &DVector<f64>| self.subproblem.admits(x);
                 self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
