@@ -24,7 +24,6 @@ use super::stage::StageError;
 use super::statistics::Statistics;
 use super::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::error::{InputError, InputErrorKind};
-use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
@@ -293,15 +292,7 @@ fn fit_rows(
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
-    let mut estimates: Vec<Estimate> =
-        model.parameters.iter().map(|own| Estimate::unfitted(own, measurements.time_measured)).collect();
-    let mut covariance = Collected::new(estimates.len());
-    enter((&mut estimates, &mut covariance), &fitting.whole(), &end, &statistics);
-    let mut not_converged = (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
-    if let Some(termination) = place_held_out(&fitting, &mut end, (&mut estimates, &mut covariance), noise)? {
-        not_converged = not_converged.or(Some(QualityFlag::HeldOutNotConverged(termination)));
-    }
-    estimates.iter_mut().filter(|_| noise == Noise::Unknown).for_each(|own| own.std_error = None);
+    let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
     let judgement = Judgement {
@@ -397,21 +388,37 @@ fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, Id
     Ok(unknowns)
 }
 
-/// Fits bases and targets of held-out sessions to their rows, with the arm as it ended; how that ended, if it did not converge.
-fn place_held_out(
+/// Estimates of all parameters and their covariance, and what did not converge. Bases and targets of held-out sessions are fitted to
+/// their rows, with the arm as it ended.
+fn estimated(
     fitting: &Fitting,
     end: &mut FitEnd,
-    results: (&mut [Estimate], &mut Collected),
+    statistics: &Statistics,
     noise: Noise,
-) -> Result<Option<Termination>, StageError> {
-    let Some(stage) = fitting.held_out_stage() else { return Ok(None) };
-    let placed: FitEnd = stage.run(&end.x)?.into();
-    end.iterations += placed.iterations;
-    end.evaluations += placed.evaluations;
-    let statistics = Statistics::of(&stage, &placed, (noise == Noise::Declared).then_some(fitting.noise_model))?;
-    enter(results, &stage, &placed, &statistics);
-    end.x = placed.x;
-    Ok((!placed.termination.converged()).then_some(placed.termination))
+) -> Result<(Vec<Estimate>, Collected, Option<QualityFlag>), StageError> {
+    let (model, time_measured) = (fitting.model, fitting.measurements.time_measured);
+    let mut estimates: Vec<Estimate> =
+        model.parameters.iter().map(|own| Estimate::unfitted(own, time_measured)).collect();
+    let mut covariance = Collected::new(estimates.len());
+    enter((&mut estimates, &mut covariance), &fitting.whole(), end, statistics);
+    let mut not_converged = (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
+    if let Some(stage) = fitting.held_out_stage() {
+        let placed: FitEnd = stage.run(&end.x)?.into();
+        end.iterations += placed.iterations;
+        end.evaluations += placed.evaluations;
+        let statistics = Statistics::of(&stage, &placed, (noise == Noise::Declared).then_some(fitting.noise_model))?;
+        enter((&mut estimates, &mut covariance), &stage, &placed, &statistics);
+        let held_out =
+            (!placed.termination.converged()).then_some(QualityFlag::HeldOutNotConverged(placed.termination));
+        not_converged = not_converged.or(held_out);
+        end.x = placed.x;
+    }
+    if noise == Noise::Unknown {
+        for own in &mut estimates {
+            own.std_error = None;
+        }
+    }
+    Ok((estimates, covariance, not_converged))
 }
 
 /// The loss that `[robust]` stands for, on the three coordinates of a position.

@@ -127,8 +127,7 @@ fn sizes(sizes: &[PriorSize]) -> Option<String> {
 
 /// Two figures that count.
 fn figures(value: f64) -> String {
-    let digits = (1.0 - value.log10().floor()).clamp(0.0, MOST as f64) as usize;
-    number(value, digits)
+    number(value, decimals(value, MOST))
 }
 
 /// What Markdown says below the table where waves are left out.
