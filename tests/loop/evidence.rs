@@ -310,6 +310,36 @@ fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
 }
 
 #[test]
+fn a_station_that_is_set_up_anew_moves_and_turns() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let truth = truth.split("[[effect]]").next().unwrap();
+    let (at_time, shift, turn) = (1500.0, [0.4, -0.6, 0.2], [0.02, -0.03, 0.05]);
+    let [x, y, z] = shift;
+    let [rx, ry, rz] = turn;
+    let text = format!(
+        "{truth}\n[[effect]]\nstation-move = {{ at_time_s = {at_time} }}\nx_mm = {x}\ny_mm = {y}\nz_mm = {z}\nrx_deg = {rx}\nry_deg = {ry}\n\
+         rz_deg = {rz}\n"
+    );
+    let truth = Truth::parse(&text, Path::new("TRUTH.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 70, 3).unwrap().rows;
+    let split = Split { identification: (0..40).collect(), held_out: (40..70).collect() };
+    let data = Dataset::new(table(&rows), split);
+    let closure = close(&problem, &data, &Options::default()).unwrap();
+    let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
+    let Effect::StationMove { at_time: moved } = found.effect else { panic!("{found:?}") };
+    // Between the same two poses.
+    let before = |time: f64| data.measurements.time.iter().filter(|own| **own < time).count();
+    assert_eq!(before(moved), before(at_time), "{moved}");
+    assert!(found.is_named(STATED) && closure.verdict == Verdict::Explained, "{found:?}");
+    let truth = shift.map(|mm: f64| mm * 1e-3).into_iter().chain(turn.map(f64::to_radians));
+    for (own, truth) in found.estimates.iter().zip(truth) {
+        assert!((own.estimate - truth).abs() < 4.0 * own.std_error.unwrap(), "{own:?} {truth}");
+    }
+}
+
+#[test]
 fn waves_are_named_with_their_orders_and_whole_numbers_are_harmonics() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&cases.join("problem.toml")).unwrap();
