@@ -107,6 +107,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             None if !identification.is_trusted() || report::tells_little(&identification) => {
                 format!("flexcal check {named} says what the poses can tell")
             }
+            None if identification.too_few_poses.is_some() => {
+                format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
+            }
             None if report::lacks_something(&identification) => {
                 format!("flexcal loop {named} looks for what the model lacks")
             }

@@ -135,12 +135,12 @@ impl<'a> Data<'a> {
         (0..count).map(|which| self.rows().iter().map(|&row| self.measurements.covariates_of(row)[which]).collect())
     }
 
-    /// Times half way between poses that leave enough of them on either side, thinned evenly.
+    /// Times about half way between poses that leave enough of them on either side, in few digits, thinned evenly.
     pub fn shift_times(&self) -> Vec<f64> {
         let mut times = self.time();
         times.sort_by(f64::total_cmp);
         let (count, side) = (times.len(), self.rules.least_side);
-        let between = |k: usize| (times[k] > times[k - 1]).then(|| 0.5 * (times[k - 1] + times[k]));
+        let between = |k: usize| (times[k] > times[k - 1]).then(|| half_way(times[k - 1], times[k]));
         let all: Vec<f64> = (side..count).take_while(|k| k + side <= count).filter_map(between).collect();
         let every = all.len().div_ceil(self.rules.shift_times).max(1);
         all.into_iter().step_by(every).collect()
@@ -209,4 +209,26 @@ pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
         *known.entry(key).or_insert(next)
     })
     .collect()
+}
+
+/// A number about half way between two, in no more decimals than it takes to be within a twentieth of their distance of the middle.
+fn half_way(low: f64, high: f64) -> f64 {
+    let middle = 0.5 * (low + high);
+    let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());
+    // Divided by a whole number, what is below one has the digits that it is written in.
+    let near = if unit < 1.0 { (middle / unit).round() / unit.recip().round() } else { (middle / unit).round() * unit };
+    if low < near && near < high { near } else { middle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_way_takes_few_digits() {
+        let cases = [(3200.0, 3221.2, 3211.0), (3.0, 4.0, 3.5), (0.0, 0.002, 0.001), (1000.0, 61000.0, 31000.0)];
+        for (low, high, expected) in cases {
+            assert_eq!(half_way(low, high).to_bits(), f64::to_bits(expected), "{low} {high}");
+        }
+    }
 }

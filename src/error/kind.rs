@@ -429,6 +429,8 @@ pub enum WarningKind {
     BeyondLimits { rows: usize, worst: String, limits: String },
     #[error("{value} is {turns} turns; if these are degrees, the columns end in _deg")]
     ManyTurns { value: String, turns: String },
+    #[error("all temperatures are {least} °C or more; if these are kelvins, take 273.15 off")]
+    Kelvins { least: String },
     #[error(
         "{distance} m away from the last frame, and all links together are {links} m long; if these are millimetres, write target_mm"
     )]

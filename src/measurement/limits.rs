@@ -8,6 +8,8 @@ use crate::problem::{JointKind, Problem};
 const ROUNDING: f64 = 1e-6;
 /// Turns from zero that hardly any arm makes.
 const MANY_TURNS: f64 = 2.0;
+/// A temperature \[°C\] at which no arm is calibrated, and below that of a cold room in kelvins.
+const HOT: f64 = 200.0;
 
 /// The column of a joint's commands.
 pub(super) struct Commands<'a> {
@@ -39,6 +41,13 @@ impl Commands<'_> {
 }
 
 impl Measurements {
+    /// A warning where temperatures are those of an oven, or in another unit, at the row of the least.
+    pub(super) fn kelvins(&self) -> Option<Warning> {
+        let (row, &least) = self.temperature.iter().flatten().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let location = self.location(row).with_key("temperature_C");
+        (least > HOT).then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
+    }
+
     /// A warning where columns in radians turn a joint further than joints turn, at the row that is furthest off.
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {

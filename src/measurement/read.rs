@@ -146,6 +146,7 @@ impl<'a> Tables<'a> {
                 observed::complete(&mut measurements, problem)?;
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
+                warnings.extend(measurements.kelvins());
                 if measured {
                     warnings.extend(measurements.beyond_limits(problem, &commands));
                 }

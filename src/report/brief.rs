@@ -6,7 +6,7 @@ use super::document::{Block, Point};
 use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
 use super::identify::{errors_by_axis, headline};
-use super::noise::{carried, noise};
+use super::noise::{carried, noise, short};
 use super::parameters::correlated;
 use super::quantity::{counted, number};
 use super::render::text_within;
@@ -108,7 +108,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     blocks.extend(cautions(closure));
     blocks.extend(not_looked_for(problem, closure).map(Block::Text));
     blocks.extend(set_aside(problem, closure));
-    blocks.extend([Block::Table(table), Block::Text(gain(closure))]);
+    blocks.push(Block::Table(table));
+    blocks.extend(Some(gain(closure)).filter(|gain| !gain.is_empty()).map(Block::Text));
     let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let last = end.lines().count();
     let found: Vec<&Found> = closure.effects.iter().filter(|found| !is_beside(closure, found)).collect();
@@ -150,9 +151,11 @@ fn gain(closure: &ClosedLoop) -> String {
     let [before, after] = [&closure.before.fit, &closure.after].map(|fit| fit.reduced_chi2);
     let chi2 = match (before, after) {
         (Some(before), Some(after)) if !closure.effects.is_empty() => {
-            format!("χ²/ν of the residual falls from {} to {}; noise alone: 1.", number(before, 2), number(after, 2))
+            let too_large = if closure.after.sigma_scale < 1.0 { " The declared σ is too large." } else { "" };
+            let (before, after) = (short(before), short(after));
+            format!("χ²/ν of the residual falls from {before} to {after}; noise alone: 1.{too_large}")
         }
-        (Some(before), _) => format!("χ²/ν of the residual is {}; noise alone: 1.", number(before, 2)),
+        (Some(before), _) => format!("χ²/ν of the residual is {}; noise alone: 1.", short(before)),
         _ => String::new(),
     };
     let gain = closure.gain;

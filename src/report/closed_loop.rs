@@ -243,10 +243,11 @@ fn gain(closure: &ClosedLoop) -> String {
     if closure.effects.is_empty() || !gain.value.is_finite() {
         return notes;
     }
+    let (takes, off, what) = if gain.value < 0.0 { ("adds", "to", "; below 0 it adds") } else { ("takes", "off", "") };
     format!(
-        "What was found takes {} off the mean error of the {} (95 % interval {} to {}). They took no part in any choice. \
-         {notes}",
-        with_unit(of, gain.value),
+        "What was found {takes} {} {off} the mean error of the {} (95 % interval of what it takes off {} to {}{what}). They took no \
+         part in any choice. {notes}",
+        with_unit(of, gain.value.abs()),
         held_out_rows(after),
         shown(of, gain.low),
         with_unit(of, gain.high),

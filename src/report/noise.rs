@@ -66,7 +66,18 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             )
         }
         (Noise::Declared, Some(chi2)) => {
-            format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2))
+            let of_chance = found.chance.filter(|&(low, high)| chi2 < low || chi2 > high);
+            let Some((low, high)) = of_chance else {
+                return format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2));
+            };
+            let (than, what) = if chi2 > high { ("more", "explains") } else { ("less", "stands for") };
+            format!(
+                "Reduced χ² is {}; chance gives {} to {}: the fit leaves {than} than the declared σ {what}.\n\
+                 Fit and standard errors take the declared σ: residual and priors together do not speak for another one.",
+                short(chi2),
+                number(low, 2),
+                number(high, 2)
+            )
         }
     }
 }
@@ -78,11 +89,12 @@ fn contradicted(found: &Identification) -> bool {
 
 /// Whether a fit leaves more than the declared noise explains.
 pub fn lacks_something(found: &Identification) -> bool {
-    contradicted(found) && found.noise_factor > 1.0
+    let by_chi2 = || found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, high))| chi2 > high);
+    found.noise == Noise::Declared && if contradicted(found) { found.noise_factor > 1.0 } else { by_chi2() }
 }
 
 /// A χ² / ν with two decimals, or two digits where it is small.
-fn short(chi2: f64) -> String {
+pub(super) fn short(chi2: f64) -> String {
     number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
@@ -143,7 +155,7 @@ pub fn look_at_carriers(found: &Identification, problem: &Path) -> Option<String
 /// How large the residual is, in brief.
 pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
     let size = match (found.noise, found.reduced_chi2) {
-        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", number(chi2, 2)),
+        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", short(chi2)),
         (Noise::Estimated(sigma), _) => {
             let of = &found.fitted.identification;
             format!("{} {} per coordinate", brief(of, sigma), unit(of))

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::document::{Block, Point, some_of};
 use super::errors::{held_out_rows, rows_of, with_unit, without_equilibrium};
 use super::json::{Both, object, to_text};
+use super::noise::short;
 use super::quantity::{counted, mm, number, p_value};
 use super::render::text;
 use super::{effect, findings};
@@ -270,8 +271,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
 
 fn headline(problem: &Problem, fit: &Identification) -> String {
     let held_out = &fit.fitted.held_out;
-    let size =
-        fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", number(chi2, 2)));
+    let size = fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", short(chi2)));
     let error = match held_out.unpredicted {
         0 => format!(
             "on {} the error is {} in the mean, rms {}",
@@ -330,13 +330,20 @@ pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_a
 
 fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     let of = &trace.fit.fitted.identification;
+    let (take, off) = if ranked.gain < 0.0 { ("add", "to") } else { ("take", "off") };
     let mut gain = format!(
-        "p {}; would take {} off the rms error of the identification poses",
+        "p {}; would {take} {} {off} the rms error of the identification poses",
         p_value(ranked.p_value),
-        with_unit(of, ranked.gain)
+        with_unit(of, ranked.gain.abs())
     );
     if let Some(cross_validated) = ranked.cross_validated {
-        let _ = write!(gain, ", {} on poses left out in turn", with_unit(of, cross_validated));
+        let size = with_unit(of, cross_validated.abs());
+        let size = match (ranked.gain < 0.0, cross_validated < 0.0) {
+            (false, true) => format!("and add {size}"),
+            (true, false) => format!("and take {size} off"),
+            _ => size,
+        };
+        let _ = write!(gain, ", {size} on poses left out in turn");
     }
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {

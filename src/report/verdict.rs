@@ -8,8 +8,6 @@ use crate::diagnose::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
 
 /// Probability of a law below which it is not even an example.
 const NONE: f64 = 0.005;
-/// Residual in units of the declared σ below which little could be found.
-const OVERSTATED: f64 = 0.3;
 
 /// What it came to, in a word.
 pub(super) fn verdict_word(verdict: Verdict) -> &'static str {
@@ -92,9 +90,9 @@ fn came_to(closure: &ClosedLoop) -> String {
     if let (Verdict::Unexplained, Some(size)) = (closure.verdict, size_alone(closure)) {
         let size = number(size, 1);
         let beside = if closure.findings.outliers.is_empty() { "" } else { ", outliers left out," };
-        return format!(
-            "Unexplained: the residual{beside} is {size} × the declared σ, and no structure is seen in it. {found}."
-        );
+        // What was interrupted has not looked everywhere.
+        let seen = if closure.interrupted { "" } else { ", and no structure is seen in it" };
+        return format!("Unexplained: the residual{beside} is {size} × the declared σ{seen}. {found}.");
     }
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
@@ -108,7 +106,7 @@ fn came_to(closure: &ClosedLoop) -> String {
                     counted(some, "pose")
                 ),
             },
-            nothing_below,
+            |ratio| nothing_below(ratio, closure.after.sigma_scale < 1.0),
         ),
         (Verdict::Explained, true) if kinds.named.is_empty() => {
             format!("{found}. With what is in the model, what is left looks like noise.")
@@ -144,11 +142,16 @@ fn found(closure: &ClosedLoop, kinds: &Kinds) -> String {
     }
 }
 
-/// That nothing was found where the residual is so many times the declared σ, fewer than chance makes it.
-fn nothing_below(ratio: f64) -> String {
-    let little = if ratio < OVERSTATED { ", and little could be" } else { "" };
+/// That nothing was found where the residual is so many times the declared σ, fewer than chance makes it; whether the fit took a smaller
+/// σ instead.
+fn nothing_below(ratio: f64, takes_less: bool) -> String {
+    let against = if takes_less {
+        ", which is too large; causes are weighed against what the fit leaves"
+    } else {
+        "; causes are weighed against that σ, and smaller ones may be missed"
+    };
     format!(
-        "Nothing found{little}: the residual is {} × the declared σ; causes are judged against that σ, and smaller ones may be missed.",
+        "Nothing found: the residual is {} × the declared σ{against}.",
         number(ratio, if ratio < 0.1 { 3 } else { 2 })
     )
 }
@@ -250,11 +253,8 @@ mod tests {
 
     #[test]
     fn an_overstated_sigma_is_said_with_its_number() {
-        let (near, far) = (nothing_below(0.94), nothing_below(0.012));
-        assert!(near.starts_with("Nothing found: the residual is 0.94 × the declared σ;"), "{near}");
-        assert!(
-            far.starts_with("Nothing found, and little could be: the residual is 0.012 × the declared σ;"),
-            "{far}"
-        );
+        let (near, far) = (nothing_below(0.94, false), nothing_below(0.012, true));
+        assert!(near.starts_with("Nothing found: the residual is 0.94 × the declared σ; causes are"), "{near}");
+        assert!(far.starts_with("Nothing found: the residual is 0.012 × the declared σ, which is too large;"), "{far}");
     }
 }

@@ -1,5 +1,6 @@
 //! `trace` and `loop` as users meet them: what they write, key by key, and that the closed problem is input again.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -207,7 +208,7 @@ fn what_keeps_the_loop_from_finding_is_said() {
     bench.edit("arm/problem.toml", |text| text.replace("\"*thermal*\" = { fixed = true }\n", ""));
     bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 50"));
     let told = bench.told(&["loop", "arm", "--out", "coarse"]);
-    assert!(told.contains("Nothing found, and little could be") && !told.contains("looks like noise"), "{told}");
+    assert!(told.contains("× the declared σ, which is too large;") && !told.contains("looks like noise"), "{told}");
     bench.edit("arm/problem.toml", |text| {
         let text = text.replace("[data]", "[data]\nreference_temperature_C = 20.0");
         format!("{text}\n[[effect]]\njoint-thermal-drift-lag = {{ joint = 1, time_constant_s = 600 }}\n")
@@ -219,6 +220,21 @@ fn what_keeps_the_loop_from_finding_is_said() {
     let refused = bench.run(&["predict", "arm", "--out", "untimed"]).code(2);
     assert!(text(&refused.get_output().stderr).contains("a column time_s"), "{refused}");
     assert!(!bench.path("untimed").exists());
+}
+
+#[test]
+fn a_declared_sigma_that_is_too_large_hides_no_cause() {
+    let bench = Bench::new(TWO);
+    let own = |json: &Value| -> BTreeSet<String> {
+        json["effects"].as_array().unwrap().iter().map(|own| own["effect"].to_string()).collect()
+    };
+    let expected = own(&bench.json(&["loop", "arm", "--out", "right"]));
+    bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 1.0"));
+    let json = bench.json(&["loop", "arm", "--out", "large"]);
+    assert_eq!((own(&json), &json["verdict"]), (expected, &"explained".into()));
+    let told = bench.told(&["loop", "arm", "--out", "told"]);
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("noise alone: 1. The declared σ is too large."), "{told}");
 }
 
 #[test]

@@ -91,6 +91,13 @@ fn sizes_that_no_arm_has_are_said() {
     // A column of one's own that nobody named.
     let words = said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,humidity\n1,2,3,4,5,40\n");
     assert!(words.contains("column humidity") && words.contains("[data.covariates]"), "{words}");
+    let warm = |of: f64| {
+        said(&arm(""), &format!("q1_deg,q2_deg,x_m,y_m,z_m,temperature_C\n1,2,3,4,5,{}\n1,3,3,4,5,{of}\n", of + 3.0))
+    };
+    assert!(
+        warm(293.0).contains("rows.csv:3: temperature_C: all temperatures are 293 °C or more; if these are kelvins")
+    );
+    assert_eq!(warm(20.0), "");
 }
 
 #[test]

@@ -27,7 +27,8 @@ pub(super) fn blocks(
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }
-    let is_declared = fitted.found.noise == Noise::Declared;
+    // A declared σ that the residual contradicts as too large is no bound: the scatter about the fit is the σ, as where none is declared.
+    let holds = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
     let unless_stopped = |some: &[&Candidate]| {
         (!data.stop.is_requested()).then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
     };
@@ -40,8 +41,8 @@ pub(super) fn blocks(
         + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
     let noise = marginal::Noise {
         freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
-        trust: if is_declared { data.rules.trust_declared } else { data.rules.trust_estimated },
-        least: if is_declared { -fitted.found.sigma_scale.ln() } else { f64::NEG_INFINITY },
+        trust: if holds { data.rules.trust_declared } else { data.rules.trust_estimated },
+        least: if holds { 0.0 } else { f64::NEG_INFINITY },
     };
     let alike = (data.rules.of_a_kind.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
     let target = Target { fit: neighbourhood, noise, alike, stop: data.stop.clone() };

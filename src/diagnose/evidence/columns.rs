@@ -280,8 +280,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Smooth functions of one covariate at some columns that belong together: any, which changes over some length, and of what is no
     /// command, direction of approach or load a straight line, unless that is a law.
     fn smooth(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], of: &Known, lengths: &[f64]) {
-        let (part, depends_on) = (Part::of(slot), vec![of.covariate.clone()]);
-        let hypothesis = Hypothesis { law: Law::Smooth, part, slot: Some(slot), depends_on };
+        let hypothesis = Hypothesis::smooth(slot, vec![of.covariate.clone()]);
         let [warped, line] = [lengths.len(), lengths.len() + 1];
         // Of few values the longest alone.
         let told = match of.levels {
@@ -323,23 +322,23 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn scaled_by(&mut self, slot: Slot, at: &DVector<f64>, known: &[Known]) {
         let Slot::Joint { joint, .. } = slot else { return };
         let Some(own) = known.iter().find(|own| own.covariate == Covariate::Command(joint)) else { return };
-        let is_size = |of: &&Known| {
-            use Covariate::{Hoist, Own, Payload, Temperature};
-            matches!(of.covariate, Temperature | Payload | Hoist | Own(_))
-        };
-        for size in known.iter().filter(is_size) {
-            let (part, depends_on) = (Part::of(slot), vec![own.covariate.clone(), size.covariate.clone()]);
-            let hypothesis = Hypothesis { law: Law::Smooth, part, slot: Some(slot), depends_on };
-            let length = self.rules.slow_length;
-            self.add("growing", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, &size.scaled, length)));
+        for size in known {
+            let zero = match size.covariate {
+                Covariate::Temperature => self.problem.data.reference_temperature,
+                Covariate::Payload | Covariate::Hoist => Some(0.0),
+                Covariate::Own(_) => None,
+                _ => continue,
+            };
+            let depends_on = vec![own.covariate.clone(), size.covariate.clone()];
+            let (hypothesis, length) = (Hypothesis::smooth(slot, depends_on), self.rules.slow_length);
+            self.add("growing", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, size, zero, length)));
         }
     }
 
     fn surface(&mut self, family: &str, slot: Slot, at: &[&DVector<f64>], (one, other): (&Known, &Known)) {
         let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
-        let hypothesis = Hypothesis { law: Law::Smooth, part: Part::of(slot), slot: Some(slot), depends_on };
-        let length = self.rules.surface_length;
+        let (hypothesis, length) = (Hypothesis::smooth(slot, depends_on), self.rules.surface_length);
         self.add(family, 1.0, hypothesis, || times(at, &products_of(&[&one.scaled, &other.scaled], length)));
     }
 

@@ -140,11 +140,16 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
-/// Functions of one covariate that change evenly with another: those of the basis, and each times the other from its middle.
-pub(super) fn growing(scaled: &[f64], size: &[f64], length: f64) -> DMatrix<f64> {
+/// Functions of one covariate that change evenly with the size of another: those of the basis times that size; where its zero is not
+/// known, beside those of the basis.
+pub(super) fn growing(scaled: &[f64], size: &Known, zero: Option<f64>, length: f64) -> DMatrix<f64> {
     let plain = basis(scaled, length);
-    let k = plain.ncols();
-    DMatrix::from_fn(plain.nrows(), 2 * k, |row, j| plain[(row, j % k)] * if j < k { 1.0 } else { size[row] - 0.5 })
+    let (low, high) = size.range;
+    let (from, kept) = (zero.unwrap_or(0.5 * (low + high)), if zero.is_some() { 0 } else { plain.ncols() });
+    let size = |row: usize| (size.values[row].clamp(low, high) - from) / (high - low);
+    DMatrix::from_fn(plain.nrows(), kept + plain.ncols(), |row, j| {
+        if j < kept { plain[(row, j)] } else { plain[(row, j - kept)] * size(row) }
+    })
 }
 
 /// Products of cosines, one of each covariate.

@@ -123,6 +123,11 @@ impl Hypothesis {
         Self { law: Law::Effect(effect.clone()), part, slot: None, depends_on }
     }
 
+    /// A smooth function of some covariates at a place.
+    pub(super) fn smooth(slot: Slot, depends_on: Vec<Covariate>) -> Self {
+        Self { law: Law::Smooth, part: Part::of(slot), slot: Some(slot), depends_on }
+    }
+
     /// Whether another says the same: the same law at the same part, of the same covariates.
     pub fn says(&self, other: &Self) -> bool {
         self.law == other.law && self.part == other.part && self.depends_on == other.depends_on
