@@ -368,6 +368,28 @@ fn waves_are_named_with_their_orders_and_whole_numbers_are_harmonics() {
 }
 
 #[test]
+fn the_lead_of_a_screw_is_found() {
+    let gantry = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/gantry");
+    let problem = Problem::read(&gantry.join("problem.toml")).unwrap();
+    let truth = fs::read_to_string(gantry.join("TRUTH.toml")).unwrap();
+    let scale = truth.find("[[effect]]").unwrap()..truth.find("[noise]").unwrap();
+    for (joint, lead) in [(3, 0.005), (4, 0.01)] {
+        let order = std::f64::consts::TAU / lead;
+        let wave =
+            format!("[[effect]]\njoint-wave = {{ joint = {joint}, order = {order} }}\nsin_mm = 0.1\ncos_mm = 0.07\n");
+        let truth =
+            Truth::parse(&truth.replace(&truth[scale.clone()], &wave), Path::new("TRUTH.toml"), &problem).unwrap();
+        let rows = simulate(&problem, &truth, 80, 4).unwrap().rows;
+        let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+        let evidence =
+            trace(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap().evidence.unwrap();
+        assert_eq!(stated(&evidence), ["joint-wave"], "{:?}", evidence.best());
+        let Some(&Effect::JointWave { joint: own, order: found }) = evidence.best()[0].effect() else { panic!() };
+        assert!(own == joint && (found / order - 1.0).abs() < 1e-3, "{joint} {order}: {own} {found}");
+    }
+}
+
+#[test]
 fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&cases.join("problem.toml")).unwrap();

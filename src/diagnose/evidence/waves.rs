@@ -8,6 +8,9 @@
 //!
 //! with the chance of all orders in a unit together, that harmonics are beside it. So where data cannot tell an order from a whole number the
 //! harmonic is the more probable one, by as much as it is the more common and no surer.
+//!
+//! A joint that slides errs with its screw or rack: sin kq with q in m, of order k = 2π/lead. So short a wave looks like noise to every
+//! function that another hypothesis could be, so that it is looked for beside every explanation.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -25,7 +28,7 @@ use crate::diagnose::covariate::Covariate;
 use crate::diagnose::fitted::Fitted;
 use crate::diagnose::rules::SelectionRules;
 use crate::model::effect::HIGHEST_ORDER;
-use crate::model::parameter::{JointField, Slot, holds_all, refuses};
+use crate::model::parameter::{Slot, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
 
 /// Probability of an explanation from which on waves are looked for in the place of its functions.
@@ -38,21 +41,22 @@ const STEPS: [f64; 2] = [1.0, 0.02];
 const LOOKED_AT: usize = 3;
 /// Orders that a row has at most: of a joint that turns four times and more in the data the highest are not looked for.
 const MOST_ORDERS: usize = 8000;
+/// The shortest lead of a screw that is looked for \[m\].
+const SHORTEST_LEAD: f64 = 0.002;
 /// Of orders further and further from one over which its likelihood is integrated, each step over that before it.
 const WIDER: f64 = 1.3;
 
 /// The joint, from 0, at which a hypothesis is a function of that joint's own command, or of nothing that is known.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Part::Joint(joint) = of.part else { return None };
-    let turns = problem.joints[joint].commanded() == JointKind::Revolute;
-    let at_coordinate = of.slot == Some(Slot::Joint { joint, field: JointField::Theta });
+    let at_coordinate = of.slot == Some(Slot::coordinate(problem, joint + 1));
     let is_own = match &of.law {
         Law::Effect(Effect::JointHarmonic { .. } | Effect::JointWave { .. }) => true,
         Law::Smooth | Law::NearHarmonic(_) => at_coordinate && of.depends_on == [Covariate::Command(joint)],
         Law::PerPose => at_coordinate,
         _ => false,
     };
-    (turns && is_own).then_some(joint)
+    is_own.then_some(joint)
 }
 
 /// Whether the rules of the problem let an effect be looked for.
@@ -83,16 +87,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let mut found: Vec<Candidate> = Vec::new();
         for (joint, rests) in self.places(weighted) {
             let Some((low, high)) = self.range(joint) else { continue };
-            if !is_free(
-                &Effect::JointWave { joint: joint + 1, order: self.products.rules.wave_orders },
-                &self.fitted.problem,
-            ) {
+            let (slides, highest) = (self.slides(joint), self.highest(joint));
+            if !is_free(&Effect::JointWave { joint: joint + 1, order: highest }, &self.fitted.problem) {
                 continue;
             }
             let left: Vec<Left> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
             let [step, finer] = STEPS.map(|phase| phase / (high - low));
             // A wave of which less than one cycle is seen is none.
-            let first = self.gains(joint, &row(TAU / (high - low), self.products.rules.wave_orders, step), &left);
+            let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
@@ -104,9 +106,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 for (order, _) in first.into_iter().take(LOOKED_AT) {
                     let near = row(order - step, order + step, finer);
                     second.extend(near.into_iter().map(|order| written(order, digits)));
-                    second.extend([order.floor(), order.ceil()]);
+                    if !slides {
+                        second.extend([order.floor(), order.ceil()]);
+                    }
                 }
-                second.retain(|order| (TAU / (high - low)..=self.products.rules.wave_orders).contains(order));
+                second.retain(|order| (TAU / (high - low)..=highest).contains(order));
                 second.sort_by(f64::total_cmp);
                 second.dedup();
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
@@ -138,16 +142,36 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         left_by(rest, self.products)
     }
 
-    /// Least and greatest command of a joint \[rad\].
+    /// Whether a joint slides.
+    fn slides(&self, joint: usize) -> bool {
+        self.fitted.problem.joints[joint].commanded() == JointKind::Prismatic
+    }
+
+    /// The highest order of a wave of a joint that is looked for; of one that slides \[rad/m\].
+    fn highest(&self, joint: usize) -> f64 {
+        if self.slides(joint) { TAU / SHORTEST_LEAD } else { self.products.rules.wave_orders }
+    }
+
+    /// Least and greatest command of a joint \[rad\], \[m\].
     fn range(&self, joint: usize) -> Option<(f64, f64)> {
         self.hypotheses.known(&Covariate::Command(joint)).map(|own| own.range)
     }
 
-    /// For joints, from 0, the sets in which a wave may stand: explanations without one function of the joint's command, and without any.
+    /// For joints, from 0, the sets in which a wave may stand: explanations without one function of the joint's command, and without any;
+    /// of joints that slide each explanation, too.
     fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| own_function(&self.hypotheses.all[member].hypothesis, &self.fitted.problem);
+        let sliding: Vec<usize> = (0..self.fitted.problem.joints.len()).filter(|&joint| self.slides(joint)).collect();
         for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
+            let mut whole = set.members.clone();
+            whole.sort_unstable();
+            for &joint in &sliding {
+                let own = all.entry(joint).or_default();
+                if !own.contains(&whole) && own.len() < MOST {
+                    own.push(whole.clone());
+                }
+            }
             for &member in &set.members {
                 let Some(joint) = of(member) else { continue };
                 let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> {
@@ -200,13 +224,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let near = gains.iter().take_while(|(_, gain)| *gain > most - self.products.rules.another_order);
             near.map(|(order, _)| *order)
         };
-        let joint = joint + 1;
+        let (joint, slides) = (joint + 1, self.slides(joint));
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number up to the highest")]
         let harmonic = |order: f64| Effect::JointHarmonic { joint, orders: vec![order as u32] };
-        let is_beyond = |order: &f64| order.fract() == 0.0 && *order > f64::from(HIGHEST_ORDER);
+        let is_whole = |order: f64| !slides && order.fract() == 0.0;
+        let is_beyond = |order: &f64| is_whole(*order) && *order > f64::from(HIGHEST_ORDER);
         let mut all: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
         if !as_good().any(|order| taken.contains(&order)) {
-            let wave = gains.iter().find(|(order, _)| order.fract() != 0.0);
+            let wave = gains.iter().find(|(order, _)| !is_whole(*order));
             all.extend(wave.map(|&(order, _)| Effect::JointWave { joint, order }));
         }
         all
@@ -218,7 +243,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let range = high - low;
         let away = std::iter::successors(Some(STEPS[1]), |phase| Some(phase * WIDER)).take_while(|phase| *phase < PI);
         let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
-        let is_looked_for = |order: &f64| (TAU / range..=self.products.rules.wave_orders).contains(order);
+        let is_looked_for = |order: &f64| (TAU / range..=self.highest(joint)).contains(order);
         let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
@@ -244,7 +269,7 @@ impl Hypotheses<'_> {
             other => order_of(other)?,
         };
         let known = self.known(&Covariate::Command(joint))?;
-        let at = self.linearised.place(Slot::Joint { joint, field: JointField::Theta })?;
+        let at = self.linearised.place(Slot::coordinate(how.0, joint + 1))?;
         let waves = DMatrix::from_fn(known.values.len(), 2, |row, k| {
             let (sin, cos) = (order * known.values[row]).sin_cos();
             if k == 0 { sin } else { cos }
