@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::noise_model::by_chance;
-use crate::model::parameter::{JointField, Parameter, Slot};
+use crate::model::parameter::{Driver, JointField, Parameter, Slot};
 use crate::quantity::Unit;
 
 /// Fewest parameters of a kind that say how large they are.
@@ -59,8 +59,9 @@ pub(super) fn prior_sizes(unknowns: &[&Parameter], x: &[f64], covariance: &DMatr
         .iter()
         .enumerate()
         .filter_map(|(k, own)| match (own.slot, own.sigma) {
-            (Slot::Joint { field, .. }, Some(sigma)) if field.is_geometry() && covariance[(k, k)] > 0.0 => {
-                Some((k, field, sigma))
+            // What a driver drives is an effect's, not the geometry's.
+            (Slot::Joint { field, .. }, Some(sigma)) if field.is_geometry() && own.driver == Driver::Constant => {
+                (covariance[(k, k)] > 0.0).then_some((k, field, sigma))
             }
             _ => None,
         })
@@ -160,10 +161,9 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Driver;
     use crate::random::{normal, stream};
 
-    /// Five joints whose angles deviate by about `size` and are seen to 1 % of it.
+    /// Eight joints whose angles deviate by about `size` and are seen to 1 % of it.
     fn found(size: f64, declared: f64) -> Vec<PriorSize> {
         let mut random = stream(7, 0);
         let parameter = |joint, field: JointField| Parameter {

@@ -164,7 +164,7 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
         (&only.law, only.part, only.depends_on.as_slice()),
         (&Law::Wandering, Part::Measurement, &[Covariate::Time][..])
     );
-    assert!(evidence.claims(only).law.1 >= STATED);
+    assert!(evidence.probability(|own| own.law == Law::Wandering) >= STATED);
 }
 
 /// The arm with the masses of its links, or without.

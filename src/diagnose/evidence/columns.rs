@@ -318,19 +318,15 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Functions of a joint's own command that grow evenly with what is no command: a gear or a scale that warms, a payload held out.
+    /// Functions of a joint's own command that grow evenly, from zero, with what is no command: a gear or a scale that warms, a payload held
+    /// out. Where that hardly varies they are functions of the command alone, and are not looked for.
     fn scaled_by(&mut self, slot: Slot, at: &DVector<f64>, known: &[Known]) {
         let Slot::Joint { joint, .. } = slot else { return };
         let Some(own) = known.iter().find(|own| own.covariate == Covariate::Command(joint)) else { return };
-        for size in known {
-            let zero = match size.covariate {
-                Covariate::Temperature => self.problem.data.reference_temperature,
-                Covariate::Payload | Covariate::Hoist => Some(0.0),
-                Covariate::Own(_) => None,
-                _ => continue,
-            };
-            let depends_on = vec![own.covariate.clone(), size.covariate.clone()];
-            let (hypothesis, length) = (Hypothesis::smooth(slot, depends_on), self.rules.slow_length);
+        let reference = self.problem.data.reference_temperature;
+        for size in known.iter().filter(|of| of.is_size(reference)) {
+            let (zero, length) = (size.zero(reference), self.rules.slow_length);
+            let hypothesis = Hypothesis::smooth(slot, vec![own.covariate.clone(), size.covariate.clone()]);
             self.add("growing", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, size, zero, length)));
         }
     }

@@ -71,6 +71,23 @@ pub(super) struct Known {
 }
 
 impl Known {
+    /// Where its size is zero, if that is known; a temperature counts from `reference` \[°C\].
+    pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
+        match self.covariate {
+            Covariate::Temperature => reference,
+            Covariate::Payload | Covariate::Hoist => Some(0.0),
+            _ => None,
+        }
+    }
+
+    /// Whether functions of a command may grow with its size: it varies by half its largest size, where its zero is known.
+    pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
+        use Covariate::{Hoist, Own, Payload, Temperature};
+        let (low, high) = self.range;
+        let varies = |zero: f64| 2.0 * (high - low) >= (high - zero).abs().max((low - zero).abs());
+        matches!(self.covariate, Temperature | Payload | Hoist | Own(_)) && self.zero(reference).is_none_or(varies)
+    }
+
     /// A covariate that varies over the first `weighed` poses.
     pub fn of(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
         let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
@@ -194,6 +211,15 @@ mod tests {
             }
         }
         assert!(rough_basis(&scaled, 0.025, 60).is_none(), "that would be the noise itself");
+    }
+
+    #[test]
+    fn what_hardly_varies_from_its_zero_is_no_size_to_grow_with() {
+        let known = |values: &[f64]| Known::of(Covariate::Temperature, values.to_vec(), values.len()).unwrap();
+        assert!(known(&[17.0, 20.0, 31.0]).is_size(Some(20.0)) && known(&[29.5, 30.5]).is_size(None));
+        assert!(!known(&[29.5, 30.5]).is_size(Some(20.0)));
+        let grown = growing(&[0.0, 0.5], &known(&[20.0, 31.0]), Some(20.0), 0.5);
+        assert!(grown.row(0).iter().all(|own| *own == 0.0) && grown.row(1).iter().any(|own| *own != 0.0), "{grown}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! All explanations of a residual with their probabilities, and what may be claimed by them.
 
 use super::explanation::Explanation;
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::{Hypothesis, Law, Part};
 use crate::diagnose::covariate::Covariate;
 use crate::problem::Effect;
 
@@ -169,8 +169,8 @@ impl Evidence {
         let depends_on = self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
-            // Functions without a law, smooth or not, say the same of the law.
-            let has_one = of.effect().is_some() || of.is_limit();
+            // Functions without a law, smooth or not, say the same of the law; sag under weight that nobody declared does not.
+            let has_one = of.effect().is_some() || of.is_limit() || of.law == Law::Sag;
             let is_it = |other: &&Hypothesis| {
                 if has_one { other.law.is_of(&of.law) && other.part == of.part } else { unknown(other) }
             };
@@ -190,7 +190,6 @@ impl Evidence {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hypothesis::Law;
     use super::*;
 
     #[test]
