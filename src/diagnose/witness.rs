@@ -1,16 +1,20 @@
 //! What data that took no part in the fit say of an effect: fixed points that were measured again.
 //!
-//! An instrument that moved by d f(t) moves a fixed point with it: z = p + d f(t) + noise of σ, its true place p unknown. All readings
-//! together say d = r ± 1/√b of each coordinate, with r = a/b, a = Σ (f − f̄)(z − z̄)/σ² and b = Σ (f − f̄)²/σ². What the loop found, d̂ with its
-//! covariance C, is held against no motion by twice the logarithm of the ratio of both marginal likelihoods,
+//! An instrument that moved by d f(t) and turned by ω f(t) moves a fixed point p with it: z = p + (d + ω × p) f(t) + noise of σ, the true
+//! place unknown and p near it. With θ = (d, ω), or d alone, B = [1  −p×] and what readings of a point say once its place is taken out,
 //!
-//! b |r|² − (r − d̂)ᵀ (C + 1/b)⁻¹ (r − d̂) − ln det(1 + b C),
+//! v = Bᵀ Σ (f − f̄)(z − z̄)/σ²,   M = BᵀB Σ (f − f̄)²/σ²,
+//!
+//! summed over the points, ln p(readings | θ) = θᵀv − θᵀMθ/2 but for a constant. What the loop found, θ̂ with its covariance C = L Lᵀ, is held
+//! against no motion by twice the logarithm of the ratio of both marginal likelihoods: with g = Lᵀ(v − M θ̂) and K = 1 + LᵀM L,
+//!
+//! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K,
 //!
 //! which decides where the odds are 100 to 1 either way.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
 use super::fitted::Fitted;
@@ -48,8 +52,8 @@ struct Reading {
     weight: f64,
 }
 
-/// Σ w (f − f̄)(z − z̄) and b = Σ w (f − f̄)² of one point, its own place taken out.
-fn told(readings: &[Reading]) -> (Vector3<f64>, f64) {
+/// v and M of one point for so many parameters: d, or d and ω.
+fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
     let all: f64 = readings.iter().map(|own| own.weight).sum();
     let place = readings.iter().map(|own| own.seen * own.weight).sum::<Vector3<f64>>() / all;
     let moved = readings.iter().map(|own| own.moved * own.weight).sum::<f64>() / all;
@@ -57,18 +61,27 @@ fn told(readings: &[Reading]) -> (Vector3<f64>, f64) {
         let f = own.moved - moved;
         ((own.seen - place) * (own.weight * f), own.weight * f * f)
     };
-    readings.iter().map(one).fold((Vector3::zeros(), 0.0), |a, b| (a.0 + b.0, a.1 + b.1))
+    let (sum, certainty) =
+        readings.iter().map(one).fold((Vector3::zeros(), 0.0), |a: (Vector3<f64>, f64), b| (a.0 + b.0, a.1 + b.1));
+    let turned = -place.cross_matrix();
+    let moves = DMatrix::from_fn(3, parameters, |i, j| if j < 3 { f64::from(i == j) } else { turned[(i, j - 3)] });
+    (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
 }
 
-/// Twice the logarithm of the odds of d ∼ N(d̂, C) against d = 0; `None` where no point was read at different f.
-fn odds(found: &Vector3<f64>, spread: &Matrix3<f64>, told: &Vector3<f64>, certainty: f64) -> Option<f64> {
-    if certainty <= 0.0 {
+/// Twice the logarithm of the odds of θ ∼ N(θ̂, C) against θ = 0; `None` where no point was read at different f.
+fn odds(found: &DVector<f64>, spread: &DMatrix<f64>, (told, certainty): (&DVector<f64>, &DMatrix<f64>)) -> Option<f64> {
+    if certainty.trace() <= 0.0 {
         return None;
     }
-    let read = told / certainty;
-    let expected = (spread * certainty + Matrix3::identity()).cholesky()?;
-    let off = read - found;
-    Some(certainty * (read.norm_squared() - off.dot(&expected.solve(&off))) - expected.determinant().ln())
+    // Of what is all but certain a combination may have next to no variance.
+    let eigen = spread.clone().symmetric_eigen();
+    let mut root = eigen.eigenvectors;
+    root.column_iter_mut().zip(&eigen.eigenvalues).for_each(|(mut own, value)| own *= value.max(0.0).sqrt());
+    let known = certainty * found;
+    let left = root.tr_mul(&(told - &known));
+    let inner = (root.tr_mul(&(certainty * &root)) + DMatrix::identity(root.ncols(), root.ncols())).cholesky()?;
+    let ln_determinant = 2.0 * inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+    Some(2.0 * found.dot(told) - found.dot(&known) + left.dot(&inner.solve(&left)) - ln_determinant)
 }
 
 /// What readings of fixed points say of an effect of the instrument; `None` for other effects, and where they do not decide.
@@ -83,17 +96,19 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
             measurements.time.first()? + reading.after as f64 - 0.5
         };
         match effect {
-            Effect::StationShift { at_time } => Some(f64::from(time >= *at_time)),
+            Effect::StationShift { at_time } | Effect::StationMove { at_time } => Some(f64::from(time >= *at_time)),
             Effect::TrackerDrift => Some(time - first),
             Effect::TrackerSettling { time_constant } => Some(1.0 - ((first - time) / time_constant).exp()),
             _ => None,
         }
     };
-    let parameters = fitted.parameters_of(effect);
-    let [x, y, z] = parameters.as_slice() else { return None };
-    let strength = Vector3::new(fitted.found.x[*x], fitted.found.x[*y], fitted.found.x[*z]);
-    let places = [*x, *y, *z];
-    let spread = Matrix3::from_fn(|i, j| fitted.found.covariance.of(places[i], places[j]).unwrap_or(0.0));
+    let places = fitted.parameters_of(effect);
+    let count = places.len();
+    if !matches!(count, 3 | 6) {
+        return None;
+    }
+    let found = DVector::from_fn(count, |i, _| fitted.found.x[places[i]]);
+    let spread = DMatrix::from_fn(count, count, |i, j| fitted.found.covariance.of(places[i], places[j]).unwrap_or(0.0));
     // A session has a place of its own for the instrument.
     let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
     for reading in &measurements.nests {
@@ -101,9 +116,9 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
         let own = Reading { seen: reading.position, moved: moves(reading)?, weight };
         points.entry((&reading.session, &reading.name)).or_default().push(own);
     }
-    let (told, certainty) =
-        points.values().map(|all| told(all)).fold((Vector3::zeros(), 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-    let gain = odds(&strength, &spread, &told, certainty)?;
+    let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
+    let (told, certainty) = points.values().map(|all| told(all, count)).fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
+    let gain = odds(&found, &spread, (&told, &certainty))?;
     let says = if gain > DECIDED {
         WitnessVerdict::Corroborated
     } else if gain < -DECIDED {
@@ -122,16 +137,48 @@ mod tests {
 
     #[test]
     fn readings_are_weighed_with_what_was_found_and_its_error() {
-        let found = Vector3::new(1.0, 0.0, 0.0);
-        let (sure, unsure) = (Matrix3::identity() * 1e-8, Matrix3::identity() * 0.09);
+        let found = DVector::from_column_slice(&[1.0, 0.0, 0.0]);
+        let identity = DMatrix::<f64>::identity(3, 3);
+        let (sure, unsure) = (&identity * 1e-8, &identity * 0.09);
+        let odds = |spread: &DMatrix<f64>, part: f64| {
+            let certainty = &identity * 1e4;
+            super::odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
+        };
         // Sharp readings of less than half of what was found with an error of 0.3: a motion all the same.
-        let read = |part: f64| found * part * 1e4;
-        assert!(odds(&found, &unsure, &read(0.45), 1e4).is_some_and(|odds| odds > 100.0));
-        assert!(odds(&found, &sure, &read(0.45), 1e4).is_some_and(|odds| odds < -100.0));
-        assert!(odds(&found, &sure, &read(1.0), 1e4).is_some_and(|odds| (odds - 1e4).abs() < 1.0));
+        assert!(odds(&unsure, 0.45) > 100.0);
+        assert!(odds(&sure, 0.45) < -100.0);
+        assert!((odds(&sure, 1.0) - 1e4).abs() < 1.0);
         // Twice ln of N(0; 1, 0.09 + 1e-4) of each coordinate over that of N(0; 0, 1e-4), by hand.
         let expected = -1.0 / 0.0901 - 3.0 * (901.0_f64).ln();
-        assert!(odds(&found, &unsure, &read(0.0), 1e4).is_some_and(|odds| (odds - expected).abs() < 1e-6));
-        assert_eq!(odds(&found, &unsure, &Vector3::zeros(), 0.0), None);
+        assert!((odds(&unsure, 0.0) - expected).abs() < 1e-6);
+        assert_eq!(super::odds(&found, &unsure, (&DVector::zeros(3), &DMatrix::zeros(3, 3))), None);
+    }
+
+    #[test]
+    fn points_that_turn_about_the_origin_tell_a_turn_from_a_shift() {
+        let places = [Vector3::new(2.0, 0.5, -1.0), Vector3::new(-1.0, 3.0, 0.2), Vector3::new(0.5, -2.0, 1.5)];
+        let (moved, turned) = (Vector3::new(1e-3, -2e-3, 5e-4), Vector3::new(4e-4, 1e-4, -3e-4));
+        let all = |turn: f64| {
+            let of = |place: &Vector3<f64>| {
+                let at = |f: f64| {
+                    let seen = place + (moved + turned.cross(place) * turn) * f;
+                    Reading { seen, moved: f, weight: 1e12 }
+                };
+                told(&[at(0.0), at(1.0), at(1.0)], 6)
+            };
+            let sum = |a: (DVector<f64>, DMatrix<f64>), b: (DVector<f64>, DMatrix<f64>)| (a.0 + b.0, a.1 + b.1);
+            places.iter().map(of).reduce(sum).unwrap()
+        };
+        let found = DVector::from_iterator(6, moved.iter().chain(&turned).copied());
+        let spread = DMatrix::identity(6, 6) * 1e-12;
+        let odds = |turn: f64| {
+            let (told, certainty) = all(turn);
+            super::odds(&found, &spread, (&told, &certainty)).unwrap()
+        };
+        // The places that were seen are off by the motion itself: next to nothing of what they tell.
+        let (told, certainty) = all(1.0);
+        let read = certainty.cholesky().unwrap().solve(&told);
+        assert!((read - &found).norm() < 1e-3 * found.norm());
+        assert!(odds(1.0) > 1e5 && odds(-2.0) < odds(1.0) - 1e4, "{} {}", odds(1.0), odds(-2.0));
     }
 }

@@ -224,13 +224,8 @@ impl Effect {
 
     /// Whether it follows time, or the order of the poses, rather than what poses can be chosen for.
     pub fn follows_time(&self) -> bool {
-        let measured = matches!(self, Self::TrackerDrift | Self::TrackerSettling { .. });
-        measured || self.steps() || self.has_memory()
-    }
-
-    /// Whether what measures moves at once.
-    pub fn steps(&self) -> bool {
-        matches!(self, Self::StationShift { .. } | Self::StationMove { .. })
+        let moves = matches!(self, Self::StationShift { .. } | Self::StationMove { .. });
+        moves || matches!(self, Self::TrackerDrift | Self::TrackerSettling { .. }) || self.has_memory()
     }
 
     /// Whether it depends on the poses before.

@@ -225,7 +225,8 @@ pub(super) fn claimed(claims: &Claims) -> String {
     let law = match claims.law.0.effect() {
         Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
         None if claims.law.0.law == Law::Wandering => {
-            "no law: it wanders, as noise does in which one reading follows the last".to_owned()
+            let sure = percent(claims.law.1);
+            format!("no law: it wanders {sure}, as noise does in which one reading follows the last")
         }
         None => "its law is not known".to_owned(),
     };

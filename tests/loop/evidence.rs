@@ -12,7 +12,7 @@ use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
 use flexcal::simulate::{Truth, simulate};
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -337,6 +337,57 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     for (own, truth) in found.estimates.iter().zip(truth) {
         assert!((own.estimate - truth).abs() < 4.0 * own.std_error.unwrap(), "{own:?} {truth}");
     }
+    // Three fixed points that moved and turned with it say so, and such that stayed where they were say that it did not.
+    let turn = Rotation3::new(Vector3::from(turn.map(f64::to_radians)));
+    for (moves, says) in [(true, WitnessVerdict::Corroborated), (false, WitnessVerdict::Contradicted)] {
+        let mut data = data.clone();
+        for (name, place) in [("door", [3.0, 0.5, 1.0]), ("floor", [-1.0, 2.0, 0.0]), ("wall", [0.5, -3.0, 2.0])] {
+            for (time, has_moved) in [(at_time - 900.0, false), (at_time + 900.0, moves)] {
+                let place = Vector3::from(place);
+                let moved = turn * place + Vector3::from(shift) * 1e-3;
+                data.measurements.nests.push(NestReading {
+                    sigma: None,
+                    origin: (0, 2),
+                    name: name.to_owned(),
+                    position: if has_moved { moved } else { place },
+                    time: Some(time),
+                    after: 0,
+                    session: String::new(),
+                });
+            }
+        }
+        let closure = close(&problem, &data, &Options::default()).unwrap();
+        let found = closure.effects.iter().find(|found| found.effect.name() == "station-move").unwrap();
+        assert_eq!(found.witness.as_ref().map(|witness| witness.says), Some(says));
+    }
+}
+
+#[test]
+fn a_function_of_a_command_that_grows_with_temperature_is_located() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let problem = Problem::read(&cases.join("problem.toml")).unwrap();
+    let reference = problem.data.reference_temperature.unwrap();
+    let text = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let plain = text.split("[[effect]]").next().unwrap();
+    let wave = format!(
+        "{plain}\n[[effect]]\njoint-harmonic = {{ joint = 2, orders = [3] }}\nsin3_deg = 0.03\ncos3_deg = 0.01\n"
+    );
+    let [rows, bent] = [plain, wave.as_str()].map(|text| {
+        let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
+        table(&simulate(&problem, &truth, 90, 11).unwrap().rows)
+    });
+    let mut measured = rows.clone();
+    let temperatures = rows.temperature.as_ref().unwrap();
+    for (k, position) in measured.positions.iter_mut().enumerate() {
+        *position += (bent.positions[k] - rows.positions[k]) * ((temperatures[k] - reference) / 10.0);
+    }
+    let split = Split { identification: (0..90).collect(), held_out: Vec::new() };
+    let evidence = trace(&problem, &Dataset::new(measured, split), &Options::default()).unwrap().evidence.unwrap();
+    let [own] = evidence.best() else { panic!("{:?}", evidence.best()) };
+    let on = [Covariate::Command(1), Covariate::Temperature];
+    assert_eq!((own.part, own.depends_on.as_slice()), (Part::Joint(1), &on[..]), "{own:?}");
+    assert!(evidence.claims(own).depends_on.1 >= STATED, "{:?}", evidence.claims(own));
+    assert_eq!(stated(&evidence), Vec::<String>::new());
 }
 
 #[test]

@@ -327,7 +327,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         for size in known.iter().filter(|of| of.is_size(reference)) {
             let (zero, length) = (size.zero(reference), self.rules.slow_length);
             let hypothesis = Hypothesis::smooth(slot, vec![own.covariate.clone(), size.covariate.clone()]);
-            self.add("growing", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, size, zero, length)));
+            self.add("surface", 1.0, hypothesis, || times(&[at], &growing(&own.scaled, size, zero, length)));
         }
     }
 
@@ -408,7 +408,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let hypothesis = Hypothesis { law: Law::Wandering, part, slot: Some(slot), depends_on };
         for (variant, &length) in self.rules.rough_lengths.iter().enumerate() {
             if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
-                self.add_variant("wandering", &hypothesis, variant, || times(at, &basis));
+                self.add_variant("smooth in the measurement", &hypothesis, variant, || times(at, &basis));
             }
         }
     }

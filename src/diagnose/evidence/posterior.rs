@@ -169,8 +169,8 @@ impl Evidence {
         let depends_on = self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
         let has_law = |explanation: &&Explanation| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
-            // Functions without a law, smooth or not, say the same of the law; sag under weight that nobody declared does not.
-            let has_one = of.effect().is_some() || of.is_limit() || of.law == Law::Sag;
+            // Functions without a law, smooth or not, say the same of the law; what wanders or sags under weight that nobody declared does not.
+            let has_one = of.effect().is_some() || of.is_limit() || matches!(of.law, Law::Sag | Law::Wandering);
             let is_it = |other: &&Hypothesis| {
                 if has_one { other.law.is_of(&of.law) && other.part == of.part } else { unknown(other) }
             };
