@@ -165,6 +165,19 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
         (&Law::Wandering, Part::Measurement, &[Covariate::Time][..])
     );
     assert!(evidence.probability(|own| own.law == Law::Wandering) >= STATED);
+    // A drift that goes to and fro once in all is smooth: it does not wander.
+    let (mut data, _) = Dataset::read_files(&[cases.join("h-none-large.csv")], &problem).unwrap();
+    let last = data.measurements.time.iter().copied().fold(0.0, f64::max);
+    for (position, time) in data.measurements.positions.iter_mut().zip(&data.measurements.time) {
+        *position += Vector3::new(1.0, -0.5, 0.7) * (1e-4 * (7.0 * time / last).sin());
+    }
+    let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
+    let [only] = evidence.best() else { panic!("{:?}", evidence.best()) };
+    assert_eq!(
+        (&only.law, only.part, only.depends_on.as_slice()),
+        (&Law::Smooth, Part::Measurement, &[Covariate::Time][..])
+    );
+    assert!(evidence.probability(|own| own.law == Law::Wandering) < 1.0 - STATED);
 }
 
 /// The arm with the masses of its links, or without.
