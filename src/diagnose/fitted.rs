@@ -1,6 +1,6 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -35,6 +35,8 @@ pub(super) struct Fitted {
     pub sigma: f64,
     /// Rows that take no part in the choice of effects: outliers.
     pub set_aside: Vec<usize>,
+    /// The linear neighbourhood at the identification rows, once it was asked for.
+    around: OnceLock<Arc<LinearNeighbourhood>>,
 }
 
 impl Fitted {
@@ -66,7 +68,8 @@ impl Fitted {
             }
         };
         let outliers_of_fit: Vec<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
-        let mut fitted = Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new() };
+        let mut fitted =
+            Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new(), around: OnceLock::new() };
         // Rounds on many poses fit too often to look for them.
         let looks = fitted.problem.robust.is_none() && data.is_led();
         fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
@@ -157,6 +160,21 @@ impl Fitted {
     /// The fit in its linear neighbourhood.
     pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
         self.neighbourhood_with(linearised, &[], None)
+    }
+
+    /// The same at the identification rows, made once.
+    pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
+        if let Some(known) = self.around.get() {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
+        Arc::clone(self.around.get_or_init(|| new))
+    }
+
+    /// The same fit, in which every row counts.
+    pub fn with_all_rows(&self) -> Self {
+        let (set_aside, around) = (Vec::new(), OnceLock::new());
+        if self.set_aside.is_empty() { self.clone() } else { Self { set_aside, around, ..self.clone() } }
     }
 
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.

@@ -116,11 +116,8 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
 /// nothing worth stating.
 fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hypothesis) -> Option<Correction> {
     // The peak of what is narrow may have been set aside; poses that are left out tell a peak from an outlier.
-    let mut whole = fitted.clone();
-    if fitted.problem.robust.is_none() {
-        whole.set_aside.clear();
-    }
-    let fitted = &whole;
+    let whole = fitted.problem.robust.is_none().then(|| fitted.with_all_rows());
+    let fitted = whole.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
     let weighed = data.weighed();
     let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
@@ -129,7 +126,7 @@ fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hyp
     let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
     let own = hypotheses.form(best, hypothesis, (shape, here.len()))?;
     let linearised = fitted.linearised(data, &[]);
-    let fit = fitted.neighbourhood(&linearised);
+    let fit = fitted.around(data);
     let first = 3 * here.len();
     let (own, beyond) = (own.rows(0, first).into_owned(), own.rows_range(first..));
     let with = fitted.neighbourhood_with(&linearised, &[], Some((&own, sigma)));

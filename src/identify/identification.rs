@@ -257,7 +257,8 @@ fn fit_rows(
     (measurements, split): (&Measurements, &Split),
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
-    let (clock, memory) = (Instant::now(), Memory::default());
+    let clock = Instant::now();
+    let memory = if options.in_passing { Memory::in_passing() } else { Memory::default() };
     check_data(problem, measurements, split)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));

@@ -130,12 +130,18 @@ impl<'a> Stage<'a> {
         at: &DVector<f64>,
         loss: Loss,
     ) -> Fit<'b, PoseResiduals<'a>> {
-        Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at))
+        Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at), self.unit())
     }
 
-    /// What tells this stage's data and unknowns, and the parameters that stay as in `at`, from those of others.
+    /// 1 σ of the first pose: what residuals are counted in.
+    fn unit(&self) -> f64 {
+        self.poses.first().map_or(1.0, |pose| pose.sigma)
+    }
+
+    /// What tells this stage's data and unknowns, and the parameters that stay as in `at`, from those of others, but for the unit that
+    /// residuals are counted in.
     fn digest(&self, at: &DVector<f64>) -> u64 {
-        let mut digest = DefaultHasher::new();
+        let (mut digest, unit) = (DefaultHasher::new(), self.unit());
         let mut others = at.clone();
         self.unknowns.iter().for_each(|&k| others[k] = 0.0);
         self.unknowns.hash(&mut digest);
@@ -157,8 +163,8 @@ impl<'a> Stage<'a> {
             let columns = configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
             columns.chain(&pose.measured).copied().for_each(&mut put);
             [*payload, *hoist, *temperature].map(|own| own.unwrap_or(f64::NAN)).into_iter().for_each(&mut put);
-            [*time, *elapsed, pose.sigma].into_iter().for_each(&mut put);
-            put(pose.orientation.map_or(0.0, |own| own.sigma));
+            [*time, *elapsed, pose.sigma / unit].into_iter().for_each(&mut put);
+            put(pose.orientation.map_or(0.0, |own| own.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
             // What was before stands in the table, which is the same in all fits that share a memory.

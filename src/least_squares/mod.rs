@@ -3,6 +3,7 @@
 //! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see the m × n Jacobian:
 //! it is reduced, block by block, to the triangular factor of its QR decomposition.
 
+mod chord;
 mod curvature;
 mod derivative;
 mod identifiability;

@@ -1,11 +1,12 @@
 //! A problem over many items as a solver sees it: a value and a triangular linearisation.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::chord::Base;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
 use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle};
@@ -22,6 +23,10 @@ const ROWS_PER_UNKNOWN: usize = 4;
 
 /// Chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
+
+/// Unknowns from which on derivatives of all data are kept, and how many numbers at most: 128 MB.
+const MANY: usize = 100;
+const MOST_KEPT: usize = 1 << 24;
 
 /// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,7 +69,7 @@ pub struct Fit<'a, P> {
     problem: &'a P,
     rows: Vec<LinearRows>,
     loss: Loss,
-    memory: Option<(&'a Memory, u64)>,
+    memory: Option<(&'a Memory, u64, f64)>,
 }
 
 impl<'a, P: LeastSquares> Fit<'a, P> {
@@ -80,10 +85,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self
     }
 
-    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem from others that share it.
+    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem from others that share it, but for the
+    /// `unit` that its residuals are counted in.
     #[must_use]
-    pub fn remembering(mut self, memory: &'a Memory, data: u64) -> Self {
-        self.memory = Some((memory, data));
+    pub fn remembering(mut self, memory: &'a Memory, data: u64, unit: f64) -> Self {
+        self.memory = Some((memory, data, unit));
         self
     }
 
@@ -109,11 +115,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.problem
     }
 
-    fn chunks(&self) -> usize {
+    pub(super) fn chunks(&self) -> usize {
         self.problem.items().div_ceil(CHUNK_ITEMS)
     }
 
-    fn chunk(&self, index: usize) -> Range<usize> {
+    pub(super) fn chunk(&self, index: usize) -> Range<usize> {
         let start = index * CHUNK_ITEMS;
         start..(start + CHUNK_ITEMS).min(self.problem.items())
     }
@@ -136,13 +142,25 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         (ROWS_PER_UNKNOWN * self.problem.parameters()).div_ceil(rows).max(1)
     }
 
-    /// The factor of a run of chunks.
-    fn run_triangle(&self, x: &DVector<f64>, run: Range<usize>, block: &mut Block) -> Triangle {
+    /// Fills a block with a chunk's residuals and their derivatives at x.
+    fn fill(&self, x: &DVector<f64>, index: usize, block: &mut Block) {
+        let items = self.chunk(index);
+        block.reshape(items.len() * self.problem.rows_per_item());
+        self.problem.linearise(x, items, block);
+    }
+
+    /// A chunk's residuals and their derivatives at x.
+    pub(super) fn block(&self, x: &DVector<f64>, index: usize) -> Block {
+        let mut block = Block::zeros(0, self.problem.parameters());
+        self.fill(x, index, &mut block);
+        block
+    }
+
+    /// The factor of a run of chunks, each filled by `fill`.
+    fn run_triangle(&self, fill: &impl Fn(usize, &mut Block), run: Range<usize>, block: &mut Block) -> Triangle {
         let mut triangle = Triangle::new(self.problem.parameters());
         for index in run {
-            let items = self.chunk(index);
-            block.reshape(items.len() * self.problem.rows_per_item());
-            self.problem.linearise(x, items, block);
+            fill(index, block);
             let before = triangle.sum_of_squares();
             let robust = self.loss.weigh(block, self.problem.rows_per_item());
             triangle.absorb(block);
@@ -153,13 +171,18 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         triangle
     }
 
-    /// The factor of all data at x: of few unknowns, whose factors are merged in no time, chunk by chunk in order.
+    /// The factor of all data at x.
     fn reduce(&self, x: &DVector<f64>) -> Triangle {
+        self.reduce_by(&|index, block: &mut Block| self.fill(x, index, block))
+    }
+
+    /// The factor of all chunks, each filled by `fill`: of few unknowns, whose factors are merged in no time, chunk by chunk in order.
+    pub(super) fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
         if self.run_length() > 1 {
-            return self.halves(x, 0..self.chunks(), &Mutex::default());
+            return self.halves(fill, 0..self.chunks(), &Mutex::default());
         }
         let mut total: Option<Triangle> = None;
-        let map = |index, block: &mut Block| self.run_triangle(x, index..index + 1, block);
+        let map = |index, block: &mut Block| self.run_triangle(fill, index..index + 1, block);
         let take = |triangle: Triangle| match &mut total {
             Some(total) => total.merge(&triangle),
             None => total = Some(triangle),
@@ -169,31 +192,57 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare` are blocks to use again.
-    fn halves(&self, x: &DVector<f64>, chunks: Range<usize>, spare: &Mutex<Vec<Block>>) -> Triangle {
+    fn halves(
+        &self,
+        fill: &(impl Fn(usize, &mut Block) + Sync),
+        chunks: Range<usize>,
+        spare: &Mutex<Vec<Block>>,
+    ) -> Triangle {
         if chunks.len() <= self.run_length() {
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let kept = spare().pop();
             let mut block = kept.unwrap_or_else(|| self.empty_block());
-            let triangle = self.run_triangle(x, chunks, &mut block);
+            let triangle = self.run_triangle(fill, chunks, &mut block);
             spare().push(block);
             return triangle;
         }
         let middle = chunks.start + chunks.len() / 2;
-        let half = |chunks| move || self.halves(x, chunks, spare);
+        let half = |chunks| move || self.halves(fill, chunks, spare);
         let (mut first, second) = rayon::join(half(chunks.start..middle), half(middle..chunks.end));
         first.merge(&second);
         first
     }
 
-    /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
-    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &mut Block) -> DVector<f64> {
-        let items = self.chunk(index);
-        let rows = items.len() * self.problem.rows_per_item();
+    /// The factor of all data at x, in passing by the derivatives of an earlier point where these serve.
+    fn factor(&self, x: &DVector<f64>) -> Triangle {
+        let Some((memory, data, unit)) = self.memory else { return self.reduce(x) };
+        memory.recall(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
+            if !self.keeps_derivatives() {
+                return self.reduce(x);
+            }
+            let earlier = || memory.base(data)?.at(self, x, unit);
+            let earlier = if memory.is_in_passing() { earlier() } else { None };
+            earlier.unwrap_or_else(|| {
+                let base = Base::new(self, x, (data, unit));
+                let triangle = base.triangle();
+                memory.keep(Arc::new(base));
+                triangle
+            })
+        })
+    }
+
+    /// Whether derivatives of all data are kept: those of squares and of many unknowns, which are asked for again, and of no more data than
+    /// memory has room for.
+    fn keeps_derivatives(&self) -> bool {
+        let (n, rows) = (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
+        self.loss == Loss::Squares && n >= MANY && rows * n <= MOST_KEPT
+    }
+
+    /// Jᵀ r″ of a chunk with such residuals and derivatives, r″ = 2 (r(x + h p) − r − h J p) / h².
+    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &Block) -> DVector<f64> {
+        let (n, rows) = (block.parameters(), block.rows());
         let mut moved = vec![0.0; rows];
-        self.problem.residuals(&(x + BEND_STEP * step), items.clone(), &mut moved);
-        block.reshape(rows);
-        self.problem.linearise(x, items, block);
-        let n = block.parameters();
+        self.problem.residuals(&(x + BEND_STEP * step), self.chunk(index), &mut moved);
         for (i, moved) in moved.iter_mut().enumerate() {
             let straight: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
             *moved = 2.0 * ((*moved - block.column(n)[i]) / BEND_STEP - straight) / BEND_STEP;
@@ -241,10 +290,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        let mut total = match self.memory {
-            Some((memory, data)) => memory.recall(&Key { data, loss: self.loss, x: x.clone() }, || self.reduce(x)),
-            None => self.reduce(x),
-        };
+        let mut total = self.factor(x);
         for rows in &self.rows {
             total.absorb_rows(&mut linear_block(rows, x));
         }
@@ -266,8 +312,19 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        // In passing a further step costs less.
+        if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing()) && self.keeps_derivatives() {
+            return None;
+        }
+        let kept = self.memory.and_then(|(memory, data, unit)| memory.base(data).filter(|base| base.is_at(x, unit)));
         let mut total = DVector::zeros(x.len());
-        let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);
+        let map = |index, block: &mut Block| match &kept {
+            Some(base) => self.chunk_bend((x, step), index, base.block(index)),
+            None => {
+                self.fill(x, index, block);
+                self.chunk_bend((x, step), index, block)
+            }
+        };
         in_order(self.chunks(), || self.empty_block(), map, |bend| total += bend);
         total.iter().all(|value| value.is_finite()).then_some(total)
     }
@@ -362,7 +419,7 @@ mod tests {
             let plain = fit.linearise(x);
             assert!((fit.cost(x) / plain.cost - 1.0).abs() < 1e-12);
             line.largest.store(0, Ordering::Relaxed);
-            let found = fit.remembering(&memory, data).linearise(x);
+            let found = fit.remembering(&memory, data, 1.0).linearise(x);
             assert_eq!((plain.triangle, plain.projected), (found.triangle, found.projected));
             line.largest.load(Ordering::Relaxed) > 0
         };

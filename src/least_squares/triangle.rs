@@ -60,6 +60,23 @@ impl Triangle {
         self
     }
 
+    /// The factor of the same rows in another unit, each number so many times as large.
+    pub(super) fn times(mut self, factor: f64) -> Self {
+        if factor.to_bits() != 1.0_f64.to_bits() {
+            self.rows.iter_mut().for_each(|value| *value *= factor);
+            self.squares *= factor * factor;
+        }
+        self
+    }
+
+    /// The same factor R of other residuals, with their c and their ‖r‖².
+    pub(super) fn with_residual(mut self, constant: &DVector<f64>, squares: f64) -> Self {
+        let n = self.parameters;
+        self.rows.chunks_exact_mut(n + 1).zip(constant.iter()).for_each(|(row, value)| row[n] = *value);
+        self.squares = squares;
+        self
+    }
+
     /// Takes in the rows of `block`, whose values are lost.
     ///
     /// A block for another number of unknowns is a mistake of the caller and is checked in debug builds only.

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Linearisation;
 use super::inverse::inverse_rows;
 use super::singular::SingularValues;
+use super::{Linearisation, Triangle};
 
 /// Weight that turns rows of held combinations into constraints.
 const HARD: f64 = 1e5;
@@ -65,7 +65,7 @@ impl VarianceLikelihood {
         }
         stack.view_mut((0, width), (n, 1)).copy_from(&at_priors);
         stack.view_mut((n, width), (closed.nrows(), 1)).copy_from(&(closed * moved * -HARD));
-        let reduced = stack.qr().unpack_r();
+        let reduced = Triangle::of(&stack);
         let (first, k) = (free.len(), known.len());
         let left = reduced.view((first, first), (k, k)).into_owned();
         let y = reduced.view((first, width), (k, 1)).column(0).into_owned();
@@ -112,7 +112,7 @@ impl VarianceLikelihood {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::least_squares::{Block, Triangle};
+    use crate::least_squares::Block;
 
     /// Deterministic numbers with the spread of normal ones.
     fn noise(i: usize) -> f64 {

@@ -33,6 +33,7 @@ use super::fitted::Fitted;
 use crate::problem::Effect;
 use again::carried_by_one;
 pub(super) use again::stability;
+use block::Block;
 use blocks::blocks;
 use candidate::Candidate;
 pub use explanation::Explanation;
@@ -40,7 +41,7 @@ pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
 pub use posterior::{Claims, Evidence};
-use products::Products;
+use products::{Known, Products};
 use search::{Weighted, search};
 use waves::Waves;
 
@@ -133,7 +134,7 @@ fn weighed_without<'a>(
     let is_present = |own: &Candidate| own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect));
     let present: Vec<usize> = (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<Explanation> = Vec::new();
-    let (mut weighted, unlisted) = {
+    let (mut weighted, unlisted, mut known) = {
         let products = Products::new((&blocks, &target), data.rules);
         let weighted = search(&products, &present);
         if data.stop.is_requested() {
@@ -142,20 +143,24 @@ fn weighed_without<'a>(
         let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }.promising(&weighted);
         let times = (&products, hypotheses.times.as_slice());
         let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
-        (weighted, [waves, moves].concat())
+        (weighted, [waves, moves].concat(), products.into_known())
     };
     let blocks_of =
         |some: &[Candidate]| Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out);
+    let again = |known: Known, blocks: &[Block]| {
+        let products = Products::knowing(known, (blocks, &target), data.rules);
+        (search(&products, &present), products.into_known())
+    };
     if !unlisted.is_empty() {
         blocks.extend(blocks_of(&unlisted));
         hypotheses.all.extend(unlisted);
-        weighted = search(&Products::new((&blocks, &target), data.rules), &present);
+        (weighted, known) = again(known, &blocks);
     }
     let finer = finer::finer(&hypotheses, &weighted, (&blocks, &target), blocks_of, (&fitted.problem, data.rules));
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
         hypotheses.all.extend(finer);
-        weighted = search(&Products::new((&blocks, &target), data.rules), &present);
+        (weighted, known) = again(known, &blocks);
     }
     let of = |k: usize| &hypotheses.all[k].hypothesis;
     if data.stop.is_requested() {
@@ -192,7 +197,8 @@ fn weighed_without<'a>(
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
     if let Some(best) = evidence.sure(data.rules.sure) {
-        evidence.stand_ins = stand_ins(best, &hypotheses, &Products::new((&blocks, &target), data.rules));
+        let products = Products::knowing(known, (&blocks, &target), data.rules);
+        evidence.stand_ins = stand_ins(best, &hypotheses, &products);
     }
     Some((evidence, hypotheses))
 }

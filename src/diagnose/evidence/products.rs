@@ -1,8 +1,7 @@
 //! Products of the columns of hypotheses with one another and with the residual: what a set leaves, and what a further hypothesis gains
-//! beside it, is told by these alone. Each is made when the first set asks for it, and kept as long as the hypotheses stay the same.
+//! beside it, is told by these alone. Each is made when the first set asks for it, and kept, further hypotheses or not.
 
-use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -40,13 +39,16 @@ pub(super) struct Products<'a> {
     pub squares: f64,
     /// Of the noise.
     grid: Vec<(f64, f64)>,
-    members: Vec<OnceLock<Member<'a>>>,
+    members: Known,
 }
 
+/// Products that were made, by the number of the hypothesis.
+pub(super) type Known = Vec<OnceLock<Member>>;
+
 /// A hypothesis of some set.
-struct Member<'a> {
+pub(super) struct Member {
     /// A, everything fitted projected out.
-    columns: Cow<'a, DMatrix<f64>>,
+    columns: Arc<DMatrix<f64>>,
     /// Aᵀ.
     transposed: DMatrix<f64>,
     /// AᵀC of every one.
@@ -55,9 +57,22 @@ struct Member<'a> {
 
 impl<'a> Products<'a> {
     pub fn new((blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
+        Self::knowing(Known::new(), (blocks, target), rules)
+    }
+
+    /// The same where products of the first of these hypotheses are known.
+    pub fn knowing(mut known: Known, (blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
         let squares = target.fit.residual().norm_squared();
-        let members = std::iter::repeat_with(OnceLock::new).take(blocks.len()).collect();
-        Self { blocks, target, rules, squares, grid: target.noise.grid(), members }
+        for member in known.iter_mut().filter_map(OnceLock::get_mut) {
+            member.products.resize_with(blocks.len(), OnceLock::new);
+        }
+        known.resize_with(blocks.len(), OnceLock::new);
+        Self { blocks, target, rules, squares, grid: target.noise.grid(), members: known }
+    }
+
+    /// The products that were made.
+    pub fn into_known(self) -> Known {
+        self.members
     }
 
     /// ln of the density of a residual of such squares, up to a constant.
@@ -71,7 +86,7 @@ impl<'a> Products<'a> {
         block.ln_prior + if is_alike { self.target.alike } else { 0.0 }
     }
 
-    fn member(&self, block: usize) -> &Member<'a> {
+    fn member(&self, block: usize) -> &Member {
         if let Some(known) = self.members[block].get() {
             return known;
         }
@@ -246,7 +261,7 @@ impl Left<'_, '_> {
 
     /// The gains of hypotheses that are none of the others, with their priors.
     pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
-        let columns: Vec<Cow<DMatrix<f64>>> =
+        let columns: Vec<Arc<DMatrix<f64>>> =
             blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
         let all: Vec<_> = columns.iter().flat_map(|own| own.column_iter()).collect();
         if all.is_empty() {
@@ -306,8 +321,8 @@ mod tests {
         let r = target.fit.residual();
         let mut covariance = DMatrix::identity(r.len(), r.len());
         for (&member, size) in members.iter().zip(sizes) {
-            let columns = blocks[member].columns(&target.fit).into_owned();
-            covariance += &columns * columns.transpose() * (size * size);
+            let columns = blocks[member].columns(&target.fit);
+            covariance += &*columns * columns.transpose() * (size * size);
         }
         let factor = covariance.cholesky().unwrap();
         let solved = factor.solve(r);

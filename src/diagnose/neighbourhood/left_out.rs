@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::orthonormal::RANK;
-use crate::numeric::gram;
+use crate::numeric::{gram, inverse_factor, solve_positive};
 
 /// JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
 struct Squares {
@@ -39,12 +39,13 @@ impl PartSquares {
     /// Values of the unknowns fitted to all parts, and their variances, priors as in [`Self::left_out`].
     pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
         let (normal, pull) = self.normal(self.whole.gram.clone(), self.whole.product.clone(), priors);
-        let inverse = normal.cholesky()?.inverse();
-        let mut x = -(&inverse * pull);
+        let root = inverse_factor(&normal)?;
+        let mut x = -root.tr_mul(&(&root * pull));
         for (j, prior) in priors.iter().enumerate() {
             x[j] += prior.0;
         }
-        Some((x, inverse.diagonal()))
+        let variances = root.column_iter().map(|column| column.norm_squared());
+        Some((x, DVector::from_iterator(root.ncols(), variances)))
     }
 
     /// The normal equations of some parts with priors.
@@ -73,7 +74,7 @@ impl PartSquares {
         let predicted = |part: &Squares| {
             let (gram, product) = (&self.whole.gram - &part.gram, &self.whole.product - &part.product);
             let (normal, pull) = self.normal(gram, product, priors);
-            let step = -normal.cholesky()?.solve(&pull);
+            let step = -solve_positive(normal, pull)?;
             let squares = part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
             Some(part.rows as f64 * (squares / part.rows as f64).ln())
         };

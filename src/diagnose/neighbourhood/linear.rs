@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
-use crate::numeric::product;
+use crate::numeric::{inverse_factor, product};
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
 /// the others say nothing of it.
@@ -320,10 +320,10 @@ fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
 
 /// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly 0.
 fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    if let Some(factor) = matrix.clone().cholesky()
-        && factor.l_dirty().diagonal().iter().all(|value| value * value > LEAST_DECIDED)
+    if let Some(root) = inverse_factor(&matrix)
+        && root.diagonal().iter().all(|value| (value * value).recip() > LEAST_DECIDED)
     {
-        return factor.solve(right);
+        return root.tr_mul(&(&root * right));
     }
     let eigen = matrix.symmetric_eigen();
     let inverted = eigen.eigenvalues.map(|value| if value > LEAST_DECIDED { value.recip() } else { 0.0 });

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::{gram, product};
+use crate::numeric::{gram, inverse_factor, product};
 
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
@@ -18,6 +18,8 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
     let n = columns.ncols();
     let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
     let (kept, first) = independent(columns, &own, lengths.unwrap_or(&own));
+    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+    let turning = |gram: &DMatrix<f64>| inverse_factor(gram).map(|inverse| inverse.transpose());
     let mut basis = columns.select_columns(&kept);
     let mut within = DMatrix::zeros(n, kept.len());
     for (k, &j) in kept.iter().enumerate() {
@@ -28,18 +30,12 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
     basis = product(&basis, &inverse);
     within *= inverse;
     // Once more, for what rounding left.
-    let again = gram(&basis).cholesky().and_then(|factor| turning(&factor.l()));
+    let again = turning(&gram(&basis));
     let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
     (product(&basis, &again), within * again)
 }
 
-/// L⁻ᵀ, which takes columns with the Gram matrix L Lᵀ to orthonormal ones.
-fn turning(lower: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let identity = DMatrix::identity(lower.nrows(), lower.nrows());
-    Some(lower.solve_lower_triangular(&identity)?.transpose())
-}
-
-/// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
+/// Columns that are directions of their own, and the Gram matrix of these, scaled to length one.
 fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let gram = gram(columns);
     let mut kept: Vec<usize> = Vec::new();
@@ -58,8 +54,9 @@ fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usi
             kept.push(j);
         }
     }
-    let lower = DMatrix::from_fn(kept.len(), kept.len(), |i, j| if j <= i { factor[i][j] } else { 0.0 });
-    (kept, lower)
+    let scaled = |i: usize, j: usize| gram[(kept[i], kept[j])] / (own[kept[i]] * own[kept[j]]);
+    let gram = DMatrix::from_fn(kept.len(), kept.len(), scaled);
+    (kept, gram)
 }
 
 /// Z with A D⁻¹ Z = 0 and ZᵀZ = I for the rows A of active constraints, shape = (constraints, n), and the scale D of the

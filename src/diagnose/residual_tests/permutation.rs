@@ -11,8 +11,11 @@ use super::chance::{Chance, Drawn};
 use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
 
-/// Number of draws.
+/// Number of draws, fewer where refitting them all takes more multiplications than these: of a fit of hundreds of parameters to thousands
+/// of poses chance varies little from draw to draw.
 const DRAWS: usize = 1999;
+const FEWEST: usize = 399;
+const WORK: usize = 1 << 32;
 /// Draws that are fitted together, fewer where they have more than so many numbers: Q is gone through once for all of them.
 const TOGETHER: usize = 96;
 const FEWEST_TOGETHER: usize = 16;
@@ -38,11 +41,12 @@ pub(super) fn chances(
         return Vec::new();
     }
     let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
-    let starts: Vec<usize> = (0..DRAWS).step_by(together).collect();
+    let draws = (WORK / leverage.fitted.len().max(1)).clamp(FEWEST, DRAWS);
+    let starts: Vec<usize> = (0..draws).step_by(together).collect();
     let drawn: Vec<Vec<f64>> = starts
         .into_par_iter()
         .flat_map_iter(|start| {
-            let residuals = draw(leverage, studentised, start..(start + together).min(DRAWS), seed);
+            let residuals = draw(leverage, studentised, start..(start + together).min(draws), seed);
             let values = |residual: &[f64]| -> Vec<f64> {
                 let sample = Sample::of(leverage.studentise(residual));
                 statistics.iter().map(|statistic| statistic.of(&sample)).collect()

@@ -1,5 +1,7 @@
 //! Candidates that explain the data better than an effect that was added.
 
+use std::sync::Arc;
+
 use super::super::data::Data;
 use super::super::fitted::Fitted;
 use super::super::neighbourhood::{LinearNeighbourhood, Linearised, Scan, tries};
@@ -8,15 +10,16 @@ use crate::problem::Effect;
 /// What may stand in the place of each added effect, all others kept, in the linear neighbourhood of a fit.
 pub(super) struct Replacements<'f, 'a> {
     fitted: &'f Fitted,
-    fit: LinearNeighbourhood,
+    fit: Arc<LinearNeighbourhood>,
     scan: Scan<'a, 'f>,
 }
 
 impl<'f, 'a> Replacements<'f, 'a> {
     /// Tries `candidates`, whose places `linearised` holds.
     pub fn new(fitted: &'f Fitted, linearised: &'f Linearised<'a>, candidates: &[Effect], data: &'f Data) -> Self {
-        let fit = fitted.neighbourhood(linearised);
-        Self { fitted, scan: Scan::new(linearised, fit.clone(), candidates.to_vec(), data.rules), fit }
+        let fit = fitted.around(data);
+        let scan = Scan::new(linearised, LinearNeighbourhood::clone(&fit), candidates.to_vec(), data.rules);
+        Self { fitted, scan, fit }
     }
 
     /// The candidate, another time of the same shift included, that explains the data better than an effect beyond doubt.
@@ -41,6 +44,6 @@ impl<'f, 'a> Replacements<'f, 'a> {
     /// The fit with the columns of a candidate.
     pub fn with(&self, candidate: &Effect) -> LinearNeighbourhood {
         let index = self.scan.effects.iter().position(|known| known == candidate);
-        index.map_or_else(|| self.fit.clone(), |index| self.fit.with(&self.scan.columns(index)))
+        index.map_or_else(|| LinearNeighbourhood::clone(&self.fit), |index| self.fit.with(&self.scan.columns(index)))
     }
 }

@@ -87,7 +87,7 @@ impl<'a> Rounds<'a> {
             candidates.testable.retain(|effect| !added.iter().any(|known| known.remembers_like(effect)));
             let (picks, staying) = {
                 let linearised = fitted.linearised(self.data, &candidates.testable);
-                let fit = fitted.neighbourhood(&linearised);
+                let fit = LinearNeighbourhood::clone(&fitted.around(self.data));
                 let own = fit.unknowns();
                 let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
                 let picks = pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1);
@@ -280,8 +280,7 @@ impl<'a> Rounds<'a> {
     /// ν ln(squares) + k ln ν of a fit, squares in metres whatever σ they were divided by, with 2 ln(tries) for the effect
     /// that was picked.
     fn criterion(&self, fitted: &Fitted, picked: &Effect) -> f64 {
-        let linearised = fitted.linearised(self.data, &[]);
-        let fit = fitted.neighbourhood(&linearised);
+        let fit = fitted.around(self.data);
         let candidates = Candidates::of(&fitted.problem, self.data).testable;
         let everything: Vec<Effect> = candidates.into_iter().chain([picked.clone()]).collect();
         let tries = tries(&everything, &fitted.problem).0.last().copied().unwrap_or(1.0);
@@ -317,8 +316,7 @@ impl<'a> Rounds<'a> {
     /// Effects of a fit with the p of what it would lose without each, corrected for the tries: those of all orders of a
     /// harmonic together.
     pub fn test(&self, fitted: &Fitted, own: Vec<Effect>) -> Vec<Retested> {
-        let linearised = fitted.linearised(self.data, &[]);
-        let fit = fitted.neighbourhood(&linearised);
+        let fit = fitted.around(self.data);
         let tries = self.tries(&fitted.problem, &own);
         let left = (fit.sums().squares, fit.sums().freedom());
         let test = |(effect, tries): (Effect, f64)| {
