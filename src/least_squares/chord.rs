@@ -1,12 +1,13 @@
 //! Derivatives taken once for several points: the chord method.
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use super::kernel::sum_of_squares;
-use super::{Block, Fit, LeastSquares, Linearisation, Triangle};
+use super::{Block, LeastSquares, Linearisation, Triangle};
 use crate::numeric::{gram, inverse_factor};
 
 /// Part of what derivatives foresee up to which what they miss is little.
@@ -26,10 +27,17 @@ pub(super) struct Base {
     /// Unit of the residuals.
     unit: f64,
     x: DVector<f64>,
-    blocks: Vec<Block>,
+    chunks: Vec<Chunk>,
     triangle: Triangle,
     /// Made when first derivatives are asked to serve elsewhere.
     within: OnceLock<Within>,
+}
+
+/// Some items with their residuals and derivatives.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    pub items: Range<usize>,
+    pub block: Block,
 }
 
 /// What takes J₀ᵀ ρ to Q₀ᵀ ρ.
@@ -70,11 +78,9 @@ struct Missed {
 }
 
 impl Base {
-    /// Takes derivatives at `x`.
-    pub fn new<P: LeastSquares>(fit: &Fit<P>, x: &DVector<f64>, (data, unit): (u64, f64)) -> Self {
-        let blocks: Vec<Block> = (0..fit.chunks()).into_par_iter().map(|index| fit.block(x, index)).collect();
-        let triangle = fit.reduce_by(&|index, block: &mut Block| block.clone_from(&blocks[index]));
-        Self { data, unit, x: x.clone(), blocks, triangle, within: OnceLock::new() }
+    /// Of all items, linearised at `x`, and their factor.
+    pub fn new(x: &DVector<f64>, (data, unit): (u64, f64), chunks: Vec<Chunk>, triangle: Triangle) -> Self {
+        Self { data, unit, x: x.clone(), chunks, triangle, within: OnceLock::new() }
     }
 
     /// Whether it was taken there, of residuals in this unit.
@@ -84,7 +90,7 @@ impl Base {
 
     /// Residuals and derivatives of a chunk.
     pub fn block(&self, index: usize) -> &Block {
-        &self.blocks[index]
+        &self.chunks[index].block
     }
 
     /// The factor where it was taken.
@@ -93,13 +99,12 @@ impl Base {
     }
 
     /// The factor at `x` for residuals in this `unit`; `None` where derivatives do not serve there.
-    pub fn at<P: LeastSquares>(&self, fit: &Fit<P>, x: &DVector<f64>, unit: f64) -> Option<Triangle> {
+    pub fn at(&self, problem: &impl LeastSquares, x: &DVector<f64>, unit: f64) -> Option<Triangle> {
         let (step, larger) = (x - &self.x, self.unit / unit);
         let n = step.len();
-        let missed = |index: usize| {
-            let block = &self.blocks[index];
+        let missed = |Chunk { items, block }: &Chunk| {
             let mut residual = vec![0.0; block.rows()];
-            fit.problem().residuals(x, fit.chunk(index), &mut residual);
+            problem.residuals(x, items.clone(), &mut residual);
             let square = sum_of_squares(&residual);
             let columns = DMatrixView::from_slice(&block.values[..n * block.rows()], block.rows(), n);
             let way = columns * &step;
@@ -111,7 +116,7 @@ impl Base {
                 gradient: columns.tr_mul(&rest),
             }
         };
-        let all: Vec<Missed> = (0..self.blocks.len()).into_par_iter().map(missed).collect();
+        let all: Vec<Missed> = self.chunks.par_iter().map(missed).collect();
         let mut gradient = DVector::zeros(n);
         let mut sums = [0.0; 3];
         for own in all {
@@ -119,72 +124,11 @@ impl Base {
             sums.iter_mut().zip(own.squares).for_each(|(sum, square)| *sum += square);
         }
         let [squares, way, rest] = sums;
-        let rows: usize = self.blocks.iter().map(Block::rows).sum();
+        let rows: usize = self.chunks.iter().map(|chunk| chunk.block.rows()).sum();
         let serves = rest <= (MISSED * MISSED * way).max(squares / (larger * larger * rows as f64));
         serves.then(|| {
             let constant = self.within.get_or_init(|| Within::new(&self.triangle)).constant(&step, &gradient);
             self.triangle().with_residual(&constant, squares / (larger * larger)).times(larger)
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::ops::Range;
-
-    use super::*;
-
-    /// A curve through many points whose first two unknowns do the same, in some unit.
-    struct Curve {
-        unit: f64,
-    }
-
-    impl LeastSquares for Curve {
-        fn parameters(&self) -> usize {
-            4
-        }
-
-        fn items(&self) -> usize {
-            700
-        }
-
-        fn rows_per_item(&self) -> usize {
-            1
-        }
-
-        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-            for (out, t) in out.iter_mut().zip(items.map(|i| i as f64 / 700.0)) {
-                *out = (x[0] + x[1] + t * x[2] + (x[3] * t).sin() - (40.0 * t).cos()) / self.unit;
-            }
-        }
-
-        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
-            self.residuals(x, items.clone(), block.column_mut(4));
-            for (row, t) in items.map(|i| i as f64 / 700.0).enumerate() {
-                let slopes = [1.0, 1.0, t, t * (x[3] * t).cos()];
-                slopes.into_iter().enumerate().for_each(|(j, slope)| block.column_mut(j)[row] = slope / self.unit);
-            }
-        }
-    }
-
-    #[test]
-    fn derivatives_serve_near_where_they_were_taken() {
-        let (curve, start) = (Curve { unit: 0.1 }, DVector::from_vec(vec![0.3, -0.1, 0.2, 1.0]));
-        let fit = Fit::new(&curve);
-        let base = Base::new(&fit, &start, (1, 0.1));
-        let columns = super::super::jacobian(&curve, &start);
-        for (unit, step) in [(0.1, 0.0), (0.1, 0.02), (0.5, 0.02)] {
-            let curve = Curve { unit };
-            let fit = Fit::new(&curve);
-            let x = &start + DVector::from_vec(vec![step, -2.0 * step, step, 0.5 * step]);
-            let there = base.at(&fit, &x, unit).unwrap().into_linearisation();
-            let residual = super::super::residual_vector(&curve, &x);
-            let gradient = columns.tr_mul(&residual) * (0.1 / unit);
-            assert!((there.triangle.tr_mul(&there.projected) - &gradient).norm() < 1e-6 * gradient.norm());
-            assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
-            // What two unknowns do alike is no part of what is left.
-            assert!(there.projected.norm_squared() < residual.norm_squared());
-        }
-        assert!(base.at(&fit, &(&start * 3.0), 0.1).is_none());
     }
 }

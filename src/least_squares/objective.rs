@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::chord::Base;
+use super::chord::{Base, Chunk};
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
 use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle};
@@ -115,11 +115,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.problem
     }
 
-    pub(super) fn chunks(&self) -> usize {
+    fn chunks(&self) -> usize {
         self.problem.items().div_ceil(CHUNK_ITEMS)
     }
 
-    pub(super) fn chunk(&self, index: usize) -> Range<usize> {
+    fn chunk(&self, index: usize) -> Range<usize> {
         let start = index * CHUNK_ITEMS;
         start..(start + CHUNK_ITEMS).min(self.problem.items())
     }
@@ -149,13 +149,6 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.problem.linearise(x, items, block);
     }
 
-    /// A chunk's residuals and their derivatives at x.
-    pub(super) fn block(&self, x: &DVector<f64>, index: usize) -> Block {
-        let mut block = Block::zeros(0, self.problem.parameters());
-        self.fill(x, index, &mut block);
-        block
-    }
-
     /// The factor of a run of chunks, each filled by `fill`.
     fn run_triangle(&self, fill: &impl Fn(usize, &mut Block), run: Range<usize>, block: &mut Block) -> Triangle {
         let mut triangle = Triangle::new(self.problem.parameters());
@@ -177,7 +170,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// The factor of all chunks, each filled by `fill`: of few unknowns, whose factors are merged in no time, chunk by chunk in order.
-    pub(super) fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
+    fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
         if self.run_length() > 1 {
             return self.halves(fill, 0..self.chunks(), &Mutex::default());
         }
@@ -220,15 +213,27 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             if !self.keeps_derivatives() {
                 return self.reduce(x);
             }
-            let earlier = || memory.base(data)?.at(self, x, unit);
+            let earlier = || memory.base(data)?.at(self.problem, x, unit);
             let earlier = if memory.is_in_passing() { earlier() } else { None };
             earlier.unwrap_or_else(|| {
-                let base = Base::new(self, x, (data, unit));
+                let base = self.base(x, (data, unit));
                 let triangle = base.triangle();
                 memory.keep(Arc::new(base));
                 triangle
             })
         })
+    }
+
+    /// Residuals and derivatives of all data at x, and their factor.
+    fn base(&self, x: &DVector<f64>, key: (u64, f64)) -> Base {
+        let chunk = |index| {
+            let mut block = Block::zeros(0, self.problem.parameters());
+            self.fill(x, index, &mut block);
+            Chunk { items: self.chunk(index), block }
+        };
+        let chunks: Vec<Chunk> = (0..self.chunks()).into_par_iter().map(chunk).collect();
+        let triangle = self.reduce_by(&|index, block: &mut Block| block.clone_from(&chunks[index].block));
+        Base::new(x, key, chunks, triangle)
     }
 
     /// Whether derivatives of all data are kept: those of squares and of many unknowns, which are asked for again, and of no more data than
@@ -427,5 +432,58 @@ mod tests {
         assert!(asked(&x, Loss::Squares, 1));
         assert!(!asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1));
         assert!(asked(&x, Loss::Squares, 2) && asked(&other, Loss::Squares, 1) && asked(&x, Loss::Squares, 1));
+    }
+
+    /// A curve through many points whose first two unknowns do the same, in some unit.
+    struct Curve {
+        unit: f64,
+    }
+
+    impl LeastSquares for Curve {
+        fn parameters(&self) -> usize {
+            4
+        }
+
+        fn items(&self) -> usize {
+            700
+        }
+
+        fn rows_per_item(&self) -> usize {
+            1
+        }
+
+        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+            for (out, t) in out.iter_mut().zip(items.map(|i| i as f64 / 700.0)) {
+                *out = (x[0] + x[1] + t * x[2] + (x[3] * t).sin() - (40.0 * t).cos()) / self.unit;
+            }
+        }
+
+        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+            self.residuals(x, items.clone(), block.column_mut(4));
+            for (row, t) in items.map(|i| i as f64 / 700.0).enumerate() {
+                let slopes = [1.0, 1.0, t, t * (x[3] * t).cos()];
+                slopes.into_iter().enumerate().for_each(|(j, slope)| block.column_mut(j)[row] = slope / self.unit);
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_serve_near_where_they_were_taken() {
+        let (curve, start) = (Curve { unit: 0.1 }, DVector::from_vec(vec![0.3, -0.1, 0.2, 1.0]));
+        let fit = Fit::new(&curve);
+        let base = fit.base(&start, (1, 0.1));
+        let columns = jacobian(&curve, &start);
+        for (unit, step) in [(0.1, 0.0), (0.1, 0.02), (0.5, 0.02)] {
+            let curve = Curve { unit };
+            let x = &start + DVector::from_vec(vec![step, -2.0 * step, step, 0.5 * step]);
+            let there = base.at(&curve, &x, unit).unwrap().into_linearisation();
+            let residual = residual_vector(&curve, &x);
+            let gradient = columns.tr_mul(&residual) * (0.1 / unit);
+            assert!((there.triangle.tr_mul(&there.projected) - &gradient).norm() < 1e-6 * gradient.norm());
+            assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
+            // What two unknowns do alike is no part of what is left.
+            assert!(there.projected.norm_squared() < residual.norm_squared());
+        }
+        assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());
     }
 }

@@ -28,7 +28,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("problem", &[&["quantity", "error", "spatial", "files"]]),
     ("measurement", &[&["quantity", "error", "problem", "files"]]),
     // Least squares knows no arms.
-    ("least_squares", &[&["scalar", "error"]]),
+    ("least_squares", &[&["scalar", "error", "numeric"]]),
     // The physics knows no sensors; the test rig shares no physics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
     ("simulate", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
