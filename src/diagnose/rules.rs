@@ -109,7 +109,8 @@ pub struct SelectionRules {
     pub rigid_links: f64,
     /// Chance that a further effect is of a family that is there already: what gives way at one joint does at others.
     pub of_a_kind: f64,
-    /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds.
+    /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds. What is more probable than not: of
+    /// one model alone that predicts best [Barbieri and Berger 2004]. What is named as found is for `stated`.
     pub sure: f64,
     /// Probability of a law from which on an effect is named as found; below it is a place with a law such as this one.
     pub stated: f64,
@@ -201,7 +202,7 @@ impl SelectionRules {
         unknown_law: 0.25,
         rigid_links: 0.1,
         of_a_kind: 0.25,
-        sure: 0.95,
+        sure: 0.5,
         stated: 0.9,
         displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
         plausible: 3.0,

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
 use crate::families::{Lacking, catalogue, newest};
-use crate::full::sets;
+use crate::full::{first, sets};
 use crate::judged::{Judged, Place, is_the_same, name, named};
 
 /// From this probability on an effect is named as found.
@@ -117,7 +117,7 @@ fn what_is_stated_of_the_newest_effects() {
 
 /// Judges so many sets from a seed on, and prints how true and how probable statements are.
 pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u64) {
-    let begin = std::env::var("FLEXCAL_FIRST").map_or(seed, |seed| seed.parse().unwrap());
+    let begin = first(seed);
     let all: Vec<Set> = (begin..begin + sets(count)).into_par_iter().map(judge).collect();
     let count = |of: &dyn Fn(&Set) -> usize| all.iter().map(of).sum::<usize>();
     let bins = [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)];
@@ -240,9 +240,9 @@ fn noise_of_many_kinds_is_no_effect() {
                 usize::from(closure.verdict != Verdict::NothingFound),
             ]
         };
-        let count = sets(100);
+        let (begin, count) = (first(6000), sets(100));
         let sums =
-            (6000..6000 + count).into_par_iter().map(one).reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|k| a[k] + b[k]));
+            (begin..begin + count).into_par_iter().map(one).reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|k| a[k] + b[k]));
         println!(
             "{kind:?}: of {count} sets {} name an effect, {} one such as, {} locate structure, {} are not nothing-found",
             sums[0], sums[1], sums[2], sums[3]
