@@ -112,6 +112,8 @@ pub struct SelectionRules {
     /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds. What is more probable than not: of
     /// one model alone that predicts best [Barbieri and Berger 2004]. What is named as found is for `stated`.
     pub sure: f64,
+    /// The same of an explanation whose functions without a law are stated as structure that is left.
+    pub located: f64,
     /// Probability of a law from which on an effect is named as found; below it is a place with a law such as this one.
     pub stated: f64,
     /// Root mean square displacements that a hypothesis may cause, in units of σ, each as probable as the others: from a third
@@ -203,6 +205,7 @@ impl SelectionRules {
         rigid_links: 0.1,
         of_a_kind: 0.25,
         sure: 0.5,
+        located: 0.95,
         stated: 0.9,
         displacements: [0.3, 1.0, 3.0, 10.0, 30.0, 100.0],
         plausible: 3.0,
@@ -262,6 +265,7 @@ impl SelectionRules {
             ("rigid_links", size(self.rigid_links)),
             ("of_a_kind", part(self.of_a_kind)),
             ("sure", part(self.sure)),
+            ("located", part(self.located)),
             ("stated", part(self.stated)),
             ("drawn_again", self.drawn_again >= 1),
             ("left_out", self.left_out >= 1),

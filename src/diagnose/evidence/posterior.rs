@@ -44,11 +44,13 @@ impl Evidence {
     /// The most probable explanation that claims no more than is sure: with as many hypotheses as there are with probability
     /// `level`, whichever they are.
     pub fn sure(&self, level: f64) -> Option<&Explanation> {
-        let as_many = |count: usize| -> f64 {
-            let holds = |explanation: &&Explanation| explanation.hypotheses.len() >= count;
-            self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
-        };
-        self.explanations.iter().find(|explanation| as_many(explanation.hypotheses.len()) >= level)
+        self.explanations.iter().find(|explanation| self.as_many(explanation) >= level)
+    }
+
+    /// Probability that there are as many hypotheses as an explanation has, whichever they are.
+    pub(in crate::diagnose) fn as_many(&self, as_in: &Explanation) -> f64 {
+        let holds = |explanation: &&Explanation| explanation.hypotheses.len() >= as_in.hypotheses.len();
+        self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
     /// Chance that fewer hypotheses than `best` has and noise make as many as probable, for all that were looked at together: a ratio
