@@ -23,11 +23,11 @@ pub struct Compensator<S> {
 impl<S: Scalar> Compensator<S> {
     /// Moment about the joint's axis on the link behind it [N·m], to be added to that of the loads beyond the joint.
     ///
-    /// τ = F · (P × A)_z / l,  F = k (l − l₀) + F₀,  P = Rz(φ) B,  l = |A − P|
+    /// τ = F · `(P × A)_z` / l,  F = k (l − l₀) + F₀,  P = Rz(φ) B,  l = |A − P|
     ///
     /// `angle` is (sin, cos) of φ = θ + q as the joint has turned, its twist included. F > 0 pulls the ends together: τ > 0 turns B
-    /// towards A about +z. (P × A)_z / l is the distance of the line of pull from the axis. Where the ends meet, that line has no
-    /// direction, and of F only k l counts, whose moment k (P × A)_z is smooth. Everything between axis and ends is rigid.
+    /// towards A about +z. `(P × A)_z` / l is the distance of the line of pull from the axis. Where the ends meet, that line has no
+    /// direction, and of F only k l counts, whose moment k `(P × A)_z` is smooth. Everything between axis and ends is rigid.
     pub fn moment(&self, (sin, cos): (S, S)) -> S {
         let ([ax, ay], [bx, by]) = (self.anchor, self.lever);
         let (px, py) = (cos * bx - sin * by, sin * bx + cos * by);

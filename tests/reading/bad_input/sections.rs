@@ -182,7 +182,7 @@ fn constraints() {
 
 #[test]
 fn effects() {
-    let effects: [(&str, &[&str]); 46] = [
+    let effects: [(&str, &[&str]); 36] = [
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         ("payload-mass = {}\nhoist-force = {}", &[":3: effect[1]: an effect is one key", "found 2"]),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
@@ -219,6 +219,45 @@ fn effects() {
             "slide-bending = { joint = 2 }\n[[joint]]\nkind = 'prismatic'\nmimic = { joint = 1 }",
             &[":4: effect[1].slide-bending.joint: joint 2 is fixed"],
         ),
+        ("twist-bending = { link = 'A' }", &[":4: effect[1].twist-bending.link: no beam is called \"A\""]),
+        ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
+        ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
+        ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-wave = { joint = 1, order = 2 }",
+            &[":6: effect[2].joint-wave: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "joint-wave = { joint = 1, order = 2.0 }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }",
+            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
+        ),
+        (
+            "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
+        ),
+        ("backlash = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].backlash.joint: joint 2 is fixed"]),
+        (
+            "joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-coupling.from: joint 2 is fixed"],
+        ),
+        (
+            "joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"],
+        ),
+        ("hoist-force = {}\n[[effect]]\nhoist-force = {}", &[":6: effect[2].hoist-force: declared already on line 4"]),
+    ];
+    for (effect, words) in effects {
+        check_problems(&[(&format!("[[effect]]\n{effect}"), words)]);
+    }
+}
+
+#[test]
+fn compensators() {
+    let effects: [(&str, &[&str]); 10] = [
         (
             "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }",
             &[
@@ -264,36 +303,6 @@ fn effects() {
              gravity-compensator = { joint = 1, anchor_m = [1, 1], lever_m = [1, 0], free_length_m = 0 }",
             &[":8: effect[3].gravity-compensator: joint 1 has a compensator already on line 6"],
         ),
-        ("twist-bending = { link = 'A' }", &[":4: effect[1].twist-bending.link: no beam is called \"A\""]),
-        ("deflected-equilibrium = {}", &[":4: effect[1].deflected-equilibrium: ", "already", "[statics]"]),
-        ("hoist-direction = {}", &[":4: effect[1].hoist-direction: no beam has a hoist"]),
-        ("joint-thermal-drift = { joint = 1 }", &[":4: effect[1].joint-thermal-drift: ", "reference_temperature_C"]),
-        (
-            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [3, 2] }",
-            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
-        ),
-        (
-            "joint-harmonic = { joint = 1, orders = [1, 2] }\n[[effect]]\njoint-wave = { joint = 1, order = 2 }",
-            &[":6: effect[2].joint-wave: order 2 of this joint is declared already on line 4"],
-        ),
-        (
-            "joint-wave = { joint = 1, order = 2.0 }\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }",
-            &[":6: effect[2].joint-harmonic: order 2 of this joint is declared already on line 4"],
-        ),
-        (
-            "gear-ratio = { joint = 2 }\n[[joint]]\nkind = 'fixed'",
-            &[":4: effect[1].gear-ratio.joint: joint 2 is fixed"],
-        ),
-        ("backlash = { joint = 2 }\n[[joint]]\nkind = 'fixed'", &[":4: effect[1].backlash.joint: joint 2 is fixed"]),
-        (
-            "joint-coupling = { joint = 1, from = 2 }\n[[joint]]\nkind = 'fixed'",
-            &[":4: effect[1].joint-coupling.from: joint 2 is fixed"],
-        ),
-        (
-            "joint-harmonic = { joint = 2, orders = [1] }\n[[joint]]\nkind = 'fixed'",
-            &[":4: effect[1].joint-harmonic.joint: joint 2 is fixed"],
-        ),
-        ("hoist-force = {}\n[[effect]]\nhoist-force = {}", &[":6: effect[2].hoist-force: declared already on line 4"]),
     ];
     for (effect, words) in effects {
         check_problems(&[(&format!("[[effect]]\n{effect}"), words)]);
