@@ -127,7 +127,9 @@ impl Model {
     #[must_use]
     pub(crate) fn placing(&self, effects: &[Effect]) -> Self {
         let mut model = self.clone();
-        effects.iter().for_each(|effect| enter::place(&mut model.nominal, effect));
+        for effect in effects {
+            enter::place(&mut model.nominal, effect);
+        }
         model
     }
 

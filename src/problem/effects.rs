@@ -59,7 +59,7 @@ fn check_alone(
 fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result<(), InputError> {
     for (k, EffectDeclaration { effect, location }) in effects.iter().enumerate() {
         let Some(joint) = effect.compensated() else { continue };
-        if let Some(first) = effects[..k].iter().find(|known| known.effect.compensated() == Some(joint)) {
+        if let Some(first) = effects.iter().take(k).find(|known| known.effect.compensated() == Some(joint)) {
             let line = first.location.line.unwrap_or(0);
             return Err(location.clone().error(InputErrorKind::RepeatedCompensator { joint, line }));
         }
