@@ -27,7 +27,8 @@ impl Pair {
     /// They are the same, one of them is declared, or follows the time and not the poses.
     pub fn new(problem: &Problem, pair: [EffectDeclaration; 2]) -> Result<Self, DesignError> {
         let [one, other] = &pair;
-        if one.effect == other.effect {
+        let relieved = one.effect.compensated();
+        if one.effect == other.effect || (relieved.is_some() && relieved == other.effect.compensated()) {
             return Err(DesignError::SameEffect { effect: one.effect.describe() });
         }
         for EffectDeclaration { effect, .. } in &pair {

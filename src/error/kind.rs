@@ -82,6 +82,8 @@ pub enum InputErrorKind {
     TooLarge { value: u64, most: u64 },
     #[error("a vector has 3 numbers, found {found}")]
     NotAVector { found: usize },
+    #[error("expected 2 numbers, found {found}")]
+    NotAPair { found: usize },
     #[error("{value} is below zero")]
     Negative { value: f64 },
     #[error("{value} is not above zero")]
@@ -199,6 +201,15 @@ pub enum InputErrorKind {
     NoSlide { joint: usize },
     #[error("joint {joint} does not turn: it is not revolute")]
     NotRevolute { joint: usize },
+    #[error("the end of a spring lies on the joint's axis, where its pull has no moment")]
+    OnTheAxis,
+    #[error(
+        "nothing gives way about the axis of joint {joint} that a compensator could relieve; give the joint its \
+         stiffness_N_m_per_rad, or declare joint-compliance = {{ joint = {joint} }} too"
+    )]
+    NothingToRelieve { joint: usize },
+    #[error("joint {joint} has a compensator already on line {line}")]
+    RepeatedCompensator { joint: usize, line: usize },
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
     #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]

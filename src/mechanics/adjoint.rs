@@ -4,8 +4,9 @@
 //! the place of every load, section and segment. Walking inwards from the target, the wrench that does that change as virtual
 //! work on everything passed so far is kept for each of the three coordinates: a load f at r adds the force f × W, with W
 //! the Λ-weighted axes of all sections inwards of it; a section adds what its own place and axes do to its moment. A segment's
-//! derivative is then the work of that wrench on the segment's twist. For the moments themselves this is Λ again, so that Λ
-//! is a fixed point of the sweep, reached by the same contraction as the equilibrium itself.
+//! derivative is then the work of that wrench on the segment's twist, and for the spring of a joint what turning the joint does
+//! to its moment. For the moments themselves this is Λ again, so that Λ is a fixed point of the sweep, reached by the same
+//! contraction as the equilibrium itself.
 //!
 //! Where branches meet, the wrenches of all of them add up. A branch without the target carries the virtual forces of its loads
 //! alone: that is how its masses, by bending the trunk, move the target of another.
@@ -112,7 +113,13 @@ impl Tape {
                 Step::Segment(segment) => {
                     let own = &loads[segment.loads.clone()];
                     let work = |lane: usize| {
-                        let mut work = wrench.on(&columns[segment.column(lane)]);
+                        let column = &columns[segment.column(lane)];
+                        let mut work = wrench.on(column);
+                        if column.pull != 0.0 {
+                            // A spring adds to the moment of the joint's own section.
+                            let own = 3 * segment.unknowns.start;
+                            work += Vector3::from_fn(|i, _| influence[own + i] * column.pull);
+                        }
                         for (load, moved) in own.iter().zip(&moves[segment.moves(lane)]) {
                             work += Vector3::from_fn(|i, _| load.virtually[i].dot(moved));
                         }

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::Wrench;
 use super::arm::Arm;
 use super::element::{Element, LinkLoad};
+use super::joint::Coordinates;
 use super::link::{Beam, Hoist, PointMass};
 use super::segment::{Cut, SLIDE_TILTS, Segment};
 use super::workspace::{Event, Workspace};
@@ -219,14 +220,16 @@ impl<S: Scalar> Arm<S> {
             }
             let (mut twist, mut slip) = (None, None);
             if joint.turns() {
-                if walk.records() {
-                    ws.events.push(Event::Axis { at: walk.frame.origin, axis: walk.frame.axes[2] });
-                }
                 let approach = setup.approach.map(|approach| approach[i]);
                 twist = walk.moments().map(|[moment]| joint.twist(moment, approach));
                 slip = joint.slip(approach);
             }
-            let offset = joint.turn(&mut walk.frame, setup.configuration[i], slip, twist);
+            let Coordinates { angle, offset } = joint.turned(setup.configuration[i], slip, twist);
+            if joint.turns() && walk.records() {
+                let pull = joint.compensator.as_ref().map(|spring| spring.moment(angle));
+                ws.events.push(Event::Axis { at: walk.frame.origin, axis: walk.frame.axes[2], pull });
+            }
+            walk.frame.rotate_z(angle);
             let mut turned = usize::from(joint.turns());
             if let Some(flexibility) = joint.slide {
                 walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::compensator::Compensator;
 use super::imperfection::Nonlinear;
 use super::link::{Beam, PointMass, point_masses};
 use crate::problem::{self, JointKind};
@@ -86,6 +87,8 @@ pub struct Joint<S> {
     pub lateral: Option<[S; 2]>,
     /// Flexibility 1/EI of the slide, a cantilever that is as long as the joint's own d + q [1/(N·m²)].
     pub slide: Option<S>,
+    /// Spring that takes off part of the moment about `z_i`.
+    pub compensator: Option<Compensator<S>>,
     /// Elastic link along a.
     pub beam: Option<Beam<S>>,
     /// Masses carried by frame i.
@@ -115,6 +118,7 @@ impl Joint<f64> {
             nonlinear: None,
             lateral: None,
             slide: None,
+            compensator: None,
             beam: joint.beam.as_ref().map(Beam::nominal),
             bodies: point_masses(&joint.bodies),
         }
@@ -134,6 +138,7 @@ impl Joint<f64> {
             nonlinear: self.nonlinear.as_ref().map(Nonlinear::lift),
             lateral: self.lateral.map(|lateral| lateral.map(S::from)),
             slide: self.slide.map(S::from),
+            compensator: self.compensator.as_ref().map(Compensator::lift),
             beam: self.beam.as_ref().map(Beam::lift),
             bodies: self.bodies.clone(),
         }
@@ -158,8 +163,8 @@ impl<S: Scalar> Joint<S> {
         self.nonlinear.as_ref().zip(approach).map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }
 
-    /// Moves `frame` through Rz(θ + q + `twist`), `slip` added to q; the length d + q \[m\] of the slide beyond.
-    pub(super) fn turn(&self, frame: &mut Frame<S>, q: f64, slip: Option<S>, twist: Option<S>) -> S {
+    /// Where a configuration puts the joint, `slip` added to q and `twist` to the angle.
+    pub(super) fn turned(&self, q: f64, slip: Option<S>, twist: Option<S>) -> Coordinates<S> {
         let (mut angle, mut offset) = self.moved(q);
         match (slip, self.kind) {
             (Some(slip), JointKind::Prismatic) => offset += slip,
@@ -169,8 +174,7 @@ impl<S: Scalar> Joint<S> {
         if let Some(twist) = twist {
             angle += twist;
         }
-        frame.rotate_z(angle.sin_cos());
-        offset
+        Coordinates { angle: angle.sin_cos(), offset }
     }
 
     /// Where a configuration puts the joint.
@@ -214,7 +218,8 @@ impl<S: Scalar> Joint<S> {
     /// Moves `frame` through the whole rigid `T_i`.
     pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
         self.root(frame);
-        let offset = self.turn(frame, q, None, None);
+        let Coordinates { angle, offset } = self.coordinates(q);
+        frame.rotate_z(angle);
         frame.translate_z(offset);
         frame.rotate_y(self.beta.sin_cos);
     }

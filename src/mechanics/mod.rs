@@ -4,6 +4,7 @@ mod adjoint;
 mod anderson;
 mod arm;
 mod beam;
+mod compensator;
 mod element;
 mod forward;
 mod frames;
@@ -20,6 +21,7 @@ mod workspace;
 
 pub use arm::Arm;
 pub use beam::{Cantilever, Deflection, Flexibility, Wrench};
+pub use compensator::Compensator;
 pub use imperfection::{AddedMass, Nonlinear, Rope, Strain};
 pub use joint::{Angle, Coordinates, Joint, Placement};
 pub use link::{Beam, Hoist, PointMass};

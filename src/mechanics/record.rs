@@ -39,6 +39,7 @@ impl Tape {
                         parameter_lane: segment.first_lane(),
                         lanes: segment.first_lane() + parameters[segment.index()],
                         events: if segment.is_beam() { index - own..index } else { index..index },
+                        axis: index.checked_sub(1).filter(|&last| matches!(ws.events[last], Event::Axis { .. })),
                         ..TapedSegment::default()
                     });
                     root = cut.real();
@@ -74,8 +75,12 @@ impl Tape {
             let [dx, dy, dz] = cut.frame.axes.map(|axis| axis.map(|c| c.eps));
             let rotation = segment.tip.vector(&Vector3::new(dy.dot(z), dz.dot(x), dx.dot(y)));
             let velocity = cut.frame.origin.map(|c| c.eps);
+            let pull = match segment.axis.map(|axis| &ws.events[axis]) {
+                Some(Event::Axis { pull: Some(pull), .. }) => pull.eps,
+                _ => 0.0,
+            };
             self.columns[segment.column(lane)] =
-                Column { rotation, translation: velocity - rotation.cross(&segment.tip.origin) };
+                Column { rotation, translation: velocity - rotation.cross(&segment.tip.origin), pull };
             for (moved, event) in self.moves[segment.moves(lane)].iter_mut().zip(&ws.events[segment.events.clone()]) {
                 if let Event::Load { at, .. } = event {
                     *moved = at.map(|c| c.eps);

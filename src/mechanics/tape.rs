@@ -17,6 +17,8 @@ pub(super) struct Column {
     pub rotation: Vector3<f64>,
     /// Of the point at the base origin \[m\] per unit.
     pub translation: Vector3<f64>,
+    /// What the spring at a joint's axis adds to the moment that turns the joint [N·m] per unit.
+    pub pull: f64,
 }
 
 /// How a section's moment is taken: along axes of space, or along axes that turn with the arm.
@@ -59,6 +61,8 @@ pub(super) struct TapedSegment {
     pub lanes: usize,
     /// Its loads as events of the walk.
     pub events: Range<usize>,
+    /// The event of its axis, where it is a joint that turns by a moment.
+    pub axis: Option<usize>,
     /// Its loads, columns and moves in the lists of all: known once it is listed.
     pub loads: Range<usize>,
     pub first_column: usize,

@@ -16,8 +16,8 @@ pub(super) enum Event<S> {
     Load { at: Vector3<S>, force: Vector3<S> },
     /// The tip of a beam element: its three moments are unknowns.
     Tip { at: Vector3<S> },
-    /// A flexible joint: the moment about its axis is an unknown.
-    Axis { at: Vector3<S>, axis: Vector3<S> },
+    /// A flexible joint: the moment about its axis is an unknown, of all loads beyond and of the spring that may pull there [N·m].
+    Axis { at: Vector3<S>, axis: Vector3<S>, pull: Option<S> },
     /// What tilts about two axes: the moments about them are unknowns.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
     /// The end of a segment of the arm that was walked alone.
@@ -88,10 +88,11 @@ impl<S> Default for Workspace<S> {
 }
 
 impl Workspace<f64> {
-    /// Sum of the sizes of all moments about the base in the last walk [N·m].
+    /// Sum of the sizes of all moments about the base in the last walk, and of those of springs [N·m].
     pub(super) fn turning(&self) -> f64 {
         let term = |event: &Event<f64>| match event {
             Event::Load { at, force } => at.norm() * force.norm(),
+            Event::Axis { pull: Some(pull), .. } => pull.abs(),
             _ => 0.0,
         };
         self.events.iter().map(term).sum()
@@ -124,7 +125,10 @@ impl<S: Scalar> Workspace<S> {
                     let moment = moment_sum - at.cross(&force_sum);
                     next_moments.extend([moment.z, moment.y, moment.x]);
                 }
-                Event::Axis { at, axis } => next_moments.push(axis.dot(&(moment_sum - at.cross(&force_sum)))),
+                Event::Axis { at, axis, pull } => {
+                    let moment = axis.dot(&(moment_sum - at.cross(&force_sum)));
+                    next_moments.push(pull.map_or(moment, |pull| moment + pull));
+                }
                 Event::Tilt { at, axes: [x, y] } => {
                     let moment = moment_sum - at.cross(&force_sum);
                     next_moments.extend([y.dot(&moment), x.dot(&moment)]);

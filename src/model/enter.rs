@@ -1,7 +1,8 @@
 //! How a parameter enters the arm, by its slot.
 
-use crate::mechanics::{AddedMass, Angle, Arm, Beam, Flexibility, Nonlinear, Rope, Strain};
+use crate::mechanics::{AddedMass, Angle, Arm, Beam, Compensator, Flexibility, Nonlinear, Rope, Strain};
 use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::problem::Effect;
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
@@ -57,6 +58,17 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
     }
 }
 
+/// Puts the spring of an effect where it is, without any pull, unless the joint has one.
+pub(super) fn place(arm: &mut Arm<f64>, effect: &Effect) {
+    if let Effect::GravityCompensator { joint, anchor, lever, free_length } = effect
+        && let Some(joint) = arm.joints.get_mut(joint.wrapping_sub(1))
+    {
+        let free_length = free_length.0;
+        let spring = Compensator { anchor: *anchor, lever: *lever, free_length, rate: 0.0, preload: 0.0 };
+        joint.compensator.get_or_insert(spring);
+    }
+}
+
 /// A link that was declared rigid, ready to bend.
 fn weightless() -> Beam<f64> {
     Beam { mass: 0.0, flexibility: Flexibility::RIGID, masses: Vec::new(), hoist: None, strain: None, added: None }
@@ -92,6 +104,8 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play += x,
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
+                (JointField::SpringRate, ..) => joint.compensator.iter_mut().for_each(|spring| spring.rate += x),
+                (JointField::SpringPreload, ..) => joint.compensator.iter_mut().for_each(|spring| spring.preload += x),
                 (JointField::SlideFlexibility, ..) => joint.slide = Some(joint.slide.map_or(x, |known| known + x)),
                 _ => {}
             }

@@ -34,7 +34,7 @@ use nalgebra::Vector3;
 use crate::error::InputError;
 use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{Driver, LinearConstraint, Parameter, Slot, constrain, resolve};
-use crate::problem::{BasePose, Problem};
+use crate::problem::{BasePose, Effect, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use driven::{Commands, Driven};
@@ -79,6 +79,9 @@ impl Model {
         for effect in effects {
             enter::prepare(&mut nominal, effect.slot, effect.nominal);
         }
+        for declared in &problem.effects {
+            enter::place(&mut nominal, &declared.effect);
+        }
         Ok(Self {
             constraints: constrain(problem, bases, targets, effects, &parameters)?,
             nominal,
@@ -116,6 +119,16 @@ impl Model {
                 lower: f64::NEG_INFINITY,
                 upper: f64::INFINITY,
             });
+        }
+        model
+    }
+
+    /// The same model with what these effects declare of the arm besides their parameters: where springs are.
+    #[must_use]
+    pub(crate) fn placing(&self, effects: &[Effect]) -> Self {
+        let mut model = self.clone();
+        for effect in effects {
+            enter::place(&mut model.nominal, effect);
         }
         model
     }

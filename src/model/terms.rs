@@ -104,6 +104,9 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
     };
     driven
         && match parameter.slot {
+            Slot::Joint { joint, field: JointField::SpringRate | JointField::SpringPreload } => {
+                problem.effects.iter().any(|own| own.effect.compensated() == Some(joint + 1))
+            }
             Slot::Joint { joint, .. } => joint < joints,
             Slot::Beam { joint, field } => problem.joints.get(joint).is_some_and(|joint| match field {
                 BeamField::Flexibility => joint.a != 0.0,

@@ -22,6 +22,10 @@ pub enum Mount {
     Base,
 }
 
+/// Length of a spring at which it pulls with its preload alone \[m\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeLength(pub f64);
+
 /// An argument of an effect as the files write it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -35,6 +39,10 @@ pub enum Argument {
     Name(String),
     /// A time \[s\], or the order of a wave.
     Number(f64),
+    /// A point of a plane \[m\].
+    Point([f64; 2]),
+    /// A length that says nothing of the place \[m\].
+    Length(f64),
     /// The base, `true`.
     Base(bool),
 }
@@ -54,21 +62,37 @@ impl Argument {
             }
             Self::Name(name) => quoted(name),
             Self::Base(there) => there.to_string(),
-            // A float, whatever its value.
-            Self::Number(number) if number.fract() == 0.0 => format!("{number:.1}"),
-            Self::Number(number) => number.to_string(),
+            Self::Point([x, y]) => format!("[{}, {}]", float(*x), float(*y)),
+            Self::Number(number) | Self::Length(number) => float(*number),
         }
     }
 
-    /// Its part of the place of an effect: orders have none.
+    /// Its part of the place of an effect: orders have none, nor has what is about a place that is named.
     pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),
             Self::Name(name) => Some(name.clone()),
             Self::Number(number) => Some(number.to_string()),
             Self::Base(_) => Some("base".to_owned()),
-            Self::Orders(_) => None,
+            Self::Orders(_) | Self::Point(_) | Self::Length(_) => None,
         }
+    }
+}
+
+/// A float, whatever its value.
+fn float(number: f64) -> String {
+    if number.fract() == 0.0 { format!("{number:.1}") } else { number.to_string() }
+}
+
+impl From<&[f64; 2]> for Argument {
+    fn from(point: &[f64; 2]) -> Self {
+        Self::Point(*point)
+    }
+}
+
+impl From<&FreeLength> for Argument {
+    fn from(length: &FreeLength) -> Self {
+        Self::Length(length.0)
     }
 }
 
@@ -152,6 +176,11 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
             Some(item) if !turns => Err(item.error(InputErrorKind::NotRevolute { joint })),
             _ => Ok(joint),
         }
+    }
+
+    /// The same of a joint whose load something takes off: that it gives way is seen when all effects are read.
+    pub fn relieved_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        self.turning_joint(key)
     }
 
     /// The number of a prismatic joint that takes a command.
@@ -249,6 +278,23 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let found = self.section.positive(base, Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
         found.ok_or_else(|| self.section.missing(base, Unit::Angle.spelled(base)))
     }
+
+    /// An end of a spring, x and y in the plane across the axis, which it does not lie on \[m\]; its key ends in the unit.
+    pub fn arm(&mut self, key: &str) -> Result<[f64; 2], InputError> {
+        let base = key.strip_suffix("_m").unwrap_or(key);
+        let Some((item, suffix)) = self.section.quantity(base, Unit::Length)? else {
+            return Err(self.section.missing(base, Unit::Length.spelled(base)));
+        };
+        let end = item.pair()?.map(suffix.to_si);
+        if end[0].hypot(end[1]) > 0.0 { Ok(end) } else { Err(item.error(InputErrorKind::OnTheAxis)) }
+    }
+
+    /// The free length of a spring, 0 or more \[m\]; its key ends in the unit.
+    pub fn free_length(&mut self, key: &str) -> Result<FreeLength, InputError> {
+        let base = key.strip_suffix("_m").unwrap_or(key);
+        let found = self.section.not_negative(base, Unit::Length)?;
+        found.map(FreeLength).ok_or_else(|| self.section.missing(base, Unit::Length.spelled(base)))
+    }
 }
 
 /// Examples of the same kinds on an arm, as TOML writes them.
@@ -286,6 +332,14 @@ impl<'s> Examples<'s> {
     pub fn turning_joint(&self) -> String {
         let turns = |&number: &usize| self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Revolute);
         self.moving().find(turns).unwrap_or(self.first()).to_string()
+    }
+
+    pub fn relieved_joint(&self) -> String {
+        let gives = |&number: &usize| {
+            let turns = |own: &Joint| own.kind == JointKind::Revolute && own.stiffness.is_some();
+            self.joints.get(number - 1).is_some_and(turns)
+        };
+        self.moving().find(gives).map_or_else(|| self.turning_joint(), |number| number.to_string())
     }
 
     pub fn sliding_joint(&self) -> String {
@@ -328,6 +382,16 @@ impl<'s> Examples<'s> {
     #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
     pub fn way(&self) -> String {
         "0.8".to_owned()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn arm(&self) -> String {
+        "[0.0, 0.5]".to_owned()
+    }
+
+    #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]
+    pub fn free_length(&self) -> String {
+        "0.3".to_owned()
     }
 
     #[expect(clippy::unused_self, reason = "a method like those of the other kinds")]

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::argument::{Argument, Examples, Mount, Reader};
+use super::argument::{Argument, Examples, FreeLength, Mount, Reader};
 use super::{Data, Equilibrium, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 
@@ -110,6 +110,13 @@ effects! {
     JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = any_joint }
     /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
     JointLateralCompliance "joint-lateral-compliance" { joint: usize = any_joint }
+    /// A spring from an anchor before the joint to a lever on the link behind it pulls the two together: with a moment about the axis.
+    GravityCompensator "gravity-compensator" {
+        joint: usize = relieved_joint,
+        anchor: [f64; 2] = arm as "anchor_m",
+        lever: [f64; 2] = arm as "lever_m",
+        free_length: FreeLength = free_length as "free_length_m"
+    }
     /// Δθ = k (T − T₀).
     JointThermalDrift "joint-thermal-drift" { joint: usize = moving_joint }
     /// Δθ = k (T̃ − T₀) with a temperature that lags, dT̃/dt = (T − T̃)/τ.
@@ -213,6 +220,14 @@ impl Effect {
     pub fn covariate(&self) -> Option<&str> {
         match self {
             Self::Covariate { of, .. } => Some(of),
+            _ => None,
+        }
+    }
+
+    /// The joint, from 1, whose load it takes off by a spring.
+    pub(crate) fn compensated(&self) -> Option<usize> {
+        match self {
+            Self::GravityCompensator { joint, .. } => Some(*joint),
             _ => None,
         }
     }

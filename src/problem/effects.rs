@@ -41,12 +41,39 @@ pub(super) fn check(
     joints: &[Joint],
     data: &Data,
 ) -> Result<(), InputError> {
-    for EffectDeclaration { effect, location } in effects {
-        if let Some(kind) = effect.refusal(statics, joints, data) {
-            return Err(location.clone().error(kind));
+    effects.iter().try_for_each(|declared| check_alone(declared, statics, joints, data))?;
+    check_compensators(effects, joints)
+}
+
+/// Refuses one that could never act, whatever else is declared.
+fn check_alone(
+    EffectDeclaration { effect, location }: &EffectDeclaration,
+    statics: Statics,
+    joints: &[Joint],
+    data: &Data,
+) -> Result<(), InputError> {
+    effect.refusal(statics, joints, data).map_or(Ok(()), |kind| Err(location.clone().error(kind)))
+}
+
+/// Refuses a compensator where nothing gives way about the joint's axis, and a second one of one joint.
+fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result<(), InputError> {
+    for (k, EffectDeclaration { effect, location }) in effects.iter().enumerate() {
+        let Some(joint) = effect.compensated() else { continue };
+        if let Some(first) = effects.iter().take(k).find(|known| known.effect.compensated() == Some(joint)) {
+            let line = first.location.line.unwrap_or(0);
+            return Err(location.clone().error(InputErrorKind::RepeatedCompensator { joint, line }));
+        }
+        if !gives_way(joint, joints, effects.iter().map(|own| &own.effect)) {
+            return Err(location.clone().error(InputErrorKind::NothingToRelieve { joint }));
         }
     }
     Ok(())
+}
+
+/// Whether a joint, counted from 1, turns by a moment about its axis: it has a stiffness, or one of these effects makes it compliant.
+pub(crate) fn gives_way<'e>(joint: usize, joints: &[Joint], mut effects: impl Iterator<Item = &'e Effect>) -> bool {
+    let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|own| own.stiffness.is_some());
+    stiff || effects.any(|effect| *effect == Effect::JointCompliance { joint })
 }
 
 /// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3 }`; `hoist-force` alone
@@ -76,7 +103,9 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
         return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
     };
     let declared = EffectDeclaration { effect: effect(name, item, &problem.joints)?, location: item.location() };
-    check(std::slice::from_ref(&declared), problem.statics, &problem.joints, &problem.data)?;
+    check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
+    let all = [problem.effects.as_slice(), std::slice::from_ref(&declared)].concat();
+    check_compensators(&all, &problem.joints)?;
     Ok(declared)
 }
 

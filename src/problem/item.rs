@@ -197,6 +197,15 @@ impl<'a, 'i> Item<'a, 'i> {
         Ok(array.iter().enumerate().map(element).collect())
     }
 
+    /// Two numbers.
+    pub fn pair(&self) -> Result<[f64; 2], InputError> {
+        let elements = self.list("a list of 2 numbers")?;
+        match elements.as_slice() {
+            [x, y] => Ok([x.number()?, y.number()?]),
+            _ => Err(self.error(InputErrorKind::NotAPair { found: elements.len() })),
+        }
+    }
+
     /// Three numbers.
     pub fn vector(&self) -> Result<Vector3<f64>, InputError> {
         let elements = self.list("a list of 3 numbers")?;

@@ -31,7 +31,7 @@ use nalgebra::Vector3;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 
 pub(crate) use argument::HIGHEST_ORDER;
-pub use argument::{Argument, Mount};
+pub use argument::{Argument, FreeLength, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, HeldOut, JointSource, OwnCovariate};

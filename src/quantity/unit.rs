@@ -20,6 +20,8 @@ pub enum Unit {
     Temperature,
     /// \[s\]
     Time,
+    /// [N/m]
+    ForcePerLength,
     /// [N·m/rad]
     TorsionalStiffness,
     /// EA \[N\]
@@ -132,6 +134,7 @@ impl Unit {
             Self::Acceleration => row("an acceleration", "m/s²", const { &[si("m_s2")] }, Plain),
             Self::Temperature => row("a temperature", "°C", const { &[si("C")] }, Plain),
             Self::Time => row("a time", "s", const { &[si("s")] }, Plain),
+            Self::ForcePerLength => row("a force per length", "N/m", const { &[si("N_per_m")] }, Prefixed),
             Self::TorsionalStiffness => row("a stiffness", "N·m/rad", const { &[si("N_m_per_rad")] }, Prefixed),
             Self::AxialRigidity => row("a force", "N", const { &[si("N")] }, Prefixed),
             Self::FlexuralRigidity => row("a rigidity", "N·m²", const { &[si("N_m2")] }, Prefixed),

@@ -170,7 +170,8 @@ fn arguments(effect: &Effect) -> Value {
             Argument::Joint(joint) => whole(joint),
             Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
             Argument::Name(name) => Value::from(name),
-            Argument::Number(number) => Value::from(number),
+            Argument::Number(number) | Argument::Length(number) => Value::from(number),
+            Argument::Point(point) => Value::Array(point.into_iter().collect::<Array>()),
             Argument::Base(there) => Value::from(there),
         };
         (key, value)

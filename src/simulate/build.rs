@@ -1,9 +1,9 @@
 //! From the declared arm and its effects to a chain of pieces, springs and loads.
 
-use nalgebra::Vector3;
+use nalgebra::{Rotation2, Vector2, Vector3};
 
 use super::Rig;
-use super::chain::{Chain, Force, Hinge, Place};
+use super::chain::{Chain, Force, Hinge, Place, Spring};
 use super::effect::TrueEffect;
 use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
@@ -41,6 +41,9 @@ impl Rig {
                 JointKind::Fixed => turn += miss,
             }
             chain.hinge(about);
+            if !about.is_rigid() {
+                chain.spring(self.springs(number, turn));
+            }
             chain.end().rotate_z(turn.sin_cos());
             self.slide(number, slide, &mut chain);
             chain.end().rotate_y(joint.beta.sin_cos());
@@ -104,6 +107,19 @@ impl Rig {
             }
         }
         (before, about)
+    }
+
+    /// The springs of compensators at a joint that is at this angle \[rad\] before it gives way.
+    fn springs(&self, number: usize, angle: f64) -> impl Iterator<Item = Spring> {
+        self.parts().filter_map(move |part| match part {
+            (Effect::GravityCompensator { joint, anchor, lever, free_length }, &[rate, preload])
+                if *joint == number =>
+            {
+                let (anchor, end) = (Vector2::from(*anchor), Rotation2::new(angle) * Vector2::from(*lever));
+                Some(Spring { piece: 0, anchor, end, free_length: free_length.0, rate, preload })
+            }
+            _ => None,
+        })
     }
 
     /// Payload \[kg\].

@@ -1,6 +1,6 @@
 //! An arm as the rig sees it: rigid pieces joined by lumped springs, and the loads that they carry.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Rotation2, Vector2, Vector3};
 
 use crate::spatial::Frame;
 
@@ -51,6 +51,33 @@ pub(super) struct Motion {
     pub rotation: Vector3<f64>,
     /// Displacement along x \[m\].
     pub stretch: f64,
+}
+
+/// A spring across a hinge, which pulls a point of the piece behind it towards one of the piece before it; x and y of the hinge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spring {
+    /// Index of the piece behind the hinge.
+    pub piece: usize,
+    /// The point before the hinge \[m\].
+    pub anchor: Vector2<f64>,
+    /// The point behind it, where the hinge has not turned \[m\].
+    pub end: Vector2<f64>,
+    /// Length at which the preload alone pulls \[m\].
+    pub free_length: f64,
+    /// Tension per length [N/m].
+    pub rate: f64,
+    /// Tension at the free length \[N\].
+    pub preload: f64,
+}
+
+impl Spring {
+    /// Moment about z on the piece behind the hinge, which has turned by an angle \[rad\] [N·m].
+    pub fn moment(&self, turned: f64) -> f64 {
+        let end = Rotation2::new(turned) * self.end;
+        let way = self.anchor - end;
+        let tension = self.preload + self.rate * (way.norm() - self.free_length);
+        way.try_normalize(0.0).map_or(0.0, |direction| end.perp(&(direction * tension)))
+    }
 }
 
 /// A rigid piece behind a hinge.
@@ -114,6 +141,7 @@ impl Force {
 pub(super) struct Chain {
     pub pieces: Vec<Piece>,
     pub loads: Vec<Load>,
+    pub springs: Vec<Spring>,
     /// Index of the piece at which it goes on, and where that ends so far, seen from its hinge.
     last: usize,
     end: Frame<f64>,
@@ -123,7 +151,8 @@ impl Chain {
     /// A single piece of no length, clamped to the base by `hinge`.
     pub fn new(hinge: Hinge) -> Self {
         let root = Place { piece: None, frame: Frame::identity() };
-        Self { pieces: vec![Piece { hinge, root }], loads: Vec::new(), last: 0, end: Frame::identity() }
+        let pieces = vec![Piece { hinge, root }];
+        Self { pieces, loads: Vec::new(), springs: Vec::new(), last: 0, end: Frame::identity() }
     }
 
     /// Where the chain ends so far, seen from its last hinge.
@@ -147,6 +176,12 @@ impl Chain {
             self.pieces.push(Piece { hinge, root: self.place() });
             (self.last, self.end) = (self.pieces.len() - 1, Frame::identity());
         }
+    }
+
+    /// Puts springs across the hinge behind which the chain has just gone on.
+    pub fn spring(&mut self, springs: impl Iterator<Item = Spring>) {
+        let piece = self.last;
+        self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
     /// Hangs a load at a point \[m\] seen from where the chain ends so far.

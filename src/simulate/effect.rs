@@ -108,6 +108,7 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         }
         Effect::JointNonlinearStiffness { .. } => named(&[("cubic", Unit::CubicCompliance)]),
         Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => about_xy(Unit::Compliance),
+        Effect::GravityCompensator { .. } => named(&[("rate", Unit::ForcePerLength), ("preload", Unit::Force)]),
         Effect::JointHysteresis { .. } => named(&[("amplitude", Unit::Angle)]),
         Effect::JointThermalDrift { joint } | Effect::JointThermalDriftLag { joint, .. } => {
             named(&[("rate", if slides(joint) { Unit::LengthPerDegree } else { Unit::AnglePerDegree })])

@@ -109,8 +109,11 @@ impl AtRest {
             }
             let hinge = &self.hinges[k];
             let about_hinge = moment - hinge.origin.cross(&force);
-            let wanted = piece.hinge.give(&hinge.resolve(&force), &hinge.resolve(&about_hinge));
             let motion = &self.motions[k];
+            let mut felt = hinge.resolve(&about_hinge);
+            let springs = chain.springs.iter().filter(|spring| spring.piece == k);
+            felt.z += springs.map(|spring| spring.moment(motion.rotation.z)).sum::<f64>();
+            let wanted = piece.hinge.give(&hinge.resolve(&force), &felt);
             missing[k] =
                 Motion { rotation: wanted.rotation - motion.rotation, stretch: wanted.stretch - motion.stretch };
             sum += missing[k].rotation.norm() + missing[k].stretch.abs();

@@ -1,9 +1,9 @@
 //! The tables `[[effect]]` of a truth: an effect as the problem file declares it, and beside it how strong it is.
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::effect::NAMES;
-use crate::problem::effects::effect;
+use crate::problem::effects::{effect, gives_way};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};
@@ -17,10 +17,24 @@ pub(super) fn read(
     problem: &Problem,
     poses: &PoseRanges,
 ) -> Result<Vec<TrueEffect>, InputError> {
-    root.sections("effect")?.into_iter().map(|section| one(section, problem, poses)).collect()
+    let all = root.sections("effect")?.into_iter().map(|section| one(section, problem, poses));
+    let all = all.collect::<Result<Vec<(TrueEffect, Location)>, _>>()?;
+    for (own, location) in &all {
+        let Some(joint) = own.parts().and_then(|(effect, _)| effect.compensated()) else { continue };
+        let effects = all.iter().filter_map(|(own, _)| own.parts()).map(|(effect, _)| effect);
+        if !gives_way(joint, &problem.joints, effects) {
+            return Err(location.clone().error(InputErrorKind::NothingToRelieve { joint }));
+        }
+    }
+    Ok(all.into_iter().map(|(own, _)| own).collect())
 }
 
-fn one(mut section: Section<'_, '_>, problem: &Problem, poses: &PoseRanges) -> Result<TrueEffect, InputError> {
+/// One with where it stands.
+fn one(
+    mut section: Section<'_, '_>,
+    problem: &Problem,
+    poses: &PoseRanges,
+) -> Result<(TrueEffect, Location), InputError> {
     let (name, item) = declaration(&section)?;
     section.get(name);
     let cause = if name == OUTSIDE {
@@ -62,6 +76,7 @@ fn one(mut section: Section<'_, '_>, problem: &Problem, poses: &PoseRanges) -> R
     }
     // The number of values is that of the keys.
     TrueEffect::new(cause, &values, &problem.joints)
+        .map(|own| (own, item.location()))
         .map_err(|_| item.error(InputErrorKind::NoStrength { write: write() }))
 }
 

@@ -1,9 +1,14 @@
 //! Every effect of the catalogue with a strength of a realistic size.
 
-use flexcal::problem::Effect;
+use flexcal::problem::{Effect, FreeLength};
 
 /// An effect and its strength in SI units.
 pub type Strong = (Effect, Vec<f64>);
+
+/// A spring at a joint between two points of the plane across its axis \[m\].
+pub fn compensator(joint: usize, anchor: [f64; 2], lever: [f64; 2], free_length: f64) -> Effect {
+    Effect::GravityCompensator { joint, anchor, lever, free_length: FreeLength(free_length) }
+}
 
 /// Every family on the lunar sampler, for which its second link, which is rigid, has a length.
 pub fn of_lunar_sampler() -> Vec<Strong> {
@@ -16,6 +21,7 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
         (Effect::Backlash { joint: 3 }, vec![5e-4]),
         (Effect::JointNonlinearStiffness { joint: 2 }, vec![2e-11]),
         (Effect::JointLateralCompliance { joint: 3 }, vec![1e-6, 2e-6]),
+        (compensator(2, [0.1, -0.25], [0.3, 0.15], 0.2), vec![900.0, 80.0]),
         (Effect::JointThermalDrift { joint: 2 }, vec![1e-5]),
         (Effect::JointThermalDriftLag { joint: 3, time_constant: 200.0 }, vec![1e-5]),
         (Effect::JointHysteresis { joint: 2, distance: 0.7 }, vec![3e-4]),

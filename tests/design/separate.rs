@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::design::{Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate};
-use flexcal::diagnose::close;
+use flexcal::diagnose::{close, separation};
 use flexcal::identify::Options;
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::{Effect, Problem};
@@ -140,8 +140,25 @@ fn a_pair_must_be_two_effects_that_poses_show() {
     let refused = |names| pair(&problem, names).unwrap_err().to_string();
     assert!(refused(["hoist-force", "hoist-force = true"]).contains("the same"));
     assert!(refused(["hoist-force", "tracker-drift"]).contains("effect of time"));
+    let springs = [0.2, 0.3].map(|free| {
+        format!("gravity-compensator = {{ joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = {free} }}")
+    });
+    assert!(refused([&springs[0], &springs[1]]).contains("the same"));
     assert!(problem.effect("gear-ratio = { joint = 9 }", Path::new("test")).is_err());
     let mut declared = problem.clone();
     declared.effects.push(problem.effect("hoist-force", Path::new("test")).unwrap());
     assert!(pair(&declared, ["hoist-force", "payload-mass"]).unwrap_err().to_string().contains("already"));
+}
+
+#[test]
+fn a_spring_is_told_from_a_wave_of_its_joint() {
+    let (problem, truth) = lunar();
+    let poses = ranges(&truth).draw(&problem, 40, Extremes::No, 1, 0);
+    let spring =
+        "gravity-compensator = { joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = 0 }";
+    let spring = problem.effect(spring, Path::new("test")).unwrap().effect;
+    let wave = Effect::JointHarmonic { joint: 2, orders: vec![1] };
+    // By its preload alone: its rate does what a wave does.
+    let angle = separation(&problem, &poses, [&spring, &wave]).unwrap().angle.unwrap();
+    assert!(angle > 0.02, "{angle} rad");
 }

@@ -14,7 +14,7 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::arms::{ODD, TREE, golden_problem, parse};
-use crate::common::effects::{Strong, of_lunar_sampler};
+use crate::common::effects::{Strong, compensator, of_lunar_sampler};
 use crate::common::made::{at_random, of_targets};
 
 /// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts on it.
@@ -41,6 +41,8 @@ pub fn odd() -> (Problem, Vec<Strong>) {
         (Effect::JointNonlinearStiffness { joint: 4 }, vec![1e-8]),
         (Effect::JointNonlinearStiffness { joint: 3 }, vec![1e-7]),
         (Effect::JointLateralCompliance { joint: 4 }, vec![1e-5, 2e-5]),
+        (compensator(3, [-0.2, 0.3], [0.1, 0.25], 0.15), vec![1500.0, 60.0]),
+        (compensator(5, [0.15, 0.1], [-0.25, 0.05], 0.0), vec![800.0, -40.0]),
         (Effect::JointThermalDrift { joint: 4 }, vec![2e-5]),
         (Effect::JointThermalDriftLag { joint: 4, time_constant: 130.0 }, vec![2e-5]),
         (Effect::JointHysteresis { joint: 5, distance: 0.6 }, vec![2e-3]),
@@ -93,6 +95,8 @@ pub fn tree() -> (Problem, Vec<Strong>) {
         (Effect::Backlash { joint: 3 }, vec![5e-4]),
         (Effect::JointNonlinearStiffness { joint: 2 }, vec![1e-7]),
         (Effect::JointLateralCompliance { joint: 2 }, vec![1e-5, 2e-5]),
+        (compensator(1, [0.3, 0.0], [0.2, 0.2], 0.1), vec![1200.0, 100.0]),
+        (compensator(8, [0.0, -0.1], [0.12, 0.0], 0.05), vec![2500.0, 30.0]),
         (Effect::JointThermalDrift { joint: 9 }, vec![2e-4]),
         (Effect::JointHysteresis { joint: 8, distance: 0.9 }, vec![2e-3]),
         (Effect::LinkThermalBendingLag { link: link("T"), time_constant: 250.0 }, vec![1e-5, 2e-5]),

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::catalogue::{declared, lunar, odd, of_effects, poses, strengths, tree};
 use crate::common::arms::path;
-use crate::common::effects::Strong;
+use crate::common::effects::{Strong, compensator};
 use crate::common::made::{labels, model_of};
 
 /// Largest difference of a column of the Jacobian, relative to its norm.
@@ -132,6 +132,39 @@ fn all_effects_at_once_with_everything_else_free_in_two_sessions() {
         let mut rows = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(6));
         rows.session = labels((0..10).map(|k| if k < 5 { "A" } else { "B" }));
         check(what, &arm, &all, &rows, true, &[]);
+    }
+}
+
+#[test]
+fn a_spring_with_everything_else_free() {
+    // A spring whose moment changes with the joint by a tenth of the joint's own stiffness: what turns the joint changes its load.
+    let soft = |mut arm: Problem| {
+        arm.joints.iter_mut().filter_map(|joint| joint.stiffness.as_mut()).for_each(|stiffness| *stiffness /= 8.0);
+        arm
+    };
+    let cases = [
+        ("lunar sampler", soft(lunar().0), compensator(3, [0.1, -0.25], [0.3, 0.15], 0.2)),
+        ("odd arm", soft(odd().0), compensator(3, [-0.2, 0.3], [0.1, 0.25], 0.15)),
+        ("tree", soft(tree().0), compensator(2, [-0.2, 0.3], [0.3, 0.05], 0.0)),
+    ];
+    for (what, mut arm, spring) in cases {
+        arm.statics.beam_elements = 2;
+        if arm.parameters.is_empty() {
+            arm.parameters = crate::common::arms::parse(crate::common::arms::TREE).parameters;
+        }
+        let Effect::GravityCompensator { joint, .. } = spring else { unreachable!() };
+        let more = [
+            (spring.clone(), vec![5e3, 100.0]),
+            (Effect::GearRatio { joint }, vec![4e-3]),
+            (Effect::Backlash { joint }, vec![5e-3]),
+            (Effect::JointCompliance { joint }, vec![1e-5]),
+            (Effect::JointLateralCompliance { joint }, vec![1e-5, 2e-5]),
+        ];
+        let rows = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(11));
+        for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
+            arm.statics.equilibrium = equilibrium;
+            check(what, &arm, &more, &rows, true, &[]);
+        }
     }
 }
 

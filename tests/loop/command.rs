@@ -148,6 +148,35 @@ fn the_closed_problem_is_input_again() {
 }
 
 #[test]
+fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
+    let bench = Bench::new(NONE);
+    let spring =
+        "gravity-compensator = { joint = 2, anchor_mm = [100, -250], lever_m = [0.3, 0.15], free_length_m = 0.2 }";
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
+    let strengths = "rate_N_per_m = 900\npreload_N = 80\n[[effect]]\ngear-ratio = { joint = 3 }\nerror_relative = 1e-3";
+    fs::write(bench.path("truth.toml"), format!("{truth}\n[[effect]]\n{spring}\n{strengths}\n")).unwrap();
+    bench.run(&["simulate", "arm", "--truth", "truth.toml", "--poses", "78", "--seed", "5", "--out", "sim"]).success();
+    fs::copy(bench.path("sim/measurements.csv"), bench.path("arm/data.csv")).unwrap();
+    let untried = bench.json(&["trace", "arm"]);
+    assert!(!untried.to_string().contains("gravity-compensator"), "{untried:#}");
+    bench.edit("arm/problem.toml", |text| format!("{text}\n[[effect]]\n{spring}\n"));
+    let closed = bench.json(&["loop", "arm", "--out", "closed"]);
+    let added = closed["effects"].to_string();
+    assert!(added.contains("gear-ratio") && !added.contains("gravity-compensator"), "{added}");
+    let written = fs::read_to_string(bench.path("closed/problem.closed.toml")).unwrap();
+    assert!(written.contains(spring), "{written}");
+    let again = bench.json(&["identify", "closed/problem.closed.toml"]);
+    let estimates = again["parameters"].as_array().unwrap();
+    for (name, truth) in [("rate", 900.0), ("preload", 80.0)] {
+        let name = format!("gravity-compensator[2].{name}");
+        let own = estimates.iter().find(|own| own["name"] == name.as_str()).unwrap();
+        let (value, error) = (own["estimate"].as_f64().unwrap(), own["std_error"].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * error, "{name}: {value} ± {error}");
+    }
+}
+
+#[test]
 fn other_data_go_into_the_closed_problem() {
     let bench = Bench::new(THERMAL);
     fs::rename(bench.path("arm/data.csv"), bench.path("other data.csv")).unwrap();

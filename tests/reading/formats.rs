@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flexcal::error::{InputError, Warning};
 use flexcal::measurement::{Measurements, Split};
-use flexcal::problem::{Effect, Equilibrium, Freedom, HeldOut, JointKind, Problem, Quantities};
+use flexcal::problem::{Effect, Equilibrium, FreeLength, Freedom, HeldOut, JointKind, Problem, Quantities};
 use nalgebra::Vector3;
 use tempfile::TempDir;
 
@@ -146,6 +146,15 @@ fn every_effect_has_its_arguments() {
         ("backlash = { joint = 1 }", Effect::Backlash { joint: 1 }),
         ("joint-nonlinear-stiffness = { joint = 1 }", Effect::JointNonlinearStiffness { joint: 1 }),
         ("joint-lateral-compliance = { joint = 1 }", Effect::JointLateralCompliance { joint: 1 }),
+        (
+            "gravity-compensator = { joint = 1, anchor_mm = [-50, 400], lever_m = [0.5, 0], free_length_mm = 250 }",
+            Effect::GravityCompensator {
+                joint: 1,
+                anchor: [-0.05, 0.4],
+                lever: [0.5, 0.0],
+                free_length: FreeLength(0.25),
+            },
+        ),
         ("joint-thermal-drift = { joint = 1 }", Effect::JointThermalDrift { joint: 1 }),
         ("joint-hysteresis = { joint = 1, distance_rad = 0.5 }", Effect::JointHysteresis { joint: 1, distance: 0.5 }),
         (
@@ -187,8 +196,22 @@ fn every_effect_has_its_arguments() {
          beam.name = 'A'\nbeam.hoist.at_m = [0.5, 0, 0]\n[[joint]]\n[[joint]]\nkind = 'prismatic'\n{}",
         tables.concat()
     );
-    let declared: Vec<_> = parse(&text).effects.into_iter().map(|declaration| declaration.effect).collect();
+    let problem = parse(&text);
+    let declared: Vec<_> = problem.effects.iter().map(|declaration| declaration.effect.clone()).collect();
     assert_eq!(declared, effects.map(|(_, effect)| effect));
+    // They are written as they are read.
+    let bare = parse(text.split("[[effect]]").next().unwrap());
+    for effect in declared.iter().filter(|effect| effect.name() != "gravity-compensator") {
+        assert_eq!(bare.effect(&effect.declaration(), Path::new("again")).unwrap().effect, *effect);
+    }
+    let alone = bare.with_effect(Effect::JointCompliance { joint: 1 });
+    let compensator = declared.iter().find(|effect| effect.name() == "gravity-compensator").unwrap();
+    assert_eq!(alone.effect(&compensator.declaration(), Path::new("again")).unwrap().effect, *compensator);
+    let error =
+        |problem: &Problem| problem.effect(&compensator.declaration(), Path::new("again")).unwrap_err().to_string();
+    assert!(error(&bare).contains("gives way about the axis of joint 1"), "{}", error(&bare));
+    let twice = alone.with_effect(compensator.clone());
+    assert!(error(&twice).contains("has a compensator already"), "{}", error(&twice));
 }
 
 const MIXED: &str = "name = 'arm'\n[[joint]]\nkind = 'fixed'\n[[joint]]\n[[joint]]\nkind = 'prismatic'\n";

@@ -1,6 +1,6 @@
 //! Results that can be checked by hand: a straight arm of one link, clamped or on one joint.
 
-use flexcal::problem::{Effect, PoseConditions, Problem};
+use flexcal::problem::{Effect, FreeLength, PoseConditions, Problem};
 use nalgebra::Vector3;
 
 use super::bench::{effect, position, problem};
@@ -138,6 +138,26 @@ fn compliances_tilt_by_the_moment() {
     upright.joints[0].alpha = 0.0;
     let tilted = effect(&upright, Effect::JointLateralCompliance { joint: 1 }, &[0.0, 1e-7]);
     near(position(&upright, vec![tilted], &at(3.0)).z, -1e-7 * moment * arm_length, 1e-9);
+}
+
+#[test]
+fn a_spring_lifts_what_a_joint_carries() {
+    // A right angle of 0.3, 0.4 and 0.5 m at the joint, whose y is up: the spring is 0.3 m longer than free, its line 0.24 m from the axis.
+    let mut arm = rigid();
+    arm.joints[0].stiffness = Some(1e7);
+    let spring =
+        |anchor| Effect::GravityCompensator { joint: 1, anchor, lever: [0.3, 0.0], free_length: FreeLength(0.2) };
+    let turned = |cause, values: &[f64]| {
+        let end = position(&arm, vec![effect(&arm, cause, values)], &at(3.0));
+        end.z.atan2(end.x) * 1e7 + 3.0 * G * 2.0
+    };
+    near(turned(spring([0.0, 0.4]), &[500.0, 0.0]), 500.0 * 0.3 * 0.24, 1e-4);
+    near(turned(spring([0.0, 0.4]), &[0.0, 70.0]), 70.0 * 0.24, 1e-4);
+    near(turned(spring([0.0, -0.4]), &[500.0, 70.0]), -(500.0 * 0.3 + 70.0) * 0.24, 1e-4);
+    // A spring where nothing gives way does nothing.
+    let stiff = rigid();
+    let still = position(&stiff, vec![effect(&stiff, spring([0.0, 0.4]), &[500.0, 70.0])], &at(3.0));
+    assert!(still.z.abs() < 1e-15);
 }
 
 #[test]

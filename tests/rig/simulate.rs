@@ -250,6 +250,14 @@ fn every_mistake_says_where_it_is() {
         ("[[effect]]\noutside = { joint = 2 }\nheight_deg = 1", &["a width above 0"]),
         ("[[effect]]\noutside = { joint = 0 }\nheight_deg = 1", &["no joint 0"]),
         ("[[effect]]\noutside = { joint = 1, shape = \"x\" }\n", &["none of bump, step"]),
+        (
+            "[[effect]]\ngravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\nrate_N_per_m = 1",
+            &["effect[1].gravity-compensator: nothing gives way about the axis of joint 1"],
+        ),
+        (
+            "[[effect]]\ngravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\nrate_N = 1",
+            &["effect[1].rate_N: "],
+        ),
         ("[[effect]]\njoint-thermal-drift = { joint = 2 }\nrate_deg_per_C = 1", &["needs temperatures"]),
     ] {
         fails(&format!("{poses}{line}\n"), words);

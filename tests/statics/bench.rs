@@ -24,6 +24,7 @@ pub fn joint(a: f64) -> Joint<f64> {
         nonlinear: None,
         lateral: None,
         slide: None,
+        compensator: None,
         kind: JointKind::Fixed,
         placement: None,
         alpha: Angle::new(0.0),

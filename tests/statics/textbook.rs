@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use flexcal::mechanics::{Angle, Arm, Flexibility, Hoist, Joint, PointMass};
+use flexcal::mechanics::{Angle, Arm, Compensator, Flexibility, Hoist, Joint, PointMass};
 use flexcal::problem::JointKind;
 use nalgebra::Vector3;
 
@@ -108,6 +108,29 @@ fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
         let tip = frame(&arm, &[q]).unwrap();
         near(-tip.origin.z, weight * k * l * l * (l / 3.0 + lever / 2.0), 1e-6, "sag");
         near(-tip.axes[2].z * along, weight * k * l * (l / 2.0 + lever), 1e-6, "slope");
+    }
+}
+
+#[test]
+fn a_spring_takes_off_part_of_the_moment() {
+    // A horizontal axis, a load at the lever L: M = −W L cos φ. A spring of no free length from the height h above the axis to the
+    // lever b along the link lifts it by k b h cos φ; with free length and preload by (k (l − l₀) + F₀) b h cos φ / l.
+    let (stiffness, mass, h, b, k) = (1e7, 4.0, 0.5, 0.4, 150.0);
+    for (free_length, preload) in [(0.0, 0.0), (0.3, 20.0), (0.0, -15.0)] {
+        for q in [-0.7_f64, 0.0, 0.4] {
+            let (anchor, lever) = ([0.0, h], [b, 0.0]);
+            let spring = Compensator { anchor, lever, free_length, rate: k, preload };
+            let (alpha, flexibility) = (Angle::new(FRAC_PI_2), Some(1.0 / stiffness));
+            let kind = JointKind::Revolute;
+            let sprung = Joint { kind, alpha, flexibility, compensator: Some(spring), ..joint(0.0) };
+            let mut arm = arm(vec![sprung, joint(LENGTH)]);
+            arm.payload_mass = mass;
+            let length = (b * b + h * h - 2.0 * b * h * q.sin()).sqrt();
+            let pull = k * (length - free_length) + preload;
+            let moment = (pull * b * h / length - mass * GRAVITY * LENGTH) * q.cos();
+            let along = frame(&arm, &[q, 0.0]).unwrap().axes[0];
+            near(along.z.atan2(along.x) - q, moment / stiffness, 1e-4, "turn");
+        }
     }
 }
 

@@ -64,7 +64,7 @@ impl<'a> Linearised<'a> {
         slots.retain(|place| fitted_at(place).is_none());
         slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
         let first = model.parameters.len();
-        let probing = model.probing(&slots);
+        let probing = model.placing(effects).probing(&slots);
         let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
         for (index, (slot, _)) in slots.iter().enumerate() {
             if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {

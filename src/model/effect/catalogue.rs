@@ -4,17 +4,18 @@ use super::coverage::{Columns, DataCoverage};
 use super::custom::custom;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::{
-    backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_direction,
-    hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic, joint_hysteresis,
-    joint_lateral_compliance, joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending,
-    link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_move,
-    station_shift, thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending, unmodelled_mass,
+    backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_compensator,
+    gravity_direction, hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic,
+    joint_hysteresis, joint_lateral_compliance, joint_nonlinear_stiffness, joint_thermal_drift, joint_wave,
+    link_bending, link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending,
+    station_move, station_shift, thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending,
+    unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
 use crate::problem::{Effect, Problem};
 
 /// Every family, in the order of the file format.
-pub const FAMILIES: [&Family; 33] = [
+pub const FAMILIES: [&Family; 34] = [
     &joint_compliance::FAMILY,
     &joint_harmonic::FAMILY,
     &joint_wave::FAMILY,
@@ -24,6 +25,7 @@ pub const FAMILIES: [&Family; 33] = [
     &joint_hysteresis::FAMILY,
     &joint_nonlinear_stiffness::FAMILY,
     &joint_lateral_compliance::FAMILY,
+    &gravity_compensator::FAMILY,
     &joint_thermal_drift::FAMILY,
     &thermal_lag::JOINT,
     &joint_coupling::FAMILY,

@@ -2,14 +2,12 @@
 
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
-use super::place::greatest_moment;
+use super::place::{LEAST_MOMENT, greatest_moment};
 use crate::model::parameter::{JointField, Slot};
 use crate::problem::Effect;
 
 /// More than any joint turns under the greatest conceivable moment \[rad\].
 const MOST: f64 = 0.1;
-/// Moment below which arms are not told apart [N·m].
-const LEAST_MOMENT: f64 = 10.0;
 
 /// The family.
 pub(super) const FAMILY: Family = Family {

@@ -19,6 +19,7 @@ mod deflected_equilibrium;
 mod family;
 mod frame_strain;
 mod gear_ratio;
+mod gravity_compensator;
 mod gravity_direction;
 mod hoist_direction;
 mod hoist_force;

@@ -29,6 +29,9 @@ pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 
+/// Moment below which arms are not told apart [N·m].
+pub(super) const LEAST_MOMENT: f64 = 10.0;
+
 /// The weight of everything that is declared beyond a joint, counted from 1, at the length of the arm beyond it, that of the longest
 /// branch [N·m].
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {

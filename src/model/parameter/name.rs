@@ -90,6 +90,10 @@ pub enum JointField {
     LateralY,
     /// Flexibility 1/EI of the slide [1/(N·m²)].
     SlideFlexibility,
+    /// Rate of the spring of a gravity compensator [N/m].
+    SpringRate,
+    /// Preload of that spring \[N\].
+    SpringPreload,
     /// Coordinates of a fixed joint's placement \[m\].
     X,
     Y,
@@ -200,6 +204,8 @@ impl JointField {
             Self::LateralX => "lateral_x",
             Self::LateralY => "lateral_y",
             Self::SlideFlexibility => "slide_flexibility",
+            Self::SpringRate => "spring_rate",
+            Self::SpringPreload => "spring_preload",
             Self::X => "x",
             Self::Y => "y",
             Self::Z => "z",
@@ -278,6 +284,8 @@ impl Slot {
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
                 JointField::Cubic => Unit::CubicCompliance,
                 JointField::SlideFlexibility => Unit::Flexibility,
+                JointField::SpringRate => Unit::ForcePerLength,
+                JointField::SpringPreload => Unit::Force,
             },
             Self::Beam { field, .. } => match field {
                 BeamField::Axial => Unit::AxialRigidity,

@@ -254,3 +254,57 @@ fn effects() {
         check_problems(&[(&format!("[[effect]]\n{effect}"), words)]);
     }
 }
+
+#[test]
+fn compensators() {
+    let effects: [(&str, &[&str]); 10] = [
+        (
+            "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }",
+            &[
+                ":4: effect[1].gravity-compensator: nothing gives way about the axis of joint 1",
+                "joint-compliance = { joint = 1 }",
+            ],
+        ),
+        (
+            "gravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\n[[joint]]\nkind = 'prismatic'",
+            &[":4: effect[1].gravity-compensator.joint: joint 2 does not turn"],
+        ),
+        (
+            "gravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\n[[joint]]\nkind = 'fixed'",
+            &[":4: effect[1].gravity-compensator.joint: joint 2 is fixed"],
+        ),
+        (
+            "gravity-compensator = { joint = 1 }",
+            &[":4: effect[1].gravity-compensator.anchor: missing", "anchor_m or anchor_mm"],
+        ),
+        (
+            "gravity-compensator = { joint = 1, anchor = [0, 1] }",
+            &[":4: effect[1].gravity-compensator.anchor: a length needs a unit"],
+        ),
+        (
+            "gravity-compensator = { joint = 1, anchor_m = [0, 1, 0] }",
+            &[":4: effect[1].gravity-compensator.anchor_m: expected 2 numbers, found 3"],
+        ),
+        (
+            "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_mm = [0, 0] }",
+            &[":4: effect[1].gravity-compensator.lever_mm: the end of a spring lies on the joint's axis"],
+        ),
+        (
+            "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0] }",
+            &[":4: effect[1].gravity-compensator.free_length: missing"],
+        ),
+        (
+            "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_mm = -1 }",
+            &[":4: effect[1].gravity-compensator.free_length_mm: "],
+        ),
+        (
+            "joint-compliance = { joint = 1 }\n[[effect]]\n\
+             gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\n[[effect]]\n\
+             gravity-compensator = { joint = 1, anchor_m = [1, 1], lever_m = [1, 0], free_length_m = 0 }",
+            &[":8: effect[3].gravity-compensator: joint 1 has a compensator already on line 6"],
+        ),
+    ];
+    for (effect, words) in effects {
+        check_problems(&[(&format!("[[effect]]\n{effect}"), words)]);
+    }
+}
