@@ -323,12 +323,12 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         }
         let kept = self.memory.and_then(|(memory, data, unit)| memory.base(data).filter(|base| base.is_at(x, unit)));
         let mut total = DVector::zeros(x.len());
-        let map = |index, block: &mut Block| match &kept {
-            Some(base) => self.chunk_bend((x, step), index, base.block(index)),
-            None => {
-                self.fill(x, index, block);
-                self.chunk_bend((x, step), index, block)
+        let map = |index, block: &mut Block| {
+            if let Some(base) = &kept {
+                return self.chunk_bend((x, step), index, base.block(index));
             }
+            self.fill(x, index, block);
+            self.chunk_bend((x, step), index, block)
         };
         in_order(self.chunks(), || self.empty_block(), map, |bend| total += bend);
         total.iter().all(|value| value.is_finite()).then_some(total)

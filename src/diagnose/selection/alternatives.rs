@@ -19,7 +19,7 @@ impl<'f, 'a> Replacements<'f, 'a> {
     pub fn new(fitted: &'f Fitted, linearised: &'f Linearised<'a>, candidates: &[Effect], data: &'f Data) -> Self {
         let fit = fitted.around(data);
         let scan = Scan::new(linearised, LinearNeighbourhood::clone(&fit), candidates.to_vec(), data.rules);
-        Self { fitted, scan, fit }
+        Self { fitted, fit, scan }
     }
 
     /// The candidate, another time of the same shift included, that explains the data better than an effect beyond doubt.
