@@ -1,16 +1,9 @@
 //! Strategies and parts of the elasticity side by side.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
-use super::frame::{
-    ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
-};
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::diagnose::{ClosedLoop, Round};
 use crate::identify::{Baseline, Comparison, Errors};
 use crate::problem::Effect;
-use crate::report::quantity::{decimals, fixed, number};
 
 const ROW: i32 = 22;
 /// Room for names.
@@ -120,9 +113,8 @@ fn rows(entries: &[Entry], label: &str) -> String {
     let (low, high) = range(entries.iter().flat_map(of));
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
     let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
-    let room = f64::from(px(WIDTH - NAMES - NUMBERS));
-    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
-    let place = |value: f64| px(NAMES) + ((value - low) / (high - low) * room).round() as i32;
+    let room = f64::from(WIDTH - NAMES - NUMBERS);
+    let place = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
     let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
     figure((WIDTH, bottom + BELOW), label, |area| {
         let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
@@ -132,16 +124,11 @@ fn rows(entries: &[Entry], label: &str) -> String {
                 let value = f64::from(decade) + part.log10();
                 if (low..=high).contains(&value) {
                     let at = place(value);
-                    area.draw(&PathElement::new(vec![(at, px(TOP)), (at, px(bottom))], line(GRID, 1.0)))?;
+                    upright(area, at, (TOP, bottom), GRID)?;
                     if part < 1.5 || high - low < CLOSE {
                         let digits = usize::try_from(-decade).unwrap_or_default();
-                        write(
-                            area,
-                            &number(10.0_f64.powf(value), digits),
-                            (at / px(1), bottom + 10),
-                            MUTED,
-                            HPos::Center,
-                        )?;
+                        let number = number(10.0_f64.powf(value), digits);
+                        write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
                     }
                 }
             }
@@ -157,8 +144,8 @@ fn rows(entries: &[Entry], label: &str) -> String {
             }
             let ends = vec![(place(fitted), px(y)), (place(held_out), px(y))];
             area.draw(&PathElement::new(ends, line(FAINT, 1.4)))?;
-            area.draw(&Circle::new((place(fitted), px(y)), radius(3.4), FAINT.filled()))?;
-            area.draw(&Circle::new((place(held_out), px(y)), radius(3.4), colour.filled()))?;
+            area.draw(&Circle::new((place(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
+            area.draw(&Circle::new((place(held_out), px(y)), pixels(3.4), colour.filled()))?;
             let value = entry.errors.held_out.mean.norm * 1e3;
             write(area, &number(value, decimals(value, 4) + 1), (WIDTH - 6, y), colour, HPos::Right)?;
         }
