@@ -8,7 +8,7 @@ use super::errors::{
     with_unit,
 };
 use super::figures::{self, PlotData};
-use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, spread, told, why_not_trusted};
+use super::identify::{BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted};
 use super::noise::{carried, size};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
@@ -134,12 +134,7 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks.extend(parameters(&closure.closed, after, &file));
     blocks.extend(lower_waves(&closure.closed, after, &file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
-    let mut seen = vec![
-        Block::heading("What the poses can tell"),
-        Block::figures([figures::correlation(&plots.correlations), figures::spectrum(after.identifiability())]),
-    ];
-    seen.extend(told(after, &file));
-    blocks.push(Block::Page(seen));
+    blocks.push(Block::Page(all_told(after, plots, &file)));
     blocks
 }
 

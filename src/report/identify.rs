@@ -150,9 +150,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
-    blocks.extend(active_constraints(found));
-    blocks.extend(shadow_prices(found));
-    blocks.extend(alternation(found));
+    blocks.extend(limits(found));
     blocks.extend(told(found, FILE));
     text(&blocks)
 }
@@ -319,12 +317,20 @@ pub(super) fn remainder<'a>(
     blocks.extend(parameters(problem, found, file));
     blocks.extend(lower_waves(problem, found, file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
-    blocks.extend(active_constraints(found).map(|own| Block::Page(vec![own])));
-    blocks.extend(shadow_prices(found).map(|own| Block::Page(vec![own])));
-    blocks.extend(alternation(found).map(|own| Block::Page(vec![own])));
-    blocks.push(Block::heading("What the poses can tell"));
+    blocks.push(Block::Page(limits(found)));
+    blocks.extend(all_told(found, plots, file));
     blocks
-        .push(Block::figures([figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())]));
+}
+
+/// What limits and turns of the stages did to a fit.
+fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
+    [active_constraints(found), shadow_prices(found), alternation(found)].into_iter().flatten().collect()
+}
+
+/// What the poses can tell, in figures and words.
+pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
+    let figures = [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
+    let mut blocks = vec![Block::heading("What the poses can tell"), Block::figures(figures)];
     blocks.extend(told(found, file));
     blocks
 }
@@ -339,7 +345,7 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
 }
 
 /// What the poses can tell, in words.
-pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
+fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
         unidentifiable(found.identifiability(), &found.unknowns, file),
