@@ -9,10 +9,10 @@ use flexcal::files::digest;
 use flexcal::identify::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, AcceptanceRecord};
 
+use super::diagnostic;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal accept`.
 #[derive(Debug, Args)]
@@ -34,16 +34,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } = common.read("accept", &["acceptance.json", "acceptance.html"])?;
     identify::held_out_positions(&problem, &data)?;
-    let line = common.talks().then(Line::new);
-    let options = Options::default()
-        .with_strategy(Strategy::Joint)
-        .with_solver(SolverChoice::Auto)
-        .with_progress(line.as_ref().map(Line::sink));
-    let result = identify::identify(&problem, &data, &options);
-    if let Some(line) = line {
-        line.clear();
-    }
-    let found = result?;
+    let options = Options::default().with_strategy(Strategy::Joint).with_solver(SolverChoice::Auto);
+    let fit = |sink| identify::identify(&problem, &data, &options.with_progress(sink));
+    let found = Line::during(common.talks(), None, fit)?;
     let judged = identify::acceptance(&problem, &data, &found)?;
     let file = common.problem_file();
     let inputs = std::iter::once(&file).chain(common.files(&problem));
@@ -55,12 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::acceptance_json(&problem, &data.measurements, &found, &judged, &record);
     let page = report::acceptance_page(&problem, &data.measurements, &found, &judged, &record);
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
-        output::print(&report::acceptance_text(&problem, &judged))?;
-        output::print(&format!("\nWritten to {}: acceptance.json, acceptance.html\n", results.folder.display()))?;
-    }
+    common.tell(&json, || report::acceptance_text(&problem, &judged) + &results.written())?;
     Ok(diagnostic::judged(&found, common.quiet))
 }
 

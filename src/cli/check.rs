@@ -9,10 +9,10 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report;
 
+use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
 use super::poses::Source;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
@@ -54,12 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
     let json = report::check_json(&problem, &check);
     results.write(&[("check.json", &json)])?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
-        output::print(&report::check_text(&problem, &check))?;
-        output::print(&format!("\nWritten to {}\n", results.path("check.json").display()))?;
-    }
+    let written = results.path("check.json");
+    common.tell(&json, || format!("{}\nWritten to {}\n", report::check_text(&problem, &check), written.display()))?;
     if check.suffices() {
         return Ok(Outcome::Done);
     }
@@ -71,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Error>> {
     let Arguments { common, poses, source } = arguments;
     let poses = poses.map(|poses| poses as usize);
-    let table = source.table(problem, common.quiet)?;
+    let table = source.table(problem, common)?;
     match (table, poses) {
         (Some(_), _) if !common.data().is_empty() => Err(PosesError::Twice.into()),
         (Some(table), poses) => {
@@ -84,9 +80,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             Ok(Judged::Table { poses: Box::new(poses), within: source.known_ranges(problem)?, held_out: None })
         }
         (None, Some(poses)) => {
-            if !common.quiet {
-                diagnostic::print_warnings(problem.far_target().as_slice());
-            }
+            common.warn(problem.far_target().as_slice());
             Ok(Judged::Drawn(source.all_ranges(problem)?, poses))
         }
         (None, None) => {
@@ -95,9 +89,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
                 return Err(PosesError::None.into());
             }
             let (measured, warnings) = Measurements::read_poses(files, problem)?;
-            if !common.quiet {
-                diagnostic::print_warnings(&warnings);
-            }
+            common.warn(&warnings);
             let data = Dataset::of(problem, measured)?;
             let held_out = design::with_known_words(&data);
             let Dataset { measurements: measured, split } = data;

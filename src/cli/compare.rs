@@ -6,11 +6,11 @@ use clap::Args;
 use flexcal::identify::{self, CompareOptions};
 use flexcal::report::{self, PlotData};
 
+use super::diagnostic;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal compare`.
 #[derive(Debug, Args)]
@@ -29,23 +29,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } = common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
-    let line = common.talks().then(Line::new);
-    let sink = line.as_ref().map(Line::sink);
-    let options = CompareOptions { paper: arguments.paper, progress: sink };
-    let result = identify::compare(&problem, &data, &options);
-    if let Some(line) = line {
-        line.clear();
-    }
-    let comparison = result?;
+    let comparison = Line::during(common.talks(), None, |progress| {
+        identify::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
+    })?;
     let json = report::compare_json(&problem, &comparison);
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     results.write_report(&[("compare.json", &json)], &told)?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
-        output::print(&report::compare_text(&problem, &comparison))?;
-        output::print(&format!("\nWritten to {}: compare.json, report.md, report.html\n", results.folder.display()))?;
-    }
+    common.tell(&json, || report::compare_text(&problem, &comparison) + &results.written())?;
     Ok(diagnostic::judged(&comparison.joint, common.quiet))
 }

@@ -11,9 +11,9 @@ use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::{identify, report};
 
+use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal compensate`.
 #[derive(Debug, Args)]
@@ -67,9 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
         return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
     }
-    if !common.quiet {
-        diagnostic::print_warnings(&warnings);
-    }
+    common.warn(&warnings);
     // Targets may be waypoints alone.
     for missing in identify::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet) {
         diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
@@ -108,12 +106,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let commands = identify::compensate(&problem, &model, &x, &sought)?;
     results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
-    if common.json {
-        output::print_json(&report::commands_json(&problem, &commands))?;
-    } else if common.talks() {
-        output::print(&report::commands_text(&problem, &targets, &commands))?;
-        output::print(&format!("\nWritten to {}\n", results.path("commands.csv").display()))?;
-    }
+    common.tell(&report::commands_json(&problem, &commands), || {
+        let written = results.path("commands.csv");
+        format!("{}\nWritten to {}\n", report::commands_text(&problem, &targets, &commands), written.display())
+    })?;
     let all = commands.iter().all(identify::Command::is_reached);
     if !all && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");

@@ -11,10 +11,10 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
 use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
 
+use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
@@ -88,14 +88,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(absent) = files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet) {
         diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
     }
-    let errors = if at_hand { Some(errors(&problem, files, &estimates, flags.quiet)?) } else { None };
+    let errors = if at_hand { Some(errors(&problem, files, &estimates, flags)?) } else { None };
     results.write(&[(&name, &text)])?;
     let exported = Exported { problem: &problem, model: &model, file: Some(&path), moved: moved.as_deref(), errors };
-    if flags.json {
-        output::print_json(&report::export_json(&exported))?;
-    } else if flags.talks() {
-        output::print(&report::export_text(&exported))?;
-    }
+    flags.tell(&report::export_json(&exported), || report::export_text(&exported))?;
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, and so is this file not");
     }
@@ -107,12 +103,10 @@ fn errors(
     problem: &Problem,
     files: &[PathBuf],
     estimates: &SavedEstimate,
-    quiet: bool,
+    flags: &Flags,
 ) -> Result<ExportErrors, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read(files, problem)?;
-    if !quiet {
-        diagnostic::print_warnings(&warnings);
-    }
+    flags.warn(&warnings);
     check_columns(problem, &rows)?;
     let data = Dataset::of(problem, rows)?;
     let placement = Placement::of(&data.measurements);

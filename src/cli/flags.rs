@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use flexcal::error::Warning;
 
-use super::output::{Results, WriteError};
+use super::diagnostic;
+use super::output::{self, Results, WriteError};
 
 /// Where results go, and who reads along.
 #[derive(Debug, Clone, Args)]
@@ -27,6 +29,22 @@ impl Flags {
     /// Whether people read along.
     pub fn talks(&self) -> bool {
         !self.json && !self.quiet
+    }
+
+    /// Prints a result: as JSON where that is asked for, in words where people read along.
+    pub fn tell(&self, json: &str, words: impl FnOnce() -> String) -> Result<(), WriteError> {
+        match (self.json, self.quiet) {
+            (true, _) => output::print_json(json),
+            (false, true) => Ok(()),
+            (false, false) => output::print(&words()),
+        }
+    }
+
+    /// Prints warnings, unless it is to be quiet.
+    pub fn warn(&self, warnings: &[Warning]) {
+        if !self.quiet {
+            diagnostic::print_warnings(warnings);
+        }
     }
 
     /// The folder for results of what is called `name`.

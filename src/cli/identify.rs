@@ -1,10 +1,11 @@
 //! `flexcal identify`.
 
 use std::error::Error;
+use std::path::Path;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexcal::identify::{self, Options, SolverChoice, Strategy};
+use flexcal::identify::{self, Identification, IdentifyError, Options, SolverChoice, Strategy};
 use flexcal::report::{self, PlotData, shell_word};
 
 use super::input::{Common, Input};
@@ -58,67 +59,58 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     let stop = interrupt::stop();
-    let line = common.talks().then(|| Line::until(stop.clone()));
     let options = Options::default()
         .with_strategy(arguments.strategy)
         .with_solver(arguments.solver)
         .with_carriers()
-        .with_stop(stop)
-        .with_progress(line.as_ref().map(Line::sink));
-    let result = identify::identify(&problem, &data, &options).and_then(|found| {
+        .with_stop(stop.clone());
+    let (sources, identification) = Line::during(common.talks(), stop, |sink| -> Result<_, IdentifyError> {
+        let options = options.with_progress(sink);
+        let found = identify::identify(&problem, &data, &options)?;
         // The fit that was asked for is there: an interrupt ends no more than what is told beside it.
         match identify::joint_sources(&problem, &data, &options, &found) {
             Err(error) if error.is_interrupted() => Ok((None, found)),
             sources => Ok((sources?, found)),
         }
-    });
-    if let Some(line) = line {
-        line.clear();
-    }
-    let (sources, identification) = result?;
+    })?;
     let json = report::estimate_json(&problem, &identification);
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
     let residuals = report::residuals_csv(&problem, &data.measurements, &identification.residuals(&problem, &data)?);
     results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
-    if common.json {
-        output::print_json(&json)?;
-        if let (Some(sources), false) = (&sources, common.quiet) {
-            diagnostic::warn(&report::joint_sources_text(sources));
-        }
-    } else if common.talks() {
+    let sources = sources.as_ref().map(report::joint_sources_text);
+    common.tell(&json, || {
         let told = if arguments.verbose {
             report::estimate_text(&problem, &identification)
         } else {
             report::estimate_brief(&problem, &identification, output::columns())
         };
-        output::print(&told)?;
-        if let Some(sources) = &sources {
-            output::print(&format!("\n{}\n", report::joint_sources_text(sources)))?;
-        }
-        let names = "estimate.json, residuals.csv, report.md, report.html";
-        output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
-        let (named, estimate) = (common.named(), results.path("estimate.json"));
-        let next = match report::look_at_carriers(&identification, &common.problem_file()) {
-            Some(look) => {
-                format!("{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks")
-            }
-            // Of what says so little neither a cause nor a correction can be told.
-            None if !identification.is_trusted() || report::tells_little(&identification) => {
-                format!("flexcal check {named} says what the poses can tell")
-            }
-            None if identification.too_few_poses.is_some() => {
-                format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
-            }
-            None if report::lacks_something(&identification) => {
-                format!("flexcal loop {named} looks for what the model lacks")
-            }
-            None => {
-                let [problem, estimate] = [common.problem(), &estimate].map(shell_word);
-                format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
-            }
-        };
-        output::print(&format!("Next: {next}\n"))?;
+        let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
+        let next = next(common, &identification, &results.path("estimate.json"));
+        format!("{told}{sources}{}Next: {next}\n", results.written())
+    })?;
+    if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
+        diagnostic::warn(words);
     }
     Ok(diagnostic::judged(&identification, common.quiet))
+}
+
+/// What to do after a fit, in one line.
+fn next(common: &Common, found: &Identification, estimate: &Path) -> String {
+    let named = common.named();
+    match report::look_at_carriers(found, &common.problem_file()) {
+        Some(look) => format!("{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks"),
+        // Of what says so little neither a cause nor a correction can be told.
+        None if !found.is_trusted() || report::tells_little(found) => {
+            format!("flexcal check {named} says what the poses can tell")
+        }
+        None if found.too_few_poses.is_some() => {
+            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
+        }
+        None if report::lacks_something(found) => format!("flexcal loop {named} looks for what the model lacks"),
+        None => {
+            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
+            format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
+        }
+    }
 }

@@ -9,7 +9,6 @@ use flexcal::urdf::{Chain, Robot, describe};
 
 use super::flags::Flags;
 use super::outcome::Outcome;
-use super::output;
 
 /// Arguments of `flexcal init`.
 #[derive(Debug, Args)]
@@ -42,10 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
-    if flags.json {
-        output::print_json(&report::init_json(&chain, &description, &file))?;
-    } else if flags.talks() {
-        output::print(&report::init_text(&chain, &description, &results.folder))?;
-    }
+    let json = report::init_json(&chain, &description, &file);
+    flags.tell(&json, || report::init_text(&chain, &description, &results.folder))?;
     Ok(Outcome::Done)
 }

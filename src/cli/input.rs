@@ -10,7 +10,6 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::shell_word;
 
-use super::diagnostic;
 use super::flags::Flags;
 use super::output::{Results, WriteError};
 
@@ -85,9 +84,7 @@ impl Common {
         let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
-        if !self.quiet {
-            diagnostic::print_warnings(&warnings);
-        }
+        self.warn(&warnings);
         Dataset::of(problem, measurements)
     }
 
@@ -95,9 +92,7 @@ impl Common {
     pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
         if problem.data.fits_orientation {
             let warning = Warning { location: problem.data.location.clone(), kind: WarningKind::OrientationLeftOut };
-            if !self.quiet {
-                diagnostic::print_warnings(std::slice::from_ref(&warning));
-            }
+            self.warn(std::slice::from_ref(&warning));
             data.measurements.warnings.push(warning);
         }
     }

@@ -43,13 +43,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut data = common.measurements(&problem)?;
     common.say_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
-    let line = common.talks().then(|| Line::until(stop.clone()));
-    let options = Options::default().with_carriers().with_stop(stop).with_progress(line.as_ref().map(Line::sink));
-    let result = diagnose::close(&problem, &data, &options);
-    if let Some(line) = line {
-        line.clear();
-    }
-    let closure = result?;
+    let options = Options::default().with_carriers().with_stop(stop.clone());
+    let close = |sink| diagnose::close(&problem, &data, &options.with_progress(sink));
+    let closure = Line::during(common.talks(), stop, close)?;
     let json = report::loop_json(&problem, &closure);
     fs::create_dir_all(&results.folder).map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
     let files =
@@ -69,24 +65,22 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     ];
     let told = report::loop_report(&problem, &closure, &shown);
     results.write_report(&texts, &told)?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
+    common.tell(&json, || {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
             report::loop_brief(&problem, &closure, output::columns())
         };
-        output::print(&told)?;
-        let names = "loop.json, problem.closed.toml, residuals.csv, report.md, report.html";
-        output::print(&format!("\nWritten to {}: {names}\n", results.folder.display()))?;
-        if let Some(look) = report::look_at_carriers(&closure.before.fit, &common.problem_file()) {
-            output::print(&format!("Next: {look}\n"))?;
-        } else if closure.after.is_trusted() {
-            let closed = shell_word(&results.path("problem.closed.toml"));
-            output::print(&format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n"))?;
-        }
-    }
+        let next = match report::look_at_carriers(&closure.before.fit, &common.problem_file()) {
+            Some(look) => format!("Next: {look}\n"),
+            None if closure.after.is_trusted() => {
+                let closed = shell_word(&results.path("problem.closed.toml"));
+                format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n")
+            }
+            None => String::new(),
+        };
+        told + &results.written() + &next
+    })?;
     let outcome = diagnostic::judged(&closure.after, common.quiet);
     if closure.interrupted {
         diagnostic::warn(&report::interrupted(&closure));

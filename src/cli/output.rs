@@ -71,6 +71,11 @@ impl Results {
         names.filter(|name| is_figure(name)).map(|name| format!("{FIGURES}/{name}")).collect()
     }
 
+    /// Says where the results are.
+    pub fn written(&self) -> String {
+        format!("\nWritten to {}: {}\n", self.folder.display(), self.names.join(", "))
+    }
+
     /// Path of a result.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)

@@ -10,11 +10,11 @@ use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report;
 
+use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
 use super::poses::Source;
 use super::progress::Line;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal plan`.
 #[derive(Debug, Args)]
@@ -125,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let pair = pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let results = common.results("plan", &problem, &source.files(), &["plan.csv", "plan.json"])?;
-    let candidates = match source.table(&problem, common.quiet)? {
+    let candidates = match source.table(&problem, common)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
     };
@@ -133,9 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         None
     } else {
         let (given, warnings) = Measurements::read_poses(common.data(), &problem)?;
-        if !common.quiet {
-            diagnostic::print_warnings(&warnings);
-        }
+        common.warn(&warnings);
         Some(given)
     };
     let criterion = Criterion::from(arguments.criterion);
@@ -167,15 +165,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::plan_json(&problem, criterion, source.seed, &plan, separated.as_ref());
     let table = report::poses_csv(&problem, &plan.poses);
     results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
-        output::print(&report::plan_text(&problem, criterion, &plan, separated.as_ref()))?;
-        output::print(&format!(
-            "\nWritten to {}, what it promises to plan.json beside it\n",
-            results.path("plan.csv").display()
-        ))?;
-    }
+    common.tell(&json, || {
+        let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
+        let table = results.path("plan.csv");
+        format!("{text}\nWritten to {}, what it promises to plan.json beside it\n", table.display())
+    })?;
     if plan.suffices {
         return Ok(Outcome::Done);
     }

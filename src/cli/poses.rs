@@ -9,7 +9,7 @@ use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::simulate::Truth;
 
-use super::diagnostic;
+use super::flags::Flags;
 
 /// Ranges or a table.
 #[derive(Debug, Args)]
@@ -34,14 +34,12 @@ impl Source {
     }
 
     /// The table of candidates, if one is named.
-    pub fn table(&self, problem: &Problem, quiet: bool) -> Result<Option<Measurements>, InputError> {
+    pub fn table(&self, problem: &Problem, flags: &Flags) -> Result<Option<Measurements>, InputError> {
         if self.candidates.is_empty() {
             return Ok(None);
         }
         let (poses, warnings) = Measurements::read_poses(&self.candidates, problem)?;
-        if !quiet {
-            diagnostic::print_warnings(&warnings);
-        }
+        flags.warn(&warnings);
         Ok(Some(poses))
     }
 

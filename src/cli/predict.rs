@@ -9,9 +9,9 @@ use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::report;
 
+use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal predict`.
 #[derive(Debug, Args)]
@@ -43,9 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
     let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
     let rows = rows.of_the_arm();
-    if !common.quiet {
-        diagnostic::print_warnings(&warnings);
-    }
+    common.warn(&warnings);
     let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
     if !trusted {
@@ -63,13 +61,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let borrowed: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
-    if common.json {
-        output::print_json(&errors.unwrap_or_else(|| "{}\n".to_owned()))?;
-    } else if common.talks() {
+    common.tell(errors.as_deref().unwrap_or("{}\n"), || {
         let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-        output::print(&report::prediction_text(&problem, arm, &prediction))?;
+        let text = report::prediction_text(&problem, arm, &prediction);
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
-        output::print(&format!("\nWritten to {}: {}\n", results.folder.display(), names.join(", ")))?;
-    }
+        format!("{text}\nWritten to {}: {}\n", results.folder.display(), names.join(", "))
+    })?;
     Ok(if trusted { Outcome::Done } else { Outcome::NotTrusted })
 }

@@ -29,15 +29,25 @@ impl Line {
     }
 
     /// The same of work that `stop` ends early.
-    pub fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
+    fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
         bar.set_style(shown.unwrap_or_else(|_| ProgressStyle::default_spinner()));
         Arc::new(Self { bar, begun: Instant::now(), course: Mutex::default(), ticking: Once::new(), stop: stop.into() })
     }
 
+    /// Does some work, which reports to a line of progress where that is `shown`; the line is gone when the work is done.
+    pub fn during<T>(shown: bool, stop: impl Into<Option<Stop>>, work: impl FnOnce(Option<ProgressSink>) -> T) -> T {
+        let line = shown.then(|| Self::until(stop));
+        let done = work(line.as_ref().map(Self::sink));
+        if let Some(line) = line {
+            line.bar.finish_and_clear();
+        }
+        done
+    }
+
     /// What the library reports to.
-    pub fn sink(self: &Arc<Self>) -> ProgressSink {
+    fn sink(self: &Arc<Self>) -> ProgressSink {
         let line = Arc::clone(self);
         Arc::new(move |progress| line.show(&progress))
     }

@@ -10,9 +10,9 @@ use flexcal::problem::{HeldOut, PoseConditions, Problem};
 use flexcal::report::shell_word;
 use flexcal::simulate::{Simulation, Truth, simulate, simulate_poses};
 
+use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]
@@ -57,14 +57,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is divided by whoever reads the rows.
     let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. })) || simulation.held_out() > 0;
-    if flags.json {
-        output::print_json(&json)?;
-    } else if flags.talks() {
-        output::print(&summary(&simulation, &table))?;
-        if divided {
-            output::print(&next(&arguments.problem, &table))?;
-        }
-    }
+    flags.tell(&json, || {
+        let next = if divided { next(&arguments.problem, &table) } else { String::new() };
+        summary(&simulation, &table) + &next
+    })?;
     if !divided && !flags.quiet {
         diagnostic::warn(
             "no row is held out, and identify needs some to judge by: simulate more poses, or change held_out or \
@@ -77,9 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// What the rows of the tables set, and the target that each names.
 fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<(PoseConditions, String)>, InputError> {
     let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
-    if !arguments.flags.quiet {
-        diagnostic::print_warnings(&warnings);
-    }
+    arguments.flags.warn(&warnings);
     let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
     let word = |row: usize| target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default();
     Ok(rows.all_conditions().into_iter().enumerate().map(|(row, own)| (own, word(row))).collect())

@@ -172,13 +172,7 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
     let found = found?;
     let json = report::replica_json(study, &found);
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
-    if common.flags.json {
-        output::print_json(&json)?;
-    } else if common.flags.talks() {
-        output::print(&report::replica_text(study, &found))?;
-        let folder = results.folder.display();
-        output::print(&format!("\nWritten to {folder}: misprints.json, report.md, report.html\n"))?;
-    }
+    common.flags.tell(&json, || report::replica_text(study, &found) + &results.written())?;
     Ok(Outcome::Done)
 }
 
@@ -203,15 +197,10 @@ fn finish(common: &Common, study: &Study, results: &Results, stores: &[Store]) -
         (NAMES[3], &report::study_csv(study, &found)),
     ];
     results.write(&texts)?;
-    if common.flags.json {
-        output::print_json(&json)?;
-    } else if common.flags.talks() {
-        output::print(&report::study_text(study, &found))?;
-        output::print(&format!(
-            "\nWritten to {}, each parameter to parameters.csv beside it\n",
-            results.path("study.csv").display()
-        ))?;
-    }
+    common.flags.tell(&json, || {
+        let (text, table) = (report::study_text(study, &found), results.path("study.csv"));
+        format!("{text}\nWritten to {}, each parameter to parameters.csv beside it\n", table.display())
+    })?;
     let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(if found.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })
 }

@@ -6,10 +6,10 @@ use clap::Args;
 use flexcal::identify::Options;
 use flexcal::{diagnose, report};
 
+use super::diagnostic;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
-use super::{diagnostic, output};
 
 /// Arguments of `flexcal trace`.
 #[derive(Debug, Args)]
@@ -27,20 +27,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, mut data, results } = common.read("trace", &["trace.json"])?;
     common.say_of_orientation(&problem, &mut data);
-    let line = common.talks().then(Line::new);
-    let options = Options::default().with_progress(line.as_ref().map(Line::sink));
-    let result = diagnose::trace(&problem, &data, &options);
-    if let Some(line) = line {
-        line.clear();
-    }
-    let trace = result?;
+    let trace = Line::during(common.talks(), None, |sink| {
+        diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
+    })?;
     let json = report::trace_json(&problem, &trace);
     results.write(&[("trace.json", &json)])?;
-    if common.json {
-        output::print_json(&json)?;
-    } else if common.talks() {
-        output::print(&report::trace_text(&problem, &trace))?;
-        output::print(&format!("\nWritten to {}\n", results.path("trace.json").display()))?;
-    }
+    let written = results.path("trace.json");
+    common.tell(&json, || format!("{}\nWritten to {}\n", report::trace_text(&problem, &trace), written.display()))?;
     Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

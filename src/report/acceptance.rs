@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use serde::Serialize;
+
 use super::document::{Block, Headline, Table};
 use super::errors::rows_in;
 use super::figures::range;
-use super::identify::{BEFORE, short_mm};
-use super::json::{object, to_text};
-use super::quantity::{counted, mm, number};
+use super::identify::BEFORE;
+use super::json::{list, object, to_text};
+use super::quantity::{about_three_digits, counted, mm, number};
 use super::render::{report, text};
 use super::table;
 use crate::identify::{Acceptance, AcceptancePose, Accuracy, Identification};
@@ -32,57 +34,20 @@ pub struct AcceptanceRecord {
     pub instrument: Option<String>,
 }
 
-object! {
-    Document<'a>(problem: &'a Problem, rows: &Measurements, found: &'a Identification, judged: &Acceptance, record: &'a AcceptanceRecord) {
-        problem: &'a str = &problem.name,
-        flexcal: &'static str = env!("CARGO_PKG_VERSION"),
-        commit: Option<&'a str> = record.commit.as_deref(),
-        arm_digest: String = problem.digest(),
-        inputs: Vec<InputEntry<'a>> = record.inputs.iter().map(InputEntry::of).collect(),
-        instrument: Option<&'a str> = record.instrument.as_deref(),
-        position_sigma_mm: Option<f64> = problem.data.position_sigma.map(|sigma| sigma * 1e3),
-        protocol: String = protocol(problem),
-        strategy: &'a str = found.strategy.as_str(),
-        solver: &'a str = found.solver.as_str(),
-        trusted: bool = found.is_trusted(),
-        conditions: Vec<RangeEntry> = conditions(problem, rows, judged).into_iter().map(RangeEntry::of).collect(),
-        identification_rows: usize = rows_in(found, |errors| errors.identification),
-        held_out_rows: usize = found.fitted.held_out.n,
-        poses: usize = judged.poses.len(),
-        before: AccuracyEntry = AccuracyEntry::of(&judged.before),
-        after: AccuracyEntry = AccuracyEntry::of(&judged.after),
-        /// Poses that were measured several times, and the largest RP among them.
-        repeated_poses: usize = repeated(judged).count(),
-        repeatability_max_mm: Option<f64> = repeatability(judged).map(|most| most * 1e3),
-    }
-}
-object! {
-    InputEntry<'a>(input: &'a (PathBuf, Option<String>)) {
-        file: String = input.0.display().to_string(),
-        sha256: Option<&'a str> = input.1.as_deref(),
-    }
-}
-object! {
-    RangeEntry(own: Condition) {
-        of: String = own.name,
-        unit: String = own.unit,
-        range: [f64; 2] = own.range.into(),
-    }
-}
-object! {
-    /// AP over the held-out poses.
-    AccuracyEntry(of: &Accuracy) {
-        mean_mm: f64 = of.mean.value * 1e3,
-        interval_95_mm: [f64; 2] = [of.mean.low * 1e3, of.mean.high * 1e3],
-        rms_mm: f64 = of.rms * 1e3,
-        max_mm: f64 = of.max * 1e3,
+/// AP over the held-out poses, as JSON.
+fn accuracy_entry(of: &Accuracy) -> impl Serialize + use<> {
+    object! {
+        mean_mm: of.mean.value * 1e3,
+        interval_95_mm: [of.mean.low * 1e3, of.mean.high * 1e3],
+        rms_mm: of.rms * 1e3,
+        max_mm: of.max * 1e3,
     }
 }
 
 /// A range under which the held-out poses were measured, in the unit that is shown.
-#[derive(Debug)]
-pub(in crate::report) struct Condition {
-    name: String,
+#[derive(Debug, Serialize)]
+struct Condition {
+    of: String,
     unit: String,
     range: (f64, f64),
 }
@@ -113,25 +78,22 @@ fn protocol(problem: &Problem) -> String {
 /// Ranges over the held-out poses.
 fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Vec<Condition> {
     let own = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
-    let mut all: Vec<Condition> = Vec::new();
-    for (joint, name, factor) in table::commands(problem) {
-        let unit = if name.ends_with("_deg") { "°" } else { "mm" };
-        let range = range(own().map(|row| rows.configuration(row)[joint] * factor));
-        all.push(Condition { name: format!("q{}", joint + 1), unit: unit.to_owned(), range });
-    }
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        let range = range(own().map(|row| rows.positions[row][axis] * 1e3));
-        all.push(Condition { name: name.to_owned(), unit: "mm".to_owned(), range });
-    }
+    let condition = |of: &str, unit: &str, value: &dyn Fn(usize) -> f64| Condition {
+        of: of.to_owned(),
+        unit: unit.to_owned(),
+        range: range(own().map(value)),
+    };
+    let joints = table::commands(problem)
+        .into_iter()
+        .map(|own| condition(&own.name(), &own.symbol(), &|row| rows.configuration(row)[own.joint] * own.factor()));
+    let places = ["x", "y", "z"].into_iter().enumerate();
+    let places = places.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
     let columns =
         [("temperature", "°C", &rows.temperature), ("payload", "kg", &rows.payload), ("hoist", "N", &rows.hoist)];
-    for (name, unit, column) in columns {
-        if let Some(values) = column {
-            let range = range(own().map(|row| values[row]));
-            all.push(Condition { name: name.to_owned(), unit: unit.to_owned(), range });
-        }
-    }
-    all
+    let measured = columns
+        .into_iter()
+        .filter_map(|(name, unit, values)| values.as_ref().map(|values| condition(name, unit, &|row| values[row])));
+    joints.chain(places).chain(measured).collect()
 }
 
 /// The machine-readable record, ending in a line break.
@@ -142,22 +104,35 @@ pub fn acceptance_json(
     judged: &Acceptance,
     record: &AcceptanceRecord,
 ) -> String {
-    to_text(&Document::of(problem, rows, found, judged, record))
+    to_text(&object! {
+        problem: &problem.name,
+        flexcal: env!("CARGO_PKG_VERSION"),
+        commit: &record.commit,
+        arm_digest: problem.digest(),
+        inputs: list(&record.inputs, |(file, sha256)| object! { file: file.display().to_string(), sha256: sha256 }),
+        instrument: &record.instrument,
+        position_sigma_mm: problem.data.position_sigma.map(|sigma| sigma * 1e3),
+        protocol: protocol(problem),
+        strategy: found.strategy.as_str(),
+        solver: found.solver.as_str(),
+        trusted: found.is_trusted(),
+        conditions: conditions(problem, rows, judged),
+        identification_rows: rows_in(found, |errors| errors.identification),
+        held_out_rows: found.fitted.held_out.n,
+        poses: judged.poses.len(),
+        before: accuracy_entry(&judged.before),
+        after: accuracy_entry(&judged.after),
+        // Poses that were measured several times, and the largest RP among them.
+        repeated_poses: repeated(judged).count(),
+        repeatability_max_mm: repeatability(judged).map(|most| most * 1e3),
+    })
 }
 
 /// The accuracy in brief, ending in a line break.
 pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
-    let blocks = [
-        Block::lines(format!(
-            "{}\n{}; {}",
-            problem.title,
-            counted(judged.poses.len(), "held-out pose"),
-            protocol(problem)
-        )),
-        Block::Table(accuracy(judged)),
-        Block::Text(JUDGED.to_owned()),
-        Block::Text(repeats(judged)),
-    ];
+    let poses = counted(judged.poses.len(), "held-out pose");
+    let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, protocol(problem)))];
+    blocks.extend(judgement(judged));
     text(&blocks)
 }
 
@@ -172,8 +147,8 @@ pub fn acceptance_page(
     let head = Headline {
         unit: "mm",
         states: vec![
-            (BEFORE, short_mm(judged.before.mean.value)),
-            ("as identified", short_mm(judged.after.mean.value)),
+            (BEFORE, about_three_digits(judged.before.mean.value * 1e3)),
+            ("as identified", about_three_digits(judged.after.mean.value * 1e3)),
         ],
         of: counted(judged.poses.len(), "held-out pose"),
         facts: Vec::new(),
@@ -186,7 +161,7 @@ pub fn acceptance_page(
     let instrument = record.instrument.as_deref().unwrap_or("not named");
     let conditions = conditions(problem, rows, judged).into_iter().map(|own| {
         let shown = [own.range.0, own.range.1].map(|value| number(value, 1));
-        [vec![own.name], shown.to_vec(), vec![own.unit]].concat()
+        [vec![own.of], shown.to_vec(), vec![own.unit]].concat()
     });
     let inputs = record.inputs.iter().map(|(file, digest)| {
         vec![
@@ -194,11 +169,9 @@ pub fn acceptance_page(
             digest.clone().unwrap_or_else(|| "not a file that can be read again".to_owned()),
         ]
     });
-    let mut blocks = vec![
-        Block::Headline(head),
-        Block::Table(accuracy(judged)),
-        Block::Text(JUDGED.to_owned()),
-        Block::Text(repeats(judged)),
+    let mut blocks = vec![Block::Headline(head)];
+    blocks.extend(judgement(judged));
+    blocks.extend([
         Block::heading("How it was measured"),
         Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
         Block::Text(format!(
@@ -215,7 +188,7 @@ pub fn acceptance_page(
             found.solver.as_str(),
             problem.digest()
         )),
-    ];
+    ]);
     blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("HEAD of the repository around the problem: {commit}; whether files differ from it is told by their digests alone."))));
     blocks.extend([
         Block::Table(Table::new(&["input", "SHA-256"], inputs.collect(), &[0, 1])),
@@ -223,6 +196,11 @@ pub fn acceptance_page(
         Block::Blanks(vec!["arm, serial number", "place, date", "measured by", "accepted by"]),
     ]);
     report(problem, "acceptance", &blocks).html
+}
+
+/// AP before and after, what that is of, and what repeated poses say.
+fn judgement<'a>(judged: &Acceptance) -> [Block<'a>; 3] {
+    [Block::Table(accuracy(judged)), Block::Text(JUDGED.to_owned()), Block::Text(repeats(judged))]
 }
 
 /// AP before and after.

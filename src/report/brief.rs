@@ -1,8 +1,8 @@
 //! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
 
 use super::around::unsteady;
-use super::closed_loop::{cautions, errors, set_aside};
-use super::document::{Block, Point};
+use super::closed_loop::{errors, to_know};
+use super::document::{Block, Point, named};
 use super::errors::{both_parts, noun, shown, unit};
 use super::findings;
 use super::identify::{errors_by_axis, headline};
@@ -10,7 +10,7 @@ use super::noise::{carried, noise, short};
 use super::parameters::correlated;
 use super::quantity::{counted, number};
 use super::render::text_within;
-use super::unexplained::{not_looked_for, places, size_alone};
+use super::unexplained::{places, size_alone};
 use super::verdict::{called, is_beside, verdict};
 use crate::diagnose::{ClosedLoop, Found, Verdict};
 use crate::identify::{Estimate, Identification, size_of_kind};
@@ -71,24 +71,15 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
         )
     }));
     points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
-    let unidentifiable = found.identifiability().unidentifiable.len();
-    if unidentifiable > 0 {
-        points.push(format!(
-            "{} of {} not identifiable",
-            counted(unidentifiable, "combination"),
-            counted(found.unknowns.len(), "parameter")
-        ));
-    }
-    if !found.weak.is_empty() {
-        points.push(format!("{} seen too weakly", counted(found.weak.len(), "combination")));
-    }
-    let correlated = correlated(found).len();
-    if correlated > 0 {
-        points.push(format!("{} correlated by more than 0.9", counted(correlated, "pair")));
-    }
-    if !found.active_constraints.is_empty() {
-        points.push(format!("{} at its limit", counted(found.active_constraints.len(), "constraint")));
-    }
+    let of_parameters = format!("of {} not identifiable", counted(found.unknowns.len(), "parameter"));
+    let counts = [
+        (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
+        (found.weak.len(), "combination", "seen too weakly"),
+        (correlated(found).len(), "pair", "correlated by more than 0.9"),
+        (found.active_constraints.len(), "constraint", "at its limit"),
+    ];
+    let counts = counts.into_iter().filter(|own| own.0 > 0);
+    points.extend(counts.map(|(n, noun, what)| format!("{} {what}", counted(n, noun))));
     points
 }
 
@@ -104,10 +95,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
         Block::lines(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
-    blocks.extend(carried(&closure.before.fit));
-    blocks.extend(cautions(closure));
-    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
-    blocks.extend(set_aside(problem, closure));
+    blocks.extend(to_know(problem, closure));
     blocks.push(Block::Table(table));
     blocks.extend(Some(gain(closure)).filter(|gain| !gain.is_empty()).map(Block::Text));
     let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
@@ -131,10 +119,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
 
 /// What the data do not tell an effect from, in a few words.
 fn untold(closure: &ClosedLoop, found: &Found) -> String {
-    let Some(first) = found.alternatives.first() else { return String::new() };
-    let more = found.alternatives.len() - 1;
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("; not told from: {}{more}", closure.before.describe(first))
+    let others = named(found.alternatives.iter().map(|other| closure.before.describe(other)), 1, "");
+    if others.is_empty() { others } else { format!("; not told from: {others}") }
 }
 
 /// Effects whose titles may take two lines each.
@@ -173,11 +159,8 @@ fn remains(closure: &ClosedLoop) -> Option<String> {
     let failed = findings::failed(&closure.findings).len();
     let is_left = closure.verdict == Verdict::Unexplained && size_alone(closure).is_none();
     let places = if is_left { places(closure) } else { Vec::new() };
-    let structure = places.first().map(|first| {
-        let more = places.len() - 1;
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("structure without a known law ({}{more})", cut(first))
-    });
+    let places = named(places.iter().map(|place| cut(place)), 1, "");
+    let structure = (!places.is_empty()).then(|| format!("structure without a known law ({places})"));
     let checks = (failed > 0).then(|| format!("{} failed", counted(failed, "check")));
     let parts: Vec<String> = structure.into_iter().chain(checks).collect();
     (!parts.is_empty()).then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))

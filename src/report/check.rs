@@ -1,73 +1,61 @@
 //! What `check` says and writes.
 
-use super::detection;
+use serde::Serialize;
+
 use super::document::{Block, Table};
-use super::forecast::{ExpectedEntry, assumptions, cells};
-use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
+use super::forecast::{assumptions, cells, expected};
+use super::json::{list, object, to_text, unidentified};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
-use crate::design::{Check, Elsewhere, Expected, Forecast, GrowthStep, Prediction};
+use super::{detection, json};
+use crate::design::{Check, Elsewhere, Expected, Forecast, Prediction};
 use crate::identify::rows_of_kind;
 use crate::problem::Problem;
 
-object! {
-    Document<'a>(problem: &'a Problem, check: &'a Check) {
-        problem: &'a str = &problem.name,
-        poses: usize = check.forecast.poses,
-        sufficient: bool = check.suffices(),
-        rank: usize = check.forecast.identifiability.rank,
-        /// With all poses of the series.
-        attainable_rank: usize = check.growth.attainable_rank,
-        #[serde(flatten)]
-        conditioning: Conditioning<'a> = Conditioning::of(&check.forecast.identifiability, check.coordinates),
-        parameters: Vec<ExpectedEntry<'a>> = check.forecast.expected.iter().map(ExpectedEntry::of).collect(),
-        unidentified: Vec<Unidentified<'a>> =
-            unidentified(&check.forecast.identifiability, |k| check.forecast.expected[k].name.as_str()),
-        /// Root mean square length of the error of one position measured with the σ of the poses; of tilts alone none.
-        noise_mm: Option<f64> = check.noise.map(|noise| noise * 1e3),
-        prediction: PredictionEntry = PredictionEntry::of(check),
-        growth: Vec<StepEntry> = check.growth.steps.iter().map(StepEntry::of).collect(),
-        /// Least number of poses that see everything and predict as exactly as one position is measured.
-        enough: Option<usize> = check.growth.enough,
-        /// From what size on each effect of the catalogue would be found.
-        detectable: detection::Entry<'a> = detection::Entry::of(&check.detection),
-    }
-}
-object! {
-    PredictionEntry(check: &Check) {
-        judged_in: &'static str = match check.elsewhere {
-            Elsewhere::Ranges => "ranges",
-            Elsewhere::HeldOut => "held-out",
-            Elsewhere::Same => "same",
-        },
-        #[serde(flatten)]
-        lengths: Lengths = Lengths::of(&check.prediction),
-        /// Of measured − predicted there: with the noise of the measurement.
-        held_out_rms_mm: Option<f64> = check.noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3),
-    }
-}
-object! {
-    Lengths(own: &Prediction) {
-        median_mm: f64 = own.median * 1e3,
-        most_mm: f64 = own.most * 1e3,
-        rms_mm: f64 = own.rms * 1e3,
-    }
-}
-object! {
-    StepEntry(own: &GrowthStep) {
-        poses: usize = own.poses,
-        rank: usize = own.rank,
-        open: usize = own.open,
-        well_identified: usize = own.well_identified,
-        #[serde(flatten)]
-        prediction: Lengths = Lengths::of(&own.prediction),
-    }
+fn lengths(own: &Prediction) -> impl Serialize + use<> {
+    object! { median_mm: own.median * 1e3, most_mm: own.most * 1e3, rms_mm: own.rms * 1e3 }
 }
 
 /// A check as JSON text.
 pub fn check_json(problem: &Problem, check: &Check) -> String {
-    to_text(&Document::of(problem, check))
+    let (forecast, noise) = (&check.forecast, check.noise);
+    let found = &forecast.identifiability;
+    let with_noise = noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3);
+    to_text(&object! {
+        problem: &problem.name,
+        poses: forecast.poses,
+        sufficient: check.suffices(),
+        rank: found.rank,
+        // With all poses of the series.
+        attainable_rank: check.growth.attainable_rank,
+        ..json::conditioning(found, check.coordinates),
+        parameters: list(&forecast.expected, expected),
+        unidentified: unidentified(&found.unidentifiable, |k| forecast.expected[k].name.as_str()),
+        // Root mean square length of the error of one position measured with the σ of the poses; of tilts alone none.
+        noise_mm: noise.map(|noise| noise * 1e3),
+        prediction: object! {
+            judged_in: match check.elsewhere {
+                Elsewhere::Ranges => "ranges",
+                Elsewhere::HeldOut => "held-out",
+                Elsewhere::Same => "same",
+            },
+            ..lengths(&check.prediction),
+            // Of measured − predicted there: with the noise of the measurement.
+            held_out_rms_mm: with_noise,
+        },
+        growth: list(&check.growth.steps, |own| object! {
+            poses: own.poses,
+            rank: own.rank,
+            open: own.open,
+            well_identified: own.well_identified,
+            ..lengths(&own.prediction),
+        }),
+        // Least number of poses that see everything and predict as exactly as one position is measured.
+        enough: check.growth.enough,
+        // From what size on each effect of the catalogue would be found.
+        detectable: detection::entry(&check.detection),
+    })
 }
 
 /// A check in words, ending in a line break.

@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Headline, Point, Table, code, some_of};
+use super::document::{Block, Headline, Point, Table, code, named, some_of};
 use super::errors::{
     NOMINAL, both_parts, held_out_rows, in_unit, mean_and_rms, measure, row, rows_of, shown, unit, unpredicted,
     with_unit,
 };
-use super::figures::{Figure, PlotData};
-use super::identify::{BEFORE, beware, fitted_parameters, mean, poses, spread, told, why_not_trusted};
+use super::figures::{self, PlotData};
+use super::identify::{BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted};
 use super::noise::{carried, size};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
@@ -30,20 +30,27 @@ const SHOWN_ROWS: usize = 3;
 /// Limits of the declared problem that are named.
 const LIMITS: usize = 3;
 
+/// What to know before one reads what was found: rows that carry the misfit, cautions, what was not looked for, rows set aside.
+pub(super) fn to_know<'a>(problem: &Problem, closure: &ClosedLoop) -> Vec<Block<'a>> {
+    let mut blocks: Vec<Block> = carried(&closure.before.fit).into_iter().collect();
+    blocks.extend(cautions(closure));
+    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
+    blocks.extend(set_aside(problem, closure));
+    blocks
+}
+
 /// Rows that took no part in the choice of effects; nothing to say without any.
-pub(super) fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
+fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
     let rows = &closure.set_aside;
-    let (named, more) = some_of(rows.iter().map(ToString::to_string), SHOWN_ROWS);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let treatment = if problem.robust.is_some() {
         "The robust loss keeps the fit from such rows"
     } else {
         "The fit counts such rows in full; a section [robust] would limit them"
     };
     let words = format!(
-        "{} too far off to be noise took no part in the choice of effects: {}{more}. {treatment}.",
+        "{} too far off to be noise took no part in the choice of effects: {}. {treatment}.",
         counted(rows.len(), "pose"),
-        named.join(", ")
+        named(rows.iter().map(ToString::to_string), SHOWN_ROWS, ", ")
     );
     (!rows.is_empty()).then_some(Block::Text(words))
 }
@@ -54,10 +61,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(closure)),
     ];
-    blocks.extend(carried(&closure.before.fit));
-    blocks.extend(cautions(closure));
-    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
-    blocks.extend(set_aside(problem, closure));
+    blocks.extend(to_know(problem, closure));
     blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
@@ -92,55 +96,45 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     );
     let mut blocks =
         vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
-    blocks.extend(carried(fit));
-    blocks.extend(cautions(closure));
-    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
-    blocks.extend(set_aside(problem, closure));
+    blocks.extend(to_know(problem, closure));
     blocks.extend(beware(after, plots));
     blocks.extend([
         Block::Table(errors(closure)),
         Block::Text(gain(closure)),
-        Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]),
+        Block::figures([figures::errors(plots), figures::vectors(plots)]),
         Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
     ]);
     blocks.extend(findings::blocks(&closure.before.findings));
     let every = format!("{} writes them all", code("flexcal trace"));
     let mut ranking = trace::ranking(problem, &closure.before, SHOWN, &every);
-    ranking.insert(1, Block::Figures(vec![Figure::Ranking(&closure.before)]));
+    ranking.insert(1, Block::figures([figures::ranking(&closure.before)]));
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::not_seen(&closure.before)));
     blocks.extend(rounds(closure));
     blocks.extend(sureness(closure));
     blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
-    let causes = plots.causes.iter().enumerate().map(|(k, cause)| Figure::Cause(plots, cause, k + 1));
-    blocks.push(Block::Figures(causes.collect()));
+    let causes = plots.causes.iter().zip(1..);
+    blocks.push(Block::figures(causes.map(|(cause, number)| Some(cause.draw_effect(number, &plots.shown)))));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure).into_iter().map(Point::from);
     let (tests, page) = (findings::all(&closure.findings), findings::each(&closure.findings));
     blocks.extend([
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
         Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
-        Block::Figures(
-            plots
-                .trend
-                .iter()
-                .map(|trend| Figure::Trend(plots, trend))
-                .chain([Figure::Histogram(plots), Figure::Order(plots), Figure::JointMap(plots)])
-                .collect(),
-        ),
+        Block::figures([
+            plots.trend.as_ref().map(|trend| trend.draw_unexplained(&plots.shown)),
+            figures::histogram(plots),
+            figures::order(plots),
+            figures::joint_map(plots),
+        ]),
         Block::heading("Parameters of the final fit"),
     ]);
     blocks.extend(parameters(&closure.closed, after, &file));
     blocks.extend(lower_waves(&closure.closed, after, &file));
-    blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
-    let mut seen = vec![
-        Block::heading("What the poses can tell"),
-        Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(after.identifiability())]),
-    ];
-    seen.extend(told(after, &file));
-    blocks.push(Block::Page(seen));
+    blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
+    blocks.push(Block::Page(all_told(after, plots, &file)));
     blocks
 }
 
@@ -180,18 +174,16 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
 }
 
 /// Why the final fit is not to be trusted, and limits of the declared problem that effects may stand for.
-pub(super) fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
+fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!after.is_trusted()).then(|| format!("Beware: {}.", why_not_trusted(after)));
     let bounds = before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
     let held = bounds.chain(before.active_constraints.iter().map(|own| own.words.clone()));
-    let (named, more) = some_of(held, LIMITS);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let limits = (!named.is_empty() && !closure.effects.is_empty()).then(|| {
+    let held = named(held, LIMITS, ", ");
+    let limits = (!held.is_empty() && !closure.effects.is_empty()).then(|| {
         format!(
-            "Limits hold the fit as declared ({}{more}): where one is wrong, an effect that was found may only stand for it. \
-             flexcal identify -v shows what each costs.",
-            named.join(", ")
+            "Limits hold the fit as declared ({held}): where one is wrong, an effect that was found may only stand for it. \
+             flexcal identify -v shows what each costs."
         )
     });
     let wrong = wrong_limits(closure).map(|(limit, probability)| {
@@ -299,10 +291,10 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     }
     details.push(chance);
     if !found.alternatives.is_empty() {
-        let named = found.alternatives.iter().map(|other| closure.before.describe(other));
-        let (mut named, more) = some_of(named, alternatives);
-        named.extend((more > 0).then(|| format!("and {more} more")));
-        details.push(format!("these data do not distinguish it from: {}", named.join("; ")));
+        let others = found.alternatives.iter().map(|other| closure.before.describe(other));
+        let (mut others, more) = some_of(others, alternatives);
+        others.extend((more > 0).then(|| format!("and {more} more")));
+        details.push(format!("these data do not distinguish it from: {}", others.join("; ")));
     }
     Point { text: called(closure, found), details, mark: None }
 }
@@ -332,7 +324,7 @@ fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
     let rows = closure.rounds.iter().enumerate().map(row).collect();
     vec![
         Block::heading("Rounds"),
-        Block::Figures(vec![Figure::Rounds(closure)]),
+        Block::figures([figures::rounds(closure)]),
         Block::Table(Table::new(&header, rows, &[1])),
     ]
 }

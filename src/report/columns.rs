@@ -98,24 +98,23 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
         ("predicted", |own| own.predicted, &predicted_turn),
         ("residual", |own| own.position, &|own: &Residual| own.orientation),
     ];
+    let mut add = |name: String, decimals, cell: &dyn Fn(&Residual) -> f64| {
+        columns.push((name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals))));
+    };
     for (word, value, turn) in both {
         for (kind, axes) in &kinds {
             let (unit, factor) = if *kind == "tilt" { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
             for (k, axis) in axes.iter().enumerate() {
                 let is_own = |own: &Residual| columns_of(rows.observation(own.row)).0 == *kind;
                 let cell = |own: &Residual| if is_own(own) { value(own)[k] * factor } else { f64::NAN };
-                let cells = residuals.iter().map(cell).collect();
-                columns.push((format!("{word}_{axis}_{unit}"), Column::Numbers(cells, Some(6))));
+                add(format!("{word}_{axis}_{unit}"), 6, &cell);
             }
         }
         for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| turned) {
-            let cell = |own: &Residual| turn(own).map_or(f64::NAN, |turn| turn[k].to_degrees());
-            let cells = residuals.iter().map(cell).collect();
-            columns.push((format!("{word}_{axis}_deg"), Column::Numbers(cells, Some(7))));
+            add(format!("{word}_{axis}_deg"), 7, &|own| turn(own).map_or(f64::NAN, |turn| turn[k].to_degrees()));
         }
     }
-    let length = residuals.iter().map(Residual::length).collect();
-    columns.push(("whitened".to_owned(), Column::Numbers(length, Some(4))));
+    add("whitened".to_owned(), 4, &Residual::length);
     columns.push(("outlier".to_owned(), Column::Flags(residuals.iter().map(|own| own.outlier).collect())));
     columns.push(("held_out".to_owned(), Column::Flags(residuals.iter().map(|own| own.held_out).collect())));
     columns

@@ -6,11 +6,11 @@ use serde::{Serialize, Serializer};
 
 use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, held_out_rows, noun, shown, unit};
-use super::figures::{Figure, PlotData};
+use super::figures::{self, PlotData};
 use super::identify::{BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder};
-use super::json::{Both, object, to_text};
+use super::json::{both, list, object, to_text};
 use super::noise::size;
-use super::paper_tables::{Tables, table_2, table_3, title};
+use super::paper_tables::{table_2, table_3, tables, title};
 use super::quantity::{counted, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::{Baseline, Comparison, Errors, Identification, SolverChoice};
@@ -28,7 +28,7 @@ const TIME: usize = 7;
 struct Row<'a> {
     strategy: Cow<'a, str>,
     solver: &'a str,
-    #[serde(flatten, serialize_with = "both")]
+    #[serde(flatten, serialize_with = "errors_of_both")]
     errors: &'a Errors,
     iterations: u64,
     evaluations: u64,
@@ -73,8 +73,8 @@ impl<'a> From<&'a Baseline> for Row<'a> {
     }
 }
 
-fn both<S: Serializer>(errors: &Errors, serializer: S) -> Result<S::Ok, S::Error> {
-    Both::of(errors).serialize(serializer)
+fn errors_of_both<S: Serializer>(errors: &Errors, serializer: S) -> Result<S::Ok, S::Error> {
+    both(errors).serialize(serializer)
 }
 
 /// Every strategy and solver, the paper's own last.
@@ -82,28 +82,20 @@ fn fits(comparison: &Comparison) -> Vec<Row<'_>> {
     comparison.strategies.iter().map(Row::from).chain(comparison.paper.iter().map(Row::from)).collect()
 }
 
-object! {
-    Document<'a>(problem: &'a Problem, comparison: &'a Comparison) {
-        problem: &'a str = &problem.name,
-        registered: Both = Both::of(&comparison.joint.registered),
-        rows: Vec<Row<'a>> = fits(comparison),
-        ablations: Vec<Ablated<'a>> = comparison.ablations.iter().map(Ablated::of).collect(),
-        procedures: Vec<Tables> = comparison.procedures.iter().map(|own| Tables::of(comparison, own)).collect(),
-    }
-}
-object! {
-    /// One part of the elasticity that is kept, strategy joint.
-    Ablated<'a>(own: &'a (Ablation, Identification)) {
-        elasticity: &'a str = own.0.as_str(),
-        parameters: usize = own.1.unknowns.len(),
-        #[serde(flatten)]
-        row: Row<'a> = Row::from(&own.1),
-    }
-}
-
 /// A comparison as JSON text, ending in a line break.
 pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
-    to_text(&Document::of(problem, comparison))
+    to_text(&object! {
+        problem: &problem.name,
+        registered: both(&comparison.joint.registered),
+        rows: fits(comparison),
+        // One part of the elasticity that is kept, strategy joint.
+        ablations: list(&comparison.ablations, |(part, found)| object! {
+            elasticity: part.as_str(),
+            parameters: found.unknowns.len(),
+            ..Row::from(found),
+        }),
+        procedures: list(&comparison.procedures, |own| tables(comparison, own)),
+    })
 }
 
 /// A comparison as text, ending in a line break.
@@ -166,11 +158,11 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         Block::Words(beware(joint, plots).into_iter().collect()),
         Block::Page(beware(joint, plots).into_iter().collect()),
         Block::heading("Strategies and solvers side by side"),
-        Block::Figures(vec![Figure::Strategies(comparison)]),
+        Block::Figures(vec![figures::strategies(comparison)]),
         Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),
         Block::Page(vec![Block::Table(in_full(comparison))]),
         Block::heading("What each part of the elasticity is worth"),
-        Block::Figures(vec![Figure::Ablations(comparison)]),
+        Block::figures([figures::ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
     ];
     if !comparison.procedures.is_empty() {
@@ -180,11 +172,11 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         blocks.push(Block::Text(format!("{}.", title(own))));
         blocks.extend([Block::Table(table_2(own)), Block::Table(table_3(comparison, own))]);
         // The errors of the joint fit stand further below.
-        blocks.extend(own.paper.map(|_| Block::Figures(vec![Figure::Procedure(&comparison.before, own)])));
+        blocks.extend(own.paper.map(|_| Block::Figures(vec![figures::of_procedure(&comparison.before, own)])));
     }
     blocks.push(Block::heading("Everything fitted at once"));
     blocks.extend(errors(joint));
-    blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(remainder(problem, joint, plots, &format!("the estimate.json of {}", code("flexcal identify"))));
     blocks

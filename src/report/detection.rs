@@ -1,41 +1,35 @@
 //! Which effects poses would show, for programs and for people.
 
+use serde::Serialize;
+
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
-use super::json::object;
+use super::json::{list, object};
 use crate::diagnose::{Detectable, Detection, Size};
 use crate::problem::Effect;
 
 /// Effects of a family on a screen.
 const SHOWN: usize = 3;
 
-object! {
-    /// All of it.
-    Entry<'a>(detection: &'a Detection) {
-        power: f64 = detection.power,
-        level: f64 = detection.level,
-        /// Whether the poses have no times yet: effects that remember what was before a pose need them.
-        times_assumed: bool = detection.times_assumed,
-        effects: Vec<EffectEntry<'a>> = detection.effects.iter().map(EffectEntry::of).collect(),
-        untestable: Vec<effect::Untestable<'a>> = detection.untestable.iter().map(effect::Untestable::of).collect(),
-    }
-}
-object! {
-    EffectEntry<'a>(own: &'a Detectable) {
-        #[serde(flatten)]
-        effect: &'a Effect = &own.effect,
-        sizes: Vec<SizeEntry<'a>> = own.sizes.iter().map(SizeEntry::of).collect(),
-    }
-}
-object! {
-    /// SI.
-    SizeEntry<'a>(size: &'a Size) {
-        parameters: &'a [String] = &size.parameters,
-        unit: &'static str = size.unit.symbol(),
-        prior_sigma: f64 = size.prior,
-        found_from: Option<f64> = size.worst,
-        found_from_at_best: Option<f64> = size.best,
+/// All of it as JSON, sizes in SI.
+pub(super) fn entry(detection: &Detection) -> impl Serialize {
+    let size = |own: &'_ Size| {
+        object! {
+            parameters: own.parameters.clone(),
+            unit: own.unit.symbol(),
+            prior_sigma: own.prior,
+            found_from: own.worst,
+            found_from_at_best: own.best,
+        }
+    };
+    object! {
+        power: detection.power,
+        level: detection.level,
+        // Whether the poses have no times yet: effects that remember what was before a pose need them.
+        times_assumed: detection.times_assumed,
+        effects: list(&detection.effects, |own| object! { ..&own.effect, sizes: list(&own.sizes, size) }),
+        untestable: effect::untestable(detection.untestable.clone()),
     }
 }
 

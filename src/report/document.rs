@@ -3,7 +3,7 @@
 //! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone; [`Block::Page`] and
 //! [`Block::Words`] hold what only one kind of reader gets.
 
-use super::figures::{Figure, PlotData};
+use super::figures::{Drawing, PlotData};
 
 /// Marks of code in words: control characters, so that no title has them on purpose and terminals drop them.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
@@ -30,7 +30,7 @@ pub(super) enum Block<'a> {
     /// What it came to, at one glance; on the page alone.
     Headline(Headline),
     /// Drawings side by side; on the page alone.
-    Figures(Vec<Figure<'a>>),
+    Figures(Vec<Drawing>),
     /// Every pose that the figures draw, to look at one by one; on the page alone.
     Poses(&'a PlotData),
     /// What a page shows on demand: its title, what it holds, and where it is found on paper; on the page alone.
@@ -97,6 +97,11 @@ impl Block<'_> {
         Self::Heading(text.to_owned())
     }
 
+    /// Those figures for which there is something to draw.
+    pub fn figures(drawn: impl IntoIterator<Item = Option<Drawing>>) -> Self {
+        Self::Figures(drawn.into_iter().flatten().collect())
+    }
+
     /// Points without details.
     pub fn list(points: impl IntoIterator<Item = String>) -> Self {
         Self::List(points.into_iter().map(Point::from).collect())
@@ -134,6 +139,13 @@ pub(super) fn first_of(words: impl IntoIterator<Item = String>, most: usize, fil
     let (mut shown, more) = some_of(words, most);
     shown.extend((more > 0).then(|| format!("and {more} more in {file}")));
     shown
+}
+
+/// "a, b and 3 more": the first `most` of some words.
+pub(super) fn named(words: impl IntoIterator<Item = String>, most: usize, between: &str) -> String {
+    let (shown, more) = some_of(words, most);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    shown.join(between) + &more
 }
 
 /// The first `most` of some words, and how many more there are.

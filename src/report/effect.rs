@@ -1,7 +1,9 @@
 //! Effects as results name them.
 
+use serde::Serialize;
+
 use super::document::{Point, code};
-use super::json::object;
+use super::json::{list, object};
 use super::quantity::{decimals, number};
 use crate::diagnose::{Found, Trace};
 use crate::identify::Estimate;
@@ -14,13 +16,9 @@ pub(super) const MOST_LISTED: usize = 8;
 /// Waves of a joint that are shown of more.
 pub(super) const SHOWN_WAVES: usize = 4;
 
-object! {
-    /// An effect that these data cannot show.
-    Untestable<'a>(own: &'a (Effect, &'static str)) {
-        #[serde(flatten)]
-        effect: &'a Effect = &own.0,
-        reason: &'static str = own.1,
-    }
+/// Effects that these data cannot show, each with the reason, as JSON.
+pub(super) fn untestable(all: Vec<(Effect, &'static str)>) -> Vec<impl Serialize> {
+    list(all, |(effect, reason)| object! { ..effect, reason: reason })
 }
 
 /// In words and, unless that is long, as a problem declares it.

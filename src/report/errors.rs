@@ -1,6 +1,6 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
-use super::quantity::{counted, decimals, number};
+use super::quantity::{about_three_digits, counted, number};
 use crate::identify::{ErrorSummary, Errors, Identification, rows_of_kind};
 
 /// The arm before anything was identified.
@@ -44,8 +44,7 @@ pub(super) fn with_unit(of: &ErrorSummary, value: f64) -> String {
 
 /// The same with about three digits.
 pub(super) fn brief(of: &ErrorSummary, value: f64) -> String {
-    let value = in_unit(of, value);
-    number(value, (decimals(value, 4) + 1).min(4))
+    about_three_digits(in_unit(of, value))
 }
 
 /// The unit in which errors of a kind of rows are shown.

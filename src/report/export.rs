@@ -6,7 +6,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::document::{Block, Table};
 use super::errors;
-use super::json::{Summary, object, to_text};
+use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
 use crate::identify::{ErrorSummary, Placement, SavedEstimate, rows_of_kind};
@@ -61,34 +61,24 @@ pub struct Exported<'a> {
     pub errors: Option<ExportErrors>,
 }
 
-object! {
-    HeldOut(errors: &ExportErrors) {
-        whole: Summary = Summary::of(&errors.whole),
-        rigid: Summary = Summary::of(&errors.rigid),
-    }
-}
-object! {
-    Moved<'a>(origin: &'a MovedOrigin) {
-        joint: &'a str = &origin.joint,
-        xyz_m: [f64; 3] = origin.xyz.into(),
-        rpy_rad: [f64; 3] = origin.rpy.into(),
-        moved_mm: f64 = origin.distance * 1e3,
-        turned_deg: f64 = origin.angle.to_degrees(),
-    }
-}
-object! {
-    Document<'a>(exported: &Exported<'a>) {
-        problem: &'a str = &exported.problem.name,
-        file: Option<String> = exported.file.map(|file| file.display().to_string()),
-        origins: Option<Vec<Moved<'a>>> = exported.moved.map(|moved| moved.iter().map(Moved::of).collect()),
-        held_out: Option<HeldOut> = exported.errors.as_ref().map(HeldOut::of),
-        not_held: Vec<String> = left_out(exported),
-    }
-}
-
 /// What was written, as JSON text.
 pub fn export_json(exported: &Exported) -> String {
-    to_text(&Document::of(exported))
+    let moved = |own: &'_ MovedOrigin| {
+        object! {
+            joint: own.joint.clone(),
+            xyz_m: <[f64; 3]>::from(own.xyz),
+            rpy_rad: <[f64; 3]>::from(own.rpy),
+            moved_mm: own.distance * 1e3,
+            turned_deg: own.angle.to_degrees(),
+        }
+    };
+    to_text(&object! {
+        problem: &exported.problem.name,
+        file: exported.file.map(|file| file.display().to_string()),
+        origins: exported.moved.map(|all| list(all, moved)),
+        held_out: exported.errors.map(|own| object! { whole: summary(&own.whole), rigid: summary(&own.rigid) }),
+        not_held: left_out(exported),
+    })
 }
 
 /// What the model has beyond the geometry of the chain.

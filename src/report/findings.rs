@@ -1,32 +1,32 @@
 //! Tests of what a fit leaves, for programs and for people.
 
+use serde::Serialize;
+
 use super::document::{Block, Mark, Point};
-use super::json::object;
+use super::json::{list, object};
 use super::quantity::number;
 use crate::diagnose::{Covariate, Findings, ResidualTest, Test};
-
-object! {
-    /// One test; `bounds`: where chance keeps the statistic.
-    Entry(check: &ResidualTest) {
-        check: &'static str = check.name(),
-        about: Option<String> = check.about().as_ref().map(named),
-        structure: bool = check.is_structure(),
-        failed: bool = check.failed(),
-        statistic: Option<f64> = check.outcome.as_ref().ok().map(|outcome| outcome.statistic),
-        bounds: Option<[f64; 2]> = check.outcome.as_ref().ok().map(|outcome| outcome.bounds.into()),
-        p_value: Option<f64> = check.outcome.as_ref().ok().map(|outcome| outcome.p_value),
-        words: String = check.to_string(),
-    }
-}
 
 /// What a test is about: the order of the rows in the plural.
 fn named(covariate: &Covariate) -> String {
     if *covariate == Covariate::Row { "rows".to_owned() } else { covariate.to_string() }
 }
 
-/// Every test.
-pub(super) fn entries(findings: &Findings) -> Vec<Entry> {
-    findings.tests.iter().map(Entry::of).collect()
+/// Every test as JSON; `bounds`: where chance keeps the statistic.
+pub(super) fn entries(findings: &Findings) -> Vec<impl Serialize> {
+    list(&findings.tests, |check| {
+        let outcome = check.outcome.as_ref().ok();
+        object! {
+            check: check.name(),
+            about: check.about().as_ref().map(named),
+            structure: check.is_structure(),
+            failed: check.failed(),
+            statistic: outcome.map(|outcome| outcome.statistic),
+            bounds: outcome.map(|outcome| outcome.bounds),
+            p_value: outcome.map(|outcome| outcome.p_value),
+            words: check.to_string(),
+        }
+    })
 }
 
 /// The tests that failed, in words.

@@ -1,8 +1,10 @@
 //! Expected standard errors as people and programs read them.
 
+use serde::Serialize;
+
 use super::document::Block;
 use super::json::object;
-use super::quantity::{counted, decimals, number, or_dash};
+use super::quantity::{counted, decimals, number, or_dash, two_digits};
 use crate::design::Expected;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
@@ -10,16 +12,16 @@ use crate::quantity::Display;
 /// Decimals of any value at most.
 const MOST: usize = 6;
 
-object! {
-    /// A parameter before anything is measured.
-    ExpectedEntry<'a>(expected: &'a Expected) {
-        name: &'a str = &expected.name,
-        unit: &'a str = expected.unit.symbol(),
-        nominal: f64 = expected.nominal,
-        prior_sigma: Option<f64> = expected.prior,
-        std_error: Option<f64> = expected.std_error,
-        identified: f64 = expected.identified,
-        identified_at_nominal: f64 = expected.identified_at_nominal,
+/// A parameter before anything is measured, as JSON.
+pub(super) fn expected(own: &Expected) -> impl Serialize {
+    object! {
+        name: &own.name,
+        unit: own.unit.symbol(),
+        nominal: own.nominal,
+        prior_sigma: own.prior,
+        std_error: own.std_error,
+        identified: own.identified,
+        identified_at_nominal: own.identified_at_nominal,
     }
 }
 
@@ -59,5 +61,5 @@ pub(super) fn assumptions<'a>(problem: &Problem, expected: &[Expected], fitted: 
 
 /// A size \[SI\] with two digits that count.
 pub(super) fn size(value: Option<f64>, unit: &Display) -> String {
-    or_dash(value.map(|value| value * unit.factor), |value| number(value, decimals(value, MOST)))
+    or_dash(value, |value| two_digits(value * unit.factor, MOST))
 }

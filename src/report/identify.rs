@@ -2,24 +2,25 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
 use super::errors::{NOMINAL, axes, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted};
-use super::figures::{Figure, PlotData};
+use super::figures::{self, PlotData};
 use super::findings;
-use super::json::{Both, Conditioning, Degrees, Kind, SpreadChange, Unidentified, object, to_text, unidentified};
-use super::limits::{AlternationEntry, PriceEntry, alternation, shadow_prices};
+use super::json::{self, both, keyed, kind, list, object, sizes, to_text, unidentified, unless_empty};
+use super::limits::{alternation, price_entry, shadow_prices};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
 };
-use super::quantity::{counted, decimals, mm, number};
+use super::quantity::{counted, mm, number};
 use super::render::{Report, report, text};
 use crate::identify::{
     ActiveConstraint, Carriers, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors,
-    Outlier,
+    Outlier, PointSpread,
 };
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
@@ -27,124 +28,108 @@ use crate::problem::Problem;
 /// The file that holds everything.
 const FILE: &str = "estimate.json";
 
-object! {
-    Document<'a>(problem: &'a Problem, found: &'a Identification) {
-        problem: &'a str = &problem.name,
-        arm_digest: String = problem.digest(),
-        strategy: &'a str = found.strategy.as_str(),
-        solver: &'a str = found.solver.as_str(),
-        solver_reason: Option<&'a str> = found.solver_reason,
-        termination: &'a str = found.termination.as_str(),
-        trusted: bool = found.is_trusted(),
-        iterations: u64 = found.iterations,
-        alternation: Option<AlternationEntry> = found.alternation.map(AlternationEntry::of),
-        seconds: f64 = found.seconds,
-        registered: Both = Both::of(&found.registered),
-        #[serde(flatten)]
-        fitted: Both = Both::of(&found.fitted),
-        #[serde(skip_serializing_if = "Vec::is_empty")]
-        kinds: Vec<Kind> = found.kinds.iter().map(Kind::of).collect(),
-        /// At each point that was touched.
-        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-        spread: BTreeMap<&'a str, SpreadChange> =
-            found.spreads.iter().map(|own| (own.0.point.as_str(), SpreadChange::of(own))).collect(),
-        reduced_chi2: Option<f64> = found.reduced_chi2,
-        first_time_s: f64 = found.first_time,
-        estimated_sigma_mm: Option<f64> = match found.noise {
+fn document(problem: &Problem, found: &Identification) -> impl Serialize {
+    let is_angle = found.fitted.identification.is_angle();
+    let name = |k: usize| found.unknowns[k].as_str();
+    object! {
+        problem: &problem.name,
+        arm_digest: problem.digest(),
+        strategy: found.strategy.as_str(),
+        solver: found.solver.as_str(),
+        solver_reason: found.solver_reason,
+        termination: found.termination.as_str(),
+        trusted: found.is_trusted(),
+        iterations: found.iterations,
+        alternation: found.alternation.map(|own| object! { sweeps: own.sweeps, contraction: own.contraction }),
+        seconds: found.seconds,
+        registered: both(&found.registered),
+        ..both(&found.fitted),
+        ?kinds: unless_empty(list(&found.kinds, kind)),
+        // At each point that was touched.
+        ?spread: unless_empty(by_point(&found.spreads)),
+        reduced_chi2: found.reduced_chi2,
+        first_time_s: found.first_time,
+        estimated_sigma_mm: match found.noise {
             Noise::Declared | Noise::Unknown => None,
             Noise::Estimated(sigma) => Some(sigma * 1e3),
         },
-        chance: Option<[f64; 2]> = found.chance.map(<[f64; 2]>::from),
-        noise_factor: f64 = found.noise_factor,
-        /// Of the kind of rows that errors are told of.
-        sigma_taken_mm: Option<f64> = (!found.fitted.identification.is_angle()).then_some(found.sigma_taken * 1e3),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        sigma_taken_deg: Option<f64> = found.fitted.identification.is_angle().then(|| found.sigma_taken.to_degrees()),
-        rank: usize = found.identifiability().rank,
-        #[serde(flatten)]
-        conditioning: Conditioning<'a> = Conditioning::of(found.identifiability(), found.coordinates),
-        orientation: Option<OrientationEntry> = found.orientation.as_ref().map(OrientationEntry::of),
-        parameters: Vec<ParameterEntry<'a>> = found.estimates.iter().map(ParameterEntry::of).collect(),
-        unidentified: Vec<Unidentified<'a>> = unidentified(found.identifiability(), |k| found.unknowns[k].as_str()),
-        weak: Vec<Unidentified<'a>> = found.weak.iter().map(|own| Unidentified::of(own, |k: usize| found.unknowns[k].as_str())).collect(),
-        covariance: Vec<Box<RawValue>> = covariance(found),
-        correlations: Vec<Correlation> = found.strong_correlations().into_iter().map(Correlation::of).collect(),
-        active_constraints: Vec<ActiveEntry<'a>> = found.active_constraints.iter().map(ActiveEntry::of).collect(),
-        outliers: Vec<OutlierEntry> = found.outliers.iter().map(OutlierEntry::of).collect(),
-        misfit_carried_by: Option<CarriersEntry> = found.carriers.as_ref().map(CarriersEntry::of),
-        cautions: Vec<String> = found.reasons_to_ask(),
+        chance: found.chance,
+        noise_factor: found.noise_factor,
+        // Of the kind of rows that errors are told of.
+        sigma_taken_mm: (!is_angle).then_some(found.sigma_taken * 1e3),
+        ?sigma_taken_deg: is_angle.then(|| found.sigma_taken.to_degrees()),
+        rank: found.identifiability().rank,
+        ..json::conditioning(found.identifiability(), found.coordinates),
+        orientation: found.orientation.as_ref().map(turns),
+        parameters: list(&found.estimates, parameter),
+        unidentified: unidentified(&found.identifiability().unidentifiable, name),
+        weak: unidentified(&found.weak, name),
+        covariance: covariance(found),
+        correlations: list(found.strong_correlations(), |(one, other, correlation)| {
+            object! { parameters: [one, other], correlation: correlation }
+        }),
+        active_constraints: list(&found.active_constraints, active_constraint),
+        outliers: list(&found.outliers, outlier),
+        misfit_carried_by: found.carriers.as_ref().map(carriers),
+        cautions: found.reasons_to_ask(),
     }
 }
-object! {
-    ParameterEntry<'a>(estimate: &'a Estimate) {
-        name: &'a str = &estimate.name,
-        unit: &'a str = estimate.unit.symbol(),
-        nominal: f64 = estimate.nominal,
-        estimate: f64 = estimate.estimate,
-        std_error: Option<f64> = estimate.std_error,
-        at_bound: Option<&'a str> = estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
-        shadow_price: Option<PriceEntry> = estimate.shadow_price.map(|price| PriceEntry::of(price, estimate.unit)),
-        identified: f64 = estimate.identified,
-        fitted: bool = estimate.fitted,
+
+/// The spread of the target at each point with the nominal and with the identified arm.
+fn by_point(all: &[(PointSpread, PointSpread, bool)]) -> BTreeMap<&str, impl Serialize> {
+    let change = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
+        object! { n: before.n, held_out: *held_out, registered_mm: before.mean * 1e3, ..json::spread(after) }
+    };
+    all.iter().map(|own| (own.0.point.as_str(), change(own))).collect()
+}
+
+fn parameter(own: &Estimate) -> impl Serialize {
+    object! {
+        name: &own.name,
+        unit: own.unit.symbol(),
+        nominal: own.nominal,
+        estimate: own.estimate,
+        std_error: own.std_error,
+        at_bound: own.at_bound.map(|bound| side(bound, ["lower", "upper"])),
+        shadow_price: own.shadow_price.map(|price| price_entry(price, own.unit)),
+        identified: own.identified,
+        fitted: own.fitted,
     }
 }
-object! {
-    /// An error summary of orientations.
-    Turns(summary: &ErrorSummary) {
-        n: usize = summary.n,
-        mean_deg: Degrees = Degrees::of(&summary.mean),
-        max_deg: Degrees = Degrees::of(&summary.max),
-        rms_deg: Degrees = Degrees::of(&summary.rms),
+
+/// Errors of orientation before and after.
+fn turns(found: &OrientationErrors) -> impl Serialize + use<> {
+    let both = |errors: &Errors| {
+        object! { identification: sizes(&errors.identification, true), held_out: sizes(&errors.held_out, true) }
+    };
+    let sigma_taken = found.sigma_taken.to_degrees();
+    object! { registered: both(&found.registered), ..both(&found.fitted), sigma_taken_deg: sigma_taken }
+}
+
+fn active_constraint(own: &ActiveConstraint) -> impl Serialize {
+    object! {
+        constraint: &own.words,
+        side: side(own.side, ["at_least", "at_most"]),
+        line: own.location.line,
+        shadow_price: price_entry(own.shadow_price, own.unit),
     }
 }
-object! {
-    BothTurns(errors: &Errors) {
-        identification: Turns = Turns::of(&errors.identification),
-        held_out: Turns = Turns::of(&errors.held_out),
+
+fn outlier(own: &Outlier) -> impl Serialize + use<> {
+    let (size, is_tilt) = (own.error.norm(), own.kind == "tilt");
+    object! {
+        file: own.location.file.display().to_string(),
+        line: own.location.line,
+        // Counted from 1 over all files.
+        pose_row: own.row + 1,
+        ..keyed("error", is_tilt, if is_tilt { size.to_degrees() } else { size * 1e3 }),
+        sigmas: own.distance,
     }
 }
-object! {
-    /// Errors of orientation before and after.
-    OrientationEntry(found: &OrientationErrors) {
-        registered: BothTurns = BothTurns::of(&found.registered),
-        #[serde(flatten)]
-        fitted: BothTurns = BothTurns::of(&found.fitted),
-        sigma_taken_deg: f64 = found.sigma_taken.to_degrees(),
-    }
-}
-object! {
-    Correlation(pair: (String, String, f64)) {
-        parameters: [String; 2] = [pair.0, pair.1],
-        correlation: f64 = pair.2,
-    }
-}
-object! {
-    ActiveEntry<'a>(active: &'a ActiveConstraint) {
-        constraint: &'a str = &active.words,
-        side: &'a str = side(active.side, ["at_least", "at_most"]),
-        line: Option<usize> = active.location.line,
-        shadow_price: PriceEntry = PriceEntry::of(active.shadow_price, active.unit),
-    }
-}
-object! {
-    OutlierEntry(outlier: &Outlier) {
-        file: String = outlier.location.file.display().to_string(),
-        line: Option<usize> = outlier.location.line,
-        /// Counted from 1 over all files.
-        pose_row: usize = outlier.row + 1,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        error_mm: Option<f64> = (outlier.kind != "tilt").then(|| outlier.error.norm() * 1e3),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        error_deg: Option<f64> = (outlier.kind == "tilt").then(|| outlier.error.norm().to_degrees()),
-        sigmas: f64 = outlier.distance,
-    }
-}
-object! {
-    /// A few rows without which the fit would explain the others far better.
-    CarriersEntry(carriers: &Carriers) {
-        rows: Vec<OutlierEntry> = carriers.rows.iter().map(OutlierEntry::of).collect(),
-        reduced_chi2_without: Option<f64> = carriers.reduced_chi2,
-    }
+
+/// A few rows without which the fit would explain the others far better.
+pub(super) fn carriers(own: &Carriers) -> impl Serialize {
+    object! { rows: list(&own.rows, outlier), reduced_chi2_without: own.reduced_chi2 }
 }
 
 fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
@@ -153,7 +138,7 @@ fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
 
 /// The result of an identification as JSON text, ending in a line break; SI units except where a key says otherwise.
 pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
-    to_text(&Document::of(problem, found))
+    to_text(&document(problem, found))
 }
 
 /// A result as a table with its story, ending in a line break.
@@ -165,9 +150,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
-    blocks.extend(active_constraints(found));
-    blocks.extend(shadow_prices(found));
-    blocks.extend(alternation(found));
+    blocks.extend(limits(found));
     blocks.extend(told(found, FILE));
     text(&blocks)
 }
@@ -197,7 +180,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(errors(found));
     blocks.extend(orientation(found));
     blocks.extend(around(found));
-    blocks.push(Block::Figures(vec![Figure::Errors(plots), Figure::Vectors(plots)]));
+    blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(remainder(problem, found, plots, FILE));
     blocks
@@ -265,13 +248,7 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
         let values = axes.iter().chain([&of.mean.norm, &of.rms.norm, &of.max.norm]).map(|value| shown(of, *value));
         [poses.to_owned(), when.to_owned()].into_iter().chain(values).collect::<Vec<String>>()
     };
-    let (before, after) = (&found.registered, &found.fitted);
-    let rows = vec![
-        row("identification", "before", &before.identification),
-        row("", "after", &after.identification),
-        row("held out", "before", &before.held_out),
-        row("", "after", &after.held_out),
-    ];
+    let rows = before_and_after((&found.registered, &found.fitted), row);
     let of = &found.fitted.held_out;
     let sizes = if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
     let header = [&[measure(of), ""], &["mean x", "mean y", "mean z"][..axes(of)], &sizes].concat();
@@ -281,6 +258,19 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     table
 }
 
+/// Rows of errors before and after, on both kinds of poses.
+fn before_and_after(
+    (before, after): (&Errors, &Errors),
+    row: impl Fn(&str, &str, &ErrorSummary) -> Vec<String>,
+) -> Vec<Vec<String>> {
+    vec![
+        row("identification", "before", &before.identification),
+        row("", "after", &after.identification),
+        row("held out", "before", &before.held_out),
+        row("", "after", &after.held_out),
+    ]
+}
+
 /// Errors of orientation before and after, where it is fitted.
 fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     let OrientationErrors { registered, fitted, .. } = found.orientation.as_ref()?;
@@ -288,12 +278,7 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
         let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value.to_degrees(), 4));
         [vec![poses.to_owned(), when.to_owned()], values.to_vec()].concat()
     };
-    let rows = vec![
-        row("identification", "before", &registered.identification),
-        row("", "after", &fitted.identification),
-        row("held out", "before", &registered.held_out),
-        row("", "after", &fitted.held_out),
-    ];
+    let rows = before_and_after((registered, fitted), row);
     Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
 }
 
@@ -325,19 +310,27 @@ pub(super) fn remainder<'a>(
     let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
     blocks.extend(carried(found));
     blocks.extend(outliers(problem, found));
-    let figures = [Figure::Histogram(plots), Figure::Order(plots), Figure::JointMap(plots)];
-    blocks.push(Block::Figures(figures.to_vec()));
+    blocks.push(Block::figures([figures::histogram(plots), figures::order(plots), figures::joint_map(plots)]));
     blocks.extend(findings::blocks(&plots.findings));
     blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
     blocks.extend(lower_waves(problem, found, file));
-    blocks.push(Block::Figures(vec![Figure::Contributions(plots)]));
-    blocks.extend(active_constraints(found).map(|own| Block::Page(vec![own])));
-    blocks.extend(shadow_prices(found).map(|own| Block::Page(vec![own])));
-    blocks.extend(alternation(found).map(|own| Block::Page(vec![own])));
-    blocks.push(Block::heading("What the poses can tell"));
-    blocks.push(Block::Figures(vec![Figure::Correlations(plots), Figure::SingularValues(found.identifiability())]));
+    blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
+    blocks.push(Block::Page(limits(found)));
+    blocks.extend(all_told(found, plots, file));
+    blocks
+}
+
+/// What limits and turns of the stages did to a fit.
+fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
+    [active_constraints(found), shadow_prices(found), alternation(found)].into_iter().flatten().collect()
+}
+
+/// What the poses can tell, in figures and words.
+pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
+    let figures = [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
+    let mut blocks = vec![Block::heading("What the poses can tell"), Block::figures(figures)];
     blocks.extend(told(found, file));
     blocks
 }
@@ -352,7 +345,7 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
 }
 
 /// What the poses can tell, in words.
-pub(super) fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
+fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
         unidentifiable(found.identifiability(), &found.unknowns, file),
@@ -389,11 +382,6 @@ fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
     let words = "Held by a constraint (standard errors are those along it):".to_owned();
     let points: Vec<String> = found.active_constraints.iter().map(point).collect();
     (!points.is_empty()).then_some(Block::Lines(words, points))
-}
-
-/// A length \[m\] in mm with about three digits.
-pub(super) fn short_mm(length: f64) -> String {
-    mm(length, (decimals(length * 1e3, 4) + 1).min(4))
 }
 
 /// The arm before, in a headline.

@@ -7,21 +7,18 @@ use super::json::{object, to_text};
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-object! {
-    Document<'a>(chain: &'a Chain<'_>, description: &'a Description, file: &Path) {
-        problem: &'a str = &description.name,
-        file: String = file.display().to_string(),
-        base: &'a str = chain.ends().0,
-        tip: &'a str = chain.ends().1,
-        /// Those that move, from base to tip.
-        joints: Vec<String> = chain.joint_names(),
-        notes: &'a [String] = &description.notes,
-    }
-}
-
 /// What was made, as JSON text.
 pub fn init_json(chain: &Chain, description: &Description, file: &Path) -> String {
-    to_text(&Document::of(chain, description, file))
+    let (base, tip) = chain.ends();
+    to_text(&object! {
+        problem: &description.name,
+        file: file.display().to_string(),
+        base: base,
+        tip: tip,
+        // Those that move, from base to tip.
+        joints: chain.joint_names(),
+        notes: &description.notes,
+    })
 }
 
 /// What was made, in words, and what comes next.

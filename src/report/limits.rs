@@ -1,33 +1,25 @@
 //! What `identify` says of bounds, constraints and stages that take turns.
 
+use serde::Serialize;
+
 use super::document::Block;
 use super::json::object;
-use super::quantity::{decimals, number};
+use super::quantity::{decimals, number, two_digits};
 use crate::identify::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
 use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 
-object! {
-    /// What a limit costs.
-    PriceEntry(price: ShadowPrice, unit: Unit) {
-        multiplier: f64 = price.multiplier,
-        rms_mm: f64 = price.in_mm(unit).0,
-        per: &'static str = price.in_mm(unit).1,
-    }
-}
-object! {
-    /// How the stages of a sequential strategy took turns.
-    AlternationEntry(own: Alternation) {
-        sweeps: usize = own.sweeps,
-        contraction: Option<f64> = own.contraction,
-    }
+/// What a limit costs, as JSON.
+pub(super) fn price_entry(price: ShadowPrice, unit: Unit) -> impl Serialize {
+    let (rms_mm, per) = price.in_mm(unit);
+    object! { multiplier: price.multiplier, rms_mm: rms_mm, per: per }
 }
 
 /// What bounds and constraints cost; nothing to say without any.
 pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);
-        format!("{name}: {} mm for 1 {per}", number(fall, decimals(fall, 6)))
+        format!("{name}: {} mm for 1 {per}", two_digits(fall, 6))
     };
     let bound = |estimate: &Estimate| {
         let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };

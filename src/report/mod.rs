@@ -51,9 +51,7 @@ pub use columns::{Column, Columns, residual_columns, residuals_csv};
 pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use export::{ExportErrors, Exported, export_json, export_text};
-pub use figures::{
-    Cause, Command, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure,
-};
+pub use figures::{Cause, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure};
 pub use identify::{estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted};
 pub use init::{init_json, init_text};
 pub use loop_json::loop_json;
@@ -65,5 +63,6 @@ pub use render::Report;
 pub use replica::{replica_json, replica_report, replica_text};
 pub use shell::shell_word;
 pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};
+pub use table::Command;
 pub use trace::{trace_json, trace_text};
 pub use verdict::interrupted;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::document::{Block, first_of, some_of};
+use super::document::{Block, first_of, named};
 use super::errors::{brief, noun, rows_in, unit, with_unit};
 use super::quantity::{counted, decimals, mm, number};
 use crate::identify::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
@@ -126,8 +126,6 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
 pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
     let own = found.carriers.as_ref()?;
     let row = |own: &Outlier| format!("{} ({})", own.location, size_of_kind(own.kind, own.error.norm(), 3));
-    let (named, more) = some_of(own.rows.iter().map(row), SHOWN_CARRIERS);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let (carry, them) = if own.rows.len() == 1 { ("carries", "it") } else { ("carry", "them") };
     let of = &found.fitted.identification;
     let left = match (own.reduced_chi2, found.reduced_chi2) {
@@ -137,19 +135,17 @@ pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
         }
     };
     Some(Block::Text(format!(
-        "{} {carry} most of what the fit leaves: {}{more}. Without {them} {left}.",
+        "{} {carry} most of what the fit leaves: {}. Without {them} {left}.",
         counted(own.rows.len(), noun(found)),
-        named.join(", ")
+        named(own.rows.iter().map(row), SHOWN_CARRIERS, ", ")
     )))
 }
 
 /// What to do about such rows, for a problem of that name, in one line.
 pub fn look_at_carriers(found: &Identification, problem: &Path) -> Option<String> {
     let own = found.carriers.as_ref()?;
-    let (named, more) = some_of(own.rows.iter().map(|own| own.location.to_string()), SHOWN_CARRIERS);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let problem = problem.display();
-    Some(format!("look at {}{more}; a section [robust] in {problem} limits what such rows do", named.join(", ")))
+    let rows = named(own.rows.iter().map(|own| own.location.to_string()), SHOWN_CARRIERS, ", ");
+    Some(format!("look at {rows}; a section [robust] in {} limits what such rows do", problem.display()))
 }
 
 /// How large the residual is, in brief.

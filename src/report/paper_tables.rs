@@ -1,9 +1,10 @@
 //! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any procedure.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::document::Table;
-use super::json::{Summary, object};
+use super::json::{list, object, summary};
 use super::quantity::{mm, number, or_dash};
 use crate::identify::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
@@ -12,69 +13,45 @@ use crate::paper::{Form, StiffnessStage};
 /// A parameter of which the data gave less than this part by itself is marked.
 const SEEN: f64 = 0.9;
 
-const TABLE_2: [&str; 16] = [
-    "joint",
-    "α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-    "→ α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-    "Δ α °",
-    "a mm",
-    "θ °",
-    "d mm",
-    "β °",
-];
+/// Parameters of a joint in table 2.
+const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
 
-object! {
-    /// Errors and parameters of one procedure in the paper's terms.
-    Tables(comparison: &Comparison, own: &Procedure) {
-        procedure: String = own.name(),
-        /// Of joints that have such parameters.
-        table_2: Vec<JointEntry> = own.geometry.iter().map(|(joint, row)| JointEntry::of(*joint, row)).collect(),
-        table_3: Errors = Errors::of(&comparison.before, own),
-        figure_13: Poses = Poses::of(&comparison.before, own),
+/// Errors and parameters of one procedure in the paper's terms.
+pub(super) fn tables(comparison: &Comparison, own: &Procedure) -> impl Serialize + use<> {
+    let Before { errors: before, registered, .. } = &comparison.before;
+    object! {
+        procedure: own.name(),
+        // Of joints that have such parameters.
+        table_2: list(&own.geometry, |(joint, [alpha, a, theta, d, beta])| object! {
+            joint: *joint,
+            alpha_deg: entry(alpha, f64::to_degrees),
+            a_mm: entry(a, millimetres),
+            theta_deg: entry(theta, f64::to_degrees),
+            d_mm: entry(d, millimetres),
+            beta_deg: entry(beta, f64::to_degrees),
+        }),
+        // Of the held-out poses; before: nominal arm without elasticity, in the measured frames.
+        table_3: object! {
+            before_registered: *registered,
+            before: summary(&ErrorSummary::of(before)),
+            after: summary(&ErrorSummary::of(&own.after)),
+            ignoring_elasticity: own.ignoring.as_ref().map(|errors| summary(&ErrorSummary::of(errors))),
+        },
+        // x, y, z of measured − predicted of each held-out pose [mm].
+        figure_13: object! {
+            before_mm: by_pose(before),
+            after_mm: by_pose(&own.after),
+            ignoring_elasticity_mm: own.ignoring.as_ref().map(|errors| by_pose(errors)),
+        },
     }
 }
-object! {
-    JointEntry(joint: usize, row: &[TableEntry; 5]) {
-        joint: usize = joint,
-        alpha_deg: Entry = Entry::of(&row[0], f64::to_degrees),
-        a_mm: Entry = Entry::of(&row[1], millimetres),
-        theta_deg: Entry = Entry::of(&row[2], f64::to_degrees),
-        d_mm: Entry = Entry::of(&row[3], millimetres),
-        beta_deg: Entry = Entry::of(&row[4], f64::to_degrees),
-    }
-}
-object! {
-    Entry(entry: &TableEntry, to: fn(f64) -> f64) {
-        nominal: f64 = to(entry.nominal),
-        identified: f64 = to(entry.identified),
-        change: f64 = to(entry.identified - entry.nominal),
-        seen: Option<f64> = entry.seen,
-    }
-}
-object! {
-    /// Of the held-out poses; before: nominal arm without elasticity, in the measured frames.
-    Errors(before: &Before, own: &Procedure) {
-        before_registered: bool = before.registered,
-        before: Summary = Summary::of(&ErrorSummary::of(&before.errors)),
-        after: Summary = Summary::of(&ErrorSummary::of(&own.after)),
-        ignoring_elasticity: Option<Summary> =
-            own.ignoring.as_ref().map(|errors| Summary::of(&ErrorSummary::of(errors))),
-    }
-}
-object! {
-    /// x, y, z of measured − predicted of each held-out pose \[mm\].
-    Poses(before: &Before, own: &Procedure) {
-        before_mm: Vec<[f64; 3]> = by_pose(&before.errors),
-        after_mm: Vec<[f64; 3]> = by_pose(&own.after),
-        ignoring_elasticity_mm: Option<Vec<[f64; 3]>> = own.ignoring.as_ref().map(|errors| by_pose(errors)),
+
+fn entry(own: &TableEntry, to: fn(f64) -> f64) -> impl Serialize + use<> {
+    object! {
+        nominal: to(own.nominal),
+        identified: to(own.identified),
+        change: to(own.identified - own.nominal),
+        seen: own.seen,
     }
 }
 
@@ -122,7 +99,8 @@ pub(super) fn table_2(own: &Procedure) -> Table {
         std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
     };
     let rows = own.geometry.iter().map(row).collect();
-    Table::new(&TABLE_2, rows, &[])
+    let header = [&["joint"], &FIELDS[..], &["→ α °"], &FIELDS[1..], &["Δ α °"], &FIELDS[1..]].concat();
+    Table::new(&header, rows, &[])
         .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified, or fixed"])
 }
 

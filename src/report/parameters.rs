@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::{Bar, Block, Table, first_of};
 use super::effect::{MOST_LISTED, SHOWN_WAVES};
-use super::quantity::{decimals, number, or_dash};
+use super::quantity::{decimals, number, or_dash, two_digits};
 use crate::identify::{Estimate, Identification, PriorSize};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_BELOW};
@@ -112,7 +112,7 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
 fn sizes(sizes: &[PriorSize]) -> Option<String> {
     let rule = |own: &PriorSize| {
         let unit = own.unit.display(own.declared);
-        let (found, declared) = (figures(own.found * unit.factor), figures(own.declared * unit.factor));
+        let [found, declared] = [own.found, own.declared].map(|sigma| two_digits(sigma * unit.factor, MOST));
         format!("{} {found} {} instead of {declared}", own.pattern, unit.symbol)
     };
     let rules: Vec<String> = sizes.iter().map(rule).collect();
@@ -123,11 +123,6 @@ fn sizes(sizes: &[PriorSize]) -> Option<String> {
             rules.join(", ")
         )
     })
-}
-
-/// Two figures that count.
-fn figures(value: f64) -> String {
-    number(value, decimals(value, MOST))
 }
 
 /// What Markdown says below the table where waves are left out.

@@ -1,62 +1,14 @@
 //! What `plan` says and writes.
 
 use super::document::{Block, Table};
-use super::forecast::{ExpectedEntry, assumptions, cells};
-use super::json::{Conditioning, Unidentified, object, to_text, unidentified};
+use super::forecast::{assumptions, cells, expected};
+use super::json::{list, object, to_text, unidentified};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, number, or_dash};
 use super::render::text;
-use super::separation;
-use crate::design::{Criterion, Expected, Plan, Separated};
+use super::{json, separation};
+use crate::design::{Criterion, Plan, Separated};
 use crate::problem::Problem;
-
-object! {
-    Document<'a>(
-        problem: &'a Problem,
-        criterion: &'a Criterion,
-        seed: u64,
-        plan: &'a Plan,
-        separated: Option<&'a Separated>,
-    ) {
-        problem: &'a str = &problem.name,
-        criterion: &'a str = criterion.as_str(),
-        seed: u64 = seed,
-        /// Planned.
-        poses: usize = plan.poses.len(),
-        /// Measured in any case.
-        given: usize = plan.given,
-        candidates: usize = plan.candidates,
-        sufficient: bool = plan.suffices,
-        /// ln of the criterion: of each start, and what was reached.
-        starts: &'a [f64] = &plan.starts,
-        value: f64 = plan.value,
-        /// Geometric mean of random_std_error / std_error over `gain_over`.
-        gain: Option<f64> = plan.gain(&plan.meaningful()),
-        gain_over: Vec<&'a str> = plan.meaningful().iter().map(|&k| plan.planned.expected[k].name.as_str()).collect(),
-        rank: usize = plan.planned.identifiability.rank,
-        /// With all candidates.
-        attainable_rank: usize = plan.attainable_rank,
-        /// Poses without which that rank cannot be reached.
-        least_poses: usize = plan.least_poses,
-        #[serde(flatten)]
-        conditioning: Conditioning<'a> = Conditioning::of(&plan.planned.identifiability, plan.coordinates),
-        parameters: Vec<PlannedEntry<'a>> =
-            plan.planned.expected.iter().enumerate().map(|(k, own)| PlannedEntry::of(own, plan.random_error(k))).collect(),
-        unidentified: Vec<Unidentified<'a>> =
-            unidentified(&plan.planned.identifiability, |k| plan.planned.expected[k].name.as_str()),
-        /// How well it tells two effects apart.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        separation: Option<separation::Entry<'a>> = separated.map(separation::Entry::of),
-    }
-}
-object! {
-    /// A parameter after planned poses, and after random ones.
-    PlannedEntry<'a>(planned: &'a Expected, random: Option<f64>) {
-        #[serde(flatten)]
-        planned: ExpectedEntry<'a> = ExpectedEntry::of(planned),
-        random_std_error: Option<f64> = random,
-    }
-}
 
 /// A plan as JSON text; `separated` where it tells two effects apart.
 pub fn plan_json(
@@ -66,7 +18,37 @@ pub fn plan_json(
     plan: &Plan,
     separated: Option<&Separated>,
 ) -> String {
-    to_text(&Document::of(problem, criterion, seed, plan, separated))
+    let Plan { planned, .. } = plan;
+    let (meaningful, name) = (plan.meaningful(), |k: usize| planned.expected[k].name.as_str());
+    to_text(&object! {
+        problem: &problem.name,
+        criterion: criterion.as_str(),
+        seed: seed,
+        // Planned, and measured in any case.
+        poses: plan.poses.len(),
+        given: plan.given,
+        candidates: plan.candidates,
+        sufficient: plan.suffices,
+        // ln of the criterion: of each start, and what was reached.
+        starts: &plan.starts,
+        value: plan.value,
+        // Geometric mean of random_std_error / std_error over `gain_over`.
+        gain: plan.gain(&meaningful),
+        gain_over: list(&meaningful, |&k| name(k)),
+        rank: planned.identifiability.rank,
+        // With all candidates, and poses without which that rank cannot be reached.
+        attainable_rank: plan.attainable_rank,
+        least_poses: plan.least_poses,
+        ..json::conditioning(&planned.identifiability, plan.coordinates),
+        // After planned poses, and after random ones.
+        parameters: list(planned.expected.iter().enumerate(), |(k, own)| object! {
+            ..expected(own),
+            random_std_error: plan.random_error(k),
+        }),
+        unidentified: unidentified(&planned.identifiability.unidentifiable, name),
+        // How well it tells two effects apart.
+        ?separation: separated.map(separation::entry),
+    })
 }
 
 /// That the poses are fewer than it takes to see all that such poses can; nothing to say where they are not.

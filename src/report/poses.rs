@@ -1,7 +1,7 @@
 //! Poses to measure, as a table.
 
 use super::quantity::fixed;
-use super::table::{commands, sessions, word};
+use super::table::{Command, commands, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
 use crate::problem::fixture::frame_word;
@@ -23,8 +23,9 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let mut columns = vec![("pose".to_owned(), (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>())];
     columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
     columns.extend(surroundings(problem, poses));
-    columns.extend(joints.iter().map(|(joint, name, factor)| {
-        (name.clone(), (0..poses.len()).map(|row| plain(poses.configuration(row)[*joint] * factor)).collect())
+    columns.extend(joints.iter().map(|own| {
+        let commands = (0..poses.len()).map(|row| plain(poses.configuration(row)[own.joint] * own.factor()));
+        (own.column(), commands.collect())
     }));
     let optional = [
         ("session", session.map(words)),
@@ -42,7 +43,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         (own.name.clone(), values.collect())
     }));
     if let Some(approach) = &poses.approach {
-        columns.extend(joints.iter().map(|(joint, ..)| {
+        columns.extend(joints.iter().map(|Command { joint, .. }| {
             let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));
             (format!("approach{}", joint + 1), sides.collect())
         }));

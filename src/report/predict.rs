@@ -7,7 +7,7 @@ use super::around::unsteady;
 use super::columns::{self, Column};
 use super::document::{Block, Table};
 use super::errors::{measure, sizes};
-use super::json::{Spread, Summary, object, to_text};
+use super::json::{list, object, spread, summary, to_text, unless_empty};
 use super::quantity::counted;
 use super::render::text;
 use super::table;
@@ -15,21 +15,17 @@ use crate::identify::{ErrorSummary, ErrorsBySession, PointSpread, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 
-object! {
-    Document<'a>(errors: &'a ErrorsBySession, spreads: &'a [PointSpread]) {
-        all: Summary = Summary::of(&errors.all),
-        #[serde(skip_serializing_if = "Vec::is_empty")]
-        kinds: Vec<Summary> = errors.kinds.iter().map(Summary::of).collect(),
-        sessions: BTreeMap<String, Summary> =
-            errors.sessions.iter().map(|(name, own)| (name.clone(), Summary::of(own))).collect(),
-        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-        spread: BTreeMap<&'a str, Spread> = spreads.iter().map(|own| (own.point.as_str(), Spread::of(own))).collect(),
-    }
-}
-
 /// Errors of all rows and of each session, and the spread at each point, as JSON text, ending in a line break.
 pub fn errors_json(errors: &ErrorsBySession, spreads: &[PointSpread]) -> String {
-    to_text(&Document::of(errors, spreads))
+    let spread = |own: &PointSpread| object! { n: own.n, ..spread(own) };
+    let spreads: BTreeMap<&str, _> = spreads.iter().map(|own| (own.point.as_str(), spread(own))).collect();
+    let sessions: BTreeMap<&str, _> = errors.sessions.iter().map(|(name, own)| (name.as_str(), summary(own))).collect();
+    to_text(&object! {
+        all: summary(&errors.all),
+        ?kinds: unless_empty(list(&errors.kinds, summary)),
+        sessions: sessions,
+        ?spread: unless_empty(spreads),
+    })
 }
 
 /// Predicted positions as CSV: file and line of each row, what names it, its commands, and where the arm will be.
@@ -39,8 +35,8 @@ pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Pred
     let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
         columns.push((name, Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals))));
     };
-    for (joint, name, factor) in table::commands(problem) {
-        add(name, 7, &|row| rows.configuration(row)[joint] * factor);
+    for own in table::commands(problem) {
+        add(own.column(), 7, &|row| rows.configuration(row)[own.joint] * own.factor());
     }
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         add(format!("predicted_{axis}_mm"), 6, &|row| prediction.positions[row][k] * 1e3);

@@ -16,6 +16,16 @@ pub(super) fn decimals(error: f64, most: usize) -> usize {
     wanted
 }
 
+/// `value` with two digits that count, and at most `most` decimals.
+pub(super) fn two_digits(value: f64, most: usize) -> String {
+    number(value, decimals(value, most))
+}
+
+/// `value` with about three digits, and at most four decimals.
+pub(super) fn about_three_digits(value: f64) -> String {
+    number(value, (decimals(value, 4) + 1).min(4))
+}
+
 /// `value` with `decimals`, never as "-0"; as `1.234e300` where it is huge, "–" where there is none.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {

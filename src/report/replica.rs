@@ -1,8 +1,10 @@
 //! What a study of the misprints says and writes.
 
+use serde::Serialize;
+
 use super::document::{Block, Headline, Table};
-use super::figures::Figure;
-use super::json::{Summary, object, to_text};
+use super::figures;
+use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::identify::ErrorSummary;
@@ -13,70 +15,58 @@ use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
 /// What a stage takes for the stiffness, in the order of a replica's results.
 const STAGES: [&str; 4] = ["stiffness known", "as declared", "from positions", "from load differences"];
 
-object! {
-    Document<'a>(study: &'a MisprintStudy, found: &'a ReplicaResults) {
-        study: &'a str = &study.name,
-        problem: &'a str = &study.problem.name,
-        seed: u64 = study.seed,
-        specimens: usize = study.specimens,
-        identification_poses: usize = study.identification,
-        held_out_poses: usize = study.held_out,
-        position_sigma_mm: f64 = study.truth.noise_sigma * 1e3,
-        rigid_leaves_mm: f64 = study.rigid_leaves * 1e3,
-        misprints: Vec<Size<'a>> = Misprint::ALL.iter().zip(&found.sizes).map(Size::of).collect(),
-        cases: Vec<CaseEntry<'a>> = study.cases.iter().map(|case| CaseEntry::of(case, found)).collect(),
+fn document(study: &MisprintStudy, found: &ReplicaResults) -> impl Serialize {
+    let sizes = Misprint::ALL.iter().zip(&found.sizes);
+    object! {
+        study: &study.name,
+        problem: &study.problem.name,
+        seed: study.seed,
+        specimens: study.specimens,
+        identification_poses: study.identification,
+        held_out_poses: study.held_out,
+        position_sigma_mm: study.truth.noise_sigma * 1e3,
+        rigid_leaves_mm: study.rigid_leaves * 1e3,
+        misprints: list(sizes, |(own, size)| object! {
+            misprint: own.as_str(),
+            place: own.place(),
+            moves_mm: size * 1e3,
+        }),
+        cases: list(&study.cases, |case| object! {
+            links_over_joints: case.links_over_joints,
+            payload_kg: case.load.and_then(|load| load.payload),
+            hoist_N: case.load.and_then(|load| load.hoist),
+            specimens: list(found.of_case(case), |own| specimen(own, found)),
+        }),
     }
 }
-object! {
-    Size<'a>(own: (&Misprint, &f64)) {
-        misprint: &'a str = own.0.as_str(),
-        place: &'a str = own.0.place(),
-        moves_mm: f64 = own.1 * 1e3,
-    }
-}
-object! {
-    CaseEntry<'a>(case: &Case, found: &'a ReplicaResults) {
-        links_over_joints: f64 = case.links_over_joints,
-        payload_kg: Option<f64> = case.load.and_then(|load| load.payload),
-        #[serde(rename = "hoist_N")]
-        hoist: Option<f64> = case.load.and_then(|load| load.hoist),
-        specimens: Vec<SimulatedArmEntry<'a>> = found.of_case(case).map(|own| SimulatedArmEntry::of(own, found)).collect(),
-    }
-}
-object! {
-    /// Held-out errors of one specimen; null where an iteration does not converge.
-    SimulatedArmEntry<'a>(own: &'a Replica, found: &'a ReplicaResults) {
-        scale: f64 = own.scale,
-        before: Summary = Summary::of(&own.before),
-        rigid: Option<Summary> = own.rigid.as_ref().map(Summary::of),
-        geometry_only: Summary = Summary::of(&own.geometry_only),
-        joint: Summary = Summary::of(&own.joint),
-        joint_both_loads: Summary = Summary::of(&own.joint_twice),
-        readings: Vec<ReadingEntry<'a>> =
-            found.readings.iter().zip(&own.by_reading).map(|(named, left)| ReadingEntry::of(&named.name, left)).collect(),
-        rivals: Vec<AlternativeEntry<'a>> =
-            AlternativeModel::EACH.into_iter().zip(&own.by_rival).map(AlternativeEntry::of).collect(),
-    }
-}
-object! {
-    ReadingEntry<'a>(name: &'a str, left: &[Left; 4]) {
-        reading: &'a str = name,
-        stiffness_known: Option<Summary> = left[0].as_ref().map(Summary::of),
-        as_declared: Option<Summary> = left[1].as_ref().map(Summary::of),
-        from_positions: Option<Summary> = left[2].as_ref().map(Summary::of),
-        from_load_differences: Option<Summary> = left[3].as_ref().map(Summary::of),
-    }
-}
-object! {
-    AlternativeEntry<'a>(own: (AlternativeModel, &Left)) {
-        rival: &'a str = own.0.words().0,
-        held_out: Option<Summary> = own.1.as_ref().map(Summary::of),
+
+/// Held-out errors of one specimen; null where an iteration does not converge.
+fn specimen(own: &Replica, found: &ReplicaResults) -> impl Serialize {
+    let left = |left: &Left| left.as_ref().map(summary);
+    object! {
+        scale: own.scale,
+        before: summary(&own.before),
+        rigid: left(&own.rigid),
+        geometry_only: summary(&own.geometry_only),
+        joint: summary(&own.joint),
+        joint_both_loads: summary(&own.joint_twice),
+        readings: list(found.readings.iter().zip(&own.by_reading), |(named, stages)| object! {
+            reading: &named.name,
+            stiffness_known: left(&stages[0]),
+            as_declared: left(&stages[1]),
+            from_positions: left(&stages[2]),
+            from_load_differences: left(&stages[3]),
+        }),
+        rivals: list(AlternativeModel::EACH.into_iter().zip(&own.by_rival), |(rival, own)| object! {
+            rival: rival.words().0,
+            held_out: left(own),
+        }),
     }
 }
 
 /// A study of the misprints as JSON text, ending in a line break.
 pub fn replica_json(study: &MisprintStudy, found: &ReplicaResults) -> String {
-    to_text(&Document::of(study, found))
+    to_text(&document(study, found))
 }
 
 /// The same as text, ending in a line break.
@@ -103,7 +93,7 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
         facts: vec![("Everything fitted at once", format!("{} mm", error(|own| Some(own.joint))))],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];
-    blocks.push(Block::Figures(vec![Figure::Misprints(study, found)]));
+    blocks.push(Block::Figures(vec![figures::misprints(study, found)]));
     blocks.extend(tables(study, found));
     report(&study.problem, "misprints", &blocks)
 }

@@ -1,43 +1,43 @@
 //! How well a plan tells two effects apart, for programs and for people.
 
+use serde::Serialize;
+
 use super::document::{Block, Table};
 use super::forecast::size as shown;
 use super::json::object;
 use super::quantity::{number, or_dash, p_value};
 use crate::design::Separated;
 use crate::diagnose::{Separation, Side};
-use crate::problem::Effect;
 
-object! {
-    /// All of it.
-    Entry<'a>(separated: &'a Separated) {
-        /// Largest principal angle between the two.
-        angle_deg: Option<f64> = separated.planned.angle.map(f64::to_degrees),
-        random_angle_deg: Option<f64> = random_angle(separated).map(f64::to_degrees),
-        effects: [SideEntry<'a>; 2] = [0, 1].map(|side| SideEntry::of(separated, side, &Figures::of(separated, side))),
-    }
-}
-object! {
-    /// One of the two, sizes in SI; beside each figure the median over random poses.
-    SideEntry<'a>(separated: &'a Separated, side: usize, figures: &Figures<'a>) {
-        #[serde(flatten)]
-        effect: &'a Effect = &separated.effects[side],
-        parameters: &'a [String] = &figures.planned.found.parameters,
-        unit: &'static str = figures.planned.found.unit.symbol(),
-        found_from: Option<f64> = figures.planned.found.worst,
-        random_found_from: Option<f64> = figures.random_found,
-        /// The other in its place is ruled out.
-        told_from: Option<f64> = figures.planned.told.worst,
-        random_told_from: Option<f64> = figures.random_told,
-        /// The size of `p_value` and `random_p_value`: from which random poses find it, or its prior.
-        size: f64 = figures.size,
-        p_value: f64 = figures.p,
-        random_p_value: f64 = figures.random_p,
+/// All of it as JSON: sizes in SI, beside each figure the median over random poses.
+pub(super) fn entry(separated: &Separated) -> impl Serialize {
+    let side = |side: usize| {
+        let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, side);
+        object! {
+            ..&separated.effects[side],
+            parameters: &planned.found.parameters,
+            unit: planned.found.unit.symbol(),
+            found_from: planned.found.worst,
+            random_found_from: random_found,
+            // The other in its place is ruled out.
+            told_from: planned.told.worst,
+            random_told_from: random_told,
+            // The size of `p_value` and `random_p_value`: from which random poses find it, or its prior.
+            size: size,
+            p_value: p,
+            random_p_value: random_p,
+        }
+    };
+    object! {
+        // Largest principal angle between the two.
+        angle_deg: separated.planned.angle.map(f64::to_degrees),
+        random_angle_deg: random_angle(separated).map(f64::to_degrees),
+        effects: [0, 1].map(side),
     }
 }
 
 /// Figures about one of the two.
-pub(super) struct Figures<'a> {
+struct Figures<'a> {
     planned: &'a Side,
     random_found: Option<f64>,
     random_told: Option<f64>,

@@ -1,77 +1,54 @@
 //! What `study` says and writes: a line a cell, `study.json`, and tables for other programs.
 
-use std::collections::BTreeMap;
+use serde::Serialize;
 
 use super::document::{Block, Table};
-use super::json::{object, to_text};
+use super::json::{list, object, to_text};
 use super::quantity::{number, or_dash};
 use super::render::text;
-use super::table;
 use crate::files;
-use crate::monte_carlo::{CellResult, ParameterResult, Results, Source, Study, Tally};
+use crate::monte_carlo::{CellResult, Results, Source, Study};
 
 /// First columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
-object! {
-    Document<'a>(study: &'a Study, results: &'a Results) {
-        study: &'a str = &study.name,
-        problem: &'a str = &study.problem.name,
-        data: &'a str = study.source.as_str(),
-        seed: u64 = study.seed,
-        repetitions: usize = study.repetitions,
-        held_out_poses: usize = study.held_out,
-        cells: Vec<Cell<'a>> = results.cells.iter().map(|cell| Cell::of(study, cell)).collect(),
-    }
-}
-object! {
-    Cell<'a>(study: &'a Study, result: &'a CellResult) {
-        position_sigma_mm: f64 = millimetres(result.cell.sigma),
-        identification_poses: usize = result.cell.poses,
-        strategy: &'a str = result.cell.strategy.as_str(),
-        solver: &'a str = result.cell.solver.as_str(),
-        fits: u64 = result.tally.fits,
-        failed: u64 = result.tally.failed(),
-        failure_rate: f64 = result.failure_rate(),
-        /// Fits that are not to be trusted, by reason.
-        failures: &'a BTreeMap<String, u64> = &result.tally.failures,
-        held_out_mm: HeldOut = HeldOut::of(&result.tally),
-        reduced_chi2: Option<f64> = result.tally.reduced_chi2.mean(),
-        coverage: Option<f64> = result.coverage(),
-        largest_bias: Option<LargestBias<'a>> =
-            result.largest_bias(study).map(|(parameter, bias)| LargestBias::of(&parameter.name, bias)),
-        iterations_mean: Option<f64> = result.tally.iterations.mean(),
-        iterations_max: Option<f64> = result.tally.iterations.largest(),
-        parameters: Vec<Parameter<'a>> = result.parameters(study).map(|own| Parameter::of(&own)).collect(),
-    }
-}
-object! {
-    /// Position errors of held-out poses; mean and rms over fits and poses, the others of the rms of each fit.
-    HeldOut(tally: &Tally) {
-        mean: Option<f64> = in_mm(tally.held_out_mean.mean()),
-        rms: Option<f64> = in_mm(tally.held_out_rms.rms()),
-        rms_sd: Option<f64> = in_mm(tally.held_out_rms.deviation()),
-        rms_max: Option<f64> = in_mm(tally.held_out_rms.largest()),
-    }
-}
-object! {
-    /// Bias over spread.
-    LargestBias<'a>(name: &'a str, bias: f64) {
-        parameter: &'a str = name,
-        bias_sd: f64 = bias,
-    }
-}
-object! {
-    Parameter<'a>(own: &ParameterResult<'a>) {
-        name: &'a str = &own.parameter.name,
-        unit: &'a str = own.unit(),
-        fits: u64 = own.fits,
-        bias: Option<f64> = own.bias,
-        spread: Option<f64> = own.spread,
-        rms_error: Option<f64> = own.rms_error,
-        with_std_error: u64 = own.with_std_error,
-        std_error: Option<f64> = own.std_error,
-        coverage: Option<f64> = own.coverage,
+fn entry<'a>(study: &'a Study, result: &'a CellResult) -> impl Serialize {
+    let CellResult { cell, tally, .. } = result;
+    let rms = &tally.held_out_rms;
+    object! {
+        position_sigma_mm: millimetres(cell.sigma),
+        identification_poses: cell.poses,
+        strategy: cell.strategy.as_str(),
+        solver: cell.solver.as_str(),
+        fits: tally.fits,
+        failed: tally.failed(),
+        failure_rate: result.failure_rate(),
+        // Fits that are not to be trusted, by reason.
+        failures: &tally.failures,
+        // Mean and rms over fits and poses, the others of the rms of each fit.
+        held_out_mm: object! {
+            mean: in_mm(tally.held_out_mean.mean()),
+            rms: in_mm(rms.rms()),
+            rms_sd: in_mm(rms.deviation()),
+            rms_max: in_mm(rms.largest()),
+        },
+        reduced_chi2: tally.reduced_chi2.mean(),
+        coverage: result.coverage(),
+        // Over its spread.
+        largest_bias: result.largest_bias(study).map(|(own, bias)| object! { parameter: &own.name, bias_sd: bias }),
+        iterations_mean: tally.iterations.mean(),
+        iterations_max: tally.iterations.largest(),
+        parameters: list(result.parameters(study), |own| object! {
+            name: &own.parameter.name,
+            unit: own.unit(),
+            fits: own.fits,
+            bias: own.bias,
+            spread: own.spread,
+            rms_error: own.rms_error,
+            with_std_error: own.with_std_error,
+            std_error: own.std_error,
+            coverage: own.coverage,
+        }),
     }
 }
 
@@ -86,7 +63,15 @@ fn millimetres(metres: f64) -> f64 {
 
 /// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and without times.
 pub fn study_json(study: &Study, results: &Results) -> String {
-    to_text(&Document::of(study, results))
+    to_text(&object! {
+        study: &study.name,
+        problem: &study.problem.name,
+        data: study.source.as_str(),
+        seed: study.seed,
+        repetitions: study.repetitions,
+        held_out_poses: study.held_out,
+        cells: list(&results.cells, |cell| entry(study, cell)),
+    })
 }
 
 /// A study as text, ending in a line break.
@@ -103,21 +88,8 @@ pub fn study_text(study: &Study, results: &Results) -> String {
         study.parameters.len(),
         study.held_out
     );
-    let header = [
-        "noise mm",
-        "poses",
-        "strategy",
-        "solver",
-        "failed",
-        "held out mean",
-        "rms, mm",
-        "± sd",
-        "covered",
-        "largest bias",
-        "of",
-        "steps",
-        "ms",
-    ];
+    let header = "noise mm|poses|strategy|solver|failed|held out mean|rms, mm|± sd|covered|largest bias|of|steps|ms";
+    let header: Vec<&str> = header.split('|').collect();
     let rows = results.cells.iter().map(|cell| line(study, cell)).collect();
     let shown = Table::new(&header, rows, &[2, 3, 10]).noted(&[
         "held out: measured − predicted, noise included; covered: by ± 1.96 standard errors, 95 % if those are right;",
@@ -224,5 +196,5 @@ fn plain(value: Option<f64>) -> String {
 }
 
 fn csv(header: &str, lines: impl Iterator<Item = Vec<String>>) -> String {
-    files::csv(table::names(&format!("{CELL},{header}")), lines)
+    files::csv(CELL.split(',').chain(header.split(',')).map(str::to_owned).collect(), lines)
 }

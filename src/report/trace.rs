@@ -4,16 +4,18 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::document::{Block, Point, some_of};
-use super::errors::{held_out_rows, rows_of, with_unit, without_equilibrium};
-use super::json::{Both, object, to_text};
+use super::document::{Block, Point, named};
+use super::errors::{held_out_rows, in_unit, rows_of, with_unit, without_equilibrium};
+use super::json::{both, keyed, list, object, to_text};
 use super::noise::short;
-use super::quantity::{counted, mm, number, p_value};
+use super::quantity::{counted, number, p_value};
 use super::render::text;
+use super::table::{Command, commands};
 use super::{effect, findings};
 use crate::diagnose::{Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace};
 use crate::identify::Identification;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
+use crate::quantity::Unit;
 
 /// Candidates that fit on a screen.
 const SHOWN: usize = 6;
@@ -23,117 +25,81 @@ const LEAST_PROBABLE: f64 = 0.01;
 /// Effects alike that are named.
 const SHOWN_ALIKE: usize = 3;
 
-object! {
-    Document<'a>(problem: &'a Problem, trace: &'a Trace, untestable: &'a [(Effect, &'static str)], absorbed: &'a [(Effect, ())]) {
-        problem: &'a str = &problem.name,
-        trusted: bool = trace.fit.is_trusted(),
-        #[serde(flatten)]
-        fitted: Both = Both::of(&trace.fit.fitted),
-        reduced_chi2: Option<f64> = trace.fit.reduced_chi2,
-        /// Whether the tests see structure that an effect could explain.
-        structured: bool = trace.findings.is_structured(),
-        checks: Vec<findings::Entry> = findings::entries(&trace.findings),
-        /// Candidates tried, orders and times counted.
-        tried: usize = trace.tried,
-        /// The p below which a candidate stands out.
-        level: f64 = trace.level,
-        ranking: Vec<RankedEntry<'a>> = trace.ranking.iter().map(|ranked| RankedEntry::of(ranked, trace)).collect(),
-        /// Explanations weighed against each other, most probable first.
-        explanations: Vec<ExplanationEntry<'a>> = explanations(trace).map(|one| ExplanationEntry::of(one, trace)).collect(),
-        /// What is claimed of the best of them, from the least to the most.
-        claims: Vec<ClaimsEntry> = claims(trace).iter().map(|one| ClaimsEntry::of(one, trace)).collect(),
-        untestable: Vec<effect::Untestable<'a>> = untestable.iter().map(effect::Untestable::of).collect(),
-        absorbed: Vec<&'a Effect> = absorbed.iter().map(|(effect, ())| effect).collect(),
-    }
-}
-object! {
-    RankedEntry<'a>(ranked: &'a Ranked, trace: &Trace) {
-        #[serde(flatten)]
-        effect: &'a Effect = &ranked.effect,
-        description: String = trace.describe(&ranked.effect),
-        p_value: f64 = ranked.p_value,
-        f: f64 = ranked.f.0,
-        freedom: usize = ranked.f.1,
-        /// Expected reduction of the root mean squared error on the identification poses.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        expected_gain_mm: Option<f64> = in_mm(trace, Some(ranked.gain)),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        expected_gain_deg: Option<f64> = in_degrees(trace, Some(ranked.gain)),
-        /// The same on poses left out in turn.
-        cross_validated_gain_mm: Option<f64> = in_mm(trace, ranked.cross_validated),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        cross_validated_gain_deg: Option<f64> = in_degrees(trace, ranked.cross_validated),
-        alike: Vec<AlikeEntry<'a>> = ranked.alike.iter().map(AlikeEntry::of).collect(),
-        /// A pose that would tell it from the first of those.
-        told_apart: Option<ApartEntry<'a>> = ranked.telling_pose.as_ref().map(|apart| ApartEntry::of(apart, trace)),
-    }
-}
-object! {
-    ApartEntry<'a>(apart: &'a TellingPose, trace: &Trace) {
-        from: &'a Effect = &apart.other,
-        /// Configuration \[rad\] or \[m\].
-        q: &'a [f64] = &apart.configuration,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        target: Option<&'a str> = apart.target.as_deref(),
-        payload_kg: Option<f64> = apart.payload,
-        #[serde(rename = "hoist_N")]
-        hoist: Option<f64> = apart.hoist,
-        #[serde(rename = "temperature_C")]
-        temperature: Option<f64> = apart.temperature,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        difference_mm: Option<f64> = in_mm(trace, Some(apart.difference)),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        difference_deg: Option<f64> = in_degrees(trace, Some(apart.difference)),
-    }
-}
-object! {
-    AlikeEntry<'a>(alike: &'a (Effect, f64)) {
-        #[serde(flatten)]
-        effect: &'a Effect = &alike.0,
-        /// 0: the same on these poses; 90: nothing in common.
-        angle_deg: f64 = alike.1.to_degrees(),
+fn document(problem: &Problem, trace: &Trace) -> impl Serialize {
+    let absorbed = effect::joined(trace.absorbed.iter().cloned().map(|effect| (effect, ())));
+    object! {
+        problem: &problem.name,
+        trusted: trace.fit.is_trusted(),
+        ..both(&trace.fit.fitted),
+        reduced_chi2: trace.fit.reduced_chi2,
+        // Whether the tests see structure that an effect could explain.
+        structured: trace.findings.is_structured(),
+        checks: findings::entries(&trace.findings),
+        // Candidates tried, orders and times counted.
+        tried: trace.tried,
+        // The p below which a candidate stands out.
+        level: trace.level,
+        ranking: list(&trace.ranking, |ranked| ranked_entry(ranked, trace)),
+        // Explanations weighed against each other, most probable first; without hypotheses: noise alone.
+        explanations: list(explanations(trace), |one| object! {
+            probability: one.probability,
+            hypotheses: list(&one.hypotheses, |own| hypothesis(own, trace)),
+        }),
+        // What is claimed of the best of them, from the least to the most.
+        claims: list(&claims(trace), |one| claims_entry(one, trace)),
+        untestable: effect::untestable(effect::joined(trace.untestable.iter().cloned())),
+        absorbed: list(absorbed, |(effect, ())| effect),
     }
 }
 
-object! {
-    ExplanationEntry<'a>(one: &'a Explanation, trace: &Trace) {
-        probability: f64 = one.probability,
-        /// Empty: noise alone.
-        hypotheses: Vec<HypothesisEntry<'a>> = one.hypotheses.iter().map(|own| HypothesisEntry::of(own, trace)).collect(),
-    }
-}
-object! {
-    HypothesisEntry<'a>(own: &'a Hypothesis, trace: &Trace) {
-        /// The effect, if the law is one.
-        effect: Option<&'a Effect> = own.effect(),
-        law: &'a str = law(own),
-        description: String = words(own, |effect| trace.describe(effect)),
-        place: String = own.part.to_string(),
-        depends_on: Vec<String> = own.depends_on.iter().map(ToString::to_string).collect(),
-    }
-}
-object! {
-    ClaimsEntry(one: &Claims, trace: &Trace) {
-        place: Claim<String> = Claim::new(one.place.0.to_string(), one.place.1),
-        depends_on: Claim<Vec<String>> =
-            Claim::new(one.depends_on.0.iter().map(ToString::to_string).collect(), one.depends_on.1),
-        /// None where it is not known.
-        law: Claim<Option<String>> =
-            Claim::new(one.law.0.effect().map(|effect| effect.name().to_owned()), one.law.1),
-        description: String = words(&one.law.0, |effect| trace.describe(effect)),
+fn ranked_entry(ranked: &Ranked, trace: &Trace) -> impl Serialize {
+    let of = &trace.fit.fitted.identification;
+    let cross_validated = ranked.cross_validated.map(|gain| in_unit(of, gain));
+    object! {
+        ..&ranked.effect,
+        description: trace.describe(&ranked.effect),
+        p_value: ranked.p_value,
+        f: ranked.f.0,
+        freedom: ranked.f.1,
+        // Expected reduction of the root mean squared error on the identification poses, and on poses left out in turn.
+        ..keyed("expected_gain", of.is_angle(), in_unit(of, ranked.gain)),
+        cross_validated_gain_mm: cross_validated.filter(|_| !of.is_angle()),
+        ?cross_validated_gain_deg: cross_validated.filter(|_| of.is_angle()),
+        // At 0° the same on these poses, at 90° nothing in common.
+        alike: list(&ranked.alike, |(effect, angle)| object! { ..effect, angle_deg: angle.to_degrees() }),
+        // A pose that would tell it from the first of those.
+        told_apart: ranked.telling_pose.as_ref().map(|apart| object! {
+            from: &apart.other,
+            // Configuration [rad] or [m].
+            q: &apart.configuration,
+            ?target: apart.target.as_deref(),
+            payload_kg: apart.payload,
+            hoist_N: apart.hoist,
+            temperature_C: apart.temperature,
+            ..keyed("difference", of.is_angle(), in_unit(of, apart.difference)),
+        }),
     }
 }
 
-/// A claim with its probability.
-#[derive(Debug, Serialize)]
-pub(in crate::report) struct Claim<T> {
-    value: T,
-    probability: f64,
+fn hypothesis(own: &Hypothesis, trace: &Trace) -> impl Serialize {
+    object! {
+        // The effect, if the law is one.
+        effect: own.effect(),
+        law: law(own),
+        description: words(own, |effect| trace.describe(effect)),
+        place: own.part.to_string(),
+        depends_on: list(&own.depends_on, ToString::to_string),
+    }
 }
 
-impl<T> Claim<T> {
-    fn new(value: T, probability: f64) -> Self {
-        Self { value, probability }
+/// Claims as JSON, each with its probability.
+pub(super) fn claims_entry(one: &Claims, trace: &Trace) -> impl Serialize + use<> {
+    object! {
+        place: object! { value: one.place.0.to_string(), probability: one.place.1 },
+        depends_on: object! { value: list(&one.depends_on.0, ToString::to_string), probability: one.depends_on.1 },
+        // None where it is not known.
+        law: object! { value: one.law.0.effect().map(|effect| effect.name().to_owned()), probability: one.law.1 },
+        description: words(&one.law.0, |effect| trace.describe(effect)),
     }
 }
 
@@ -251,9 +217,7 @@ pub(super) fn percent(probability: f64) -> String {
 
 /// A trace as JSON text, ending in a line break; SI units except where a key says otherwise.
 pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
-    let untestable = effect::joined(trace.untestable.iter().cloned());
-    let absorbed = effect::joined(trace.absorbed.iter().cloned().map(|effect| (effect, ())));
-    to_text(&Document::of(problem, trace, &untestable, &absorbed))
+    to_text(&document(problem, trace))
 }
 
 /// A trace as text, ending in a line break.
@@ -348,10 +312,8 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     }
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {
-        let named = |(other, angle): &(Effect, f64)| format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees());
-        let (named, more) = some_of(ranked.alike.iter().map(named), SHOWN_ALIKE);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        details.push(format!("hard to tell from: {}{more}", named.join("; ")));
+        let alike = |(other, angle): &(Effect, f64)| format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees());
+        details.push(format!("hard to tell from: {}", named(ranked.alike.iter().map(alike), SHOWN_ALIKE, "; ")));
     }
     if let Some(apart) = &ranked.telling_pose {
         let other = trace.describe(&apart.other);
@@ -364,26 +326,13 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     Point { text: effect::both(&ranked.effect, trace), details, mark: None }
 }
 
-/// An error of the rows that the fit is told of in mm, unless they are tilts.
-fn in_mm(trace: &Trace, value: Option<f64>) -> Option<f64> {
-    value.filter(|_| !trace.fit.fitted.identification.is_angle()).map(|value| value * 1e3)
-}
-
-/// The same in °, if they are.
-fn in_degrees(trace: &Trace, value: Option<f64>) -> Option<f64> {
-    value.filter(|_| trace.fit.fitted.identification.is_angle()).map(f64::to_degrees)
-}
-
 /// A pose in words: joints, payload, hoist, temperature.
 fn pose(problem: &Problem, apart: &TellingPose) -> String {
-    let joints = problem.joints.iter().zip(&apart.configuration).enumerate();
-    let mut words: Vec<String> = joints
-        .filter_map(|(index, (joint, q))| match joint.commanded() {
-            JointKind::Revolute => Some(format!("q{} {}°", index + 1, number(q.to_degrees(), 1))),
-            JointKind::Prismatic => Some(format!("q{} {} mm", index + 1, mm(*q, 1))),
-            JointKind::Fixed => None,
-        })
-        .collect();
+    let joint = |own: Command| {
+        let unit = if own.unit == Unit::Angle { "°" } else { " mm" };
+        format!("{} {}{unit}", own.name(), number(apart.configuration[own.joint] * own.factor(), 1))
+    };
+    let mut words: Vec<String> = commands(problem).into_iter().map(joint).collect();
     words.extend(apart.target.as_ref().map(|target| format!("target {target}")));
     words.extend(apart.payload.map(|mass| format!("payload {} kg", number(mass, 2))));
     words.extend(apart.hoist.map(|force| format!("hoist {} N", number(force, 1))));

@@ -4,23 +4,16 @@
 //! error of the joint's coordinate by the lever of each pose; elsewhere it is the part along the effect's displacement.
 
 use nalgebra::Vector3;
-use plotters::prelude::*;
 
 use super::arm::{Arm, LEAST_LEVER, Poses};
-use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, INK, Mark, WARM, WIDTH, chart, figure, legend, line, note_beyond, radius, range,
-    with_margin,
-};
 use super::pose::{thin, thinned};
+use super::prelude::*;
 use super::reach::{beyond, reach};
-use super::sheet::Sheet;
-use super::tags::Tags;
 use crate::diagnose::{Covariate, PartialResidual, Unexplained};
 use crate::measurement::Split;
 use crate::model::parameter::{Driver, EffectParameter, JointField, Slot};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
-use crate::report::quantity::fixed;
 
 /// Steps of a curve.
 const STEPS: u32 = 160;
@@ -87,6 +80,10 @@ impl Quantity {
 
     fn temperature() -> Self {
         Self::new("temperature [°C]", 1.0)
+    }
+
+    fn lagging(time_constant: f64) -> Self {
+        Self::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0)
     }
 
     /// Up to `most` \[s\].
@@ -186,75 +183,65 @@ fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
 /// An effect that changes the coordinate of a joint.
 fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm, poses: &Poses) -> Option<View<'a>> {
     let first = rows.values.first().copied().unwrap_or_default();
-    let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
-    let commands = |joint: usize| rows.poses.iter().map(|pose| pose.configuration[joint - 1]).collect();
+    let each = |value: &dyn Fn(&PoseView) -> f64| -> Vec<f64> { rows.poses.iter().map(value).collect() };
+    let command = |joint: usize| each(&|pose| pose.configuration[joint - 1]);
     let lever = |joint: usize| {
         let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
         poses.levers(arm, Slot::Joint { joint: joint - 1, field })
     };
+    let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
+    // Δθ = c M, c₃ M³: the moment follows from the law itself.
+    let moments = |joint: usize, of: fn(f64) -> f64| -> Vec<f64> {
+        lever(joint).iter().zip(&rows.own).map(|(lever, own)| of(along(lever, own) / first)).collect()
+    };
+    let in_proportion: Law = Box::new(move |x| first * x);
     let of_command: Law = Box::new(|q: f64| {
         let configuration = vec![q; rows.poses[0].configuration.len()];
         rows.driven(&PoseView::of(&configuration))
     });
-    let own = |levers: &[Vector3<f64>]| -> Vec<f64> {
-        levers.iter().zip(&rows.own).map(|(lever, own)| along(lever, own)).collect()
-    };
-    let (joint, across, x, levers, law): (_, _, Vec<f64>, _, Law) = match *found {
+    let (joint, across, x, law): (_, _, _, Law) = match *found {
         Effect::JointHarmonic { joint, .. } | Effect::JointWave { joint, .. } | Effect::GearRatio { joint } => {
-            (joint, Quantity::command(problem, joint), commands(joint), lever(joint), of_command)
+            (joint, Quantity::command(problem, joint), command(joint), of_command)
         }
-        Effect::JointCoupling { joint, from } => {
-            (joint, Quantity::command(problem, from), commands(from), lever(joint), of_command)
-        }
+        Effect::JointCoupling { joint, from } => (joint, Quantity::command(problem, from), command(from), of_command),
         Effect::JointThermalDrift { joint } => {
             let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(t), ..PoseView::of(&[]) }));
-            (joint, Quantity::temperature(), rows.temperatures(), lever(joint), law)
+            (joint, Quantity::temperature(), rows.temperatures(), law)
         }
         Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
             let which = problem.data.covariates.iter().position(|own| own.name == *of)?;
-            let value = |pose: &PoseView| pose.covariates.get(which).copied().unwrap_or_default();
-            let values = rows.poses.iter().map(value).collect();
-            (joint, Quantity::new(of, 1.0), values, lever(joint), Box::new(move |value| first * value))
+            let values = each(&|pose| pose.covariates.get(which).copied().unwrap_or_default());
+            (joint, Quantity::new(of, 1.0), values, in_proportion)
         }
         Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
             let across = Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
-            let sides = rows.poses.iter().map(|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
-            (joint, across, sides.collect(), lever(joint), Box::new(move |side| 0.5 * first * side))
+            let sides = each(&|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
+            (joint, across, sides, Box::new(move |side| 0.5 * first * side))
         }
         Effect::PayloadBacklash { joint } => {
             let across = Quantity::new(format!("half the payload × side from which joint {joint} came [kg]"), 1.0);
             let driver = Driver::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
-            let sides = rows.poses.iter().map(|pose| driver.value(pose)).collect();
-            (joint, across, sides, lever(joint), Box::new(move |side| first * side))
+            (joint, across, each(&|pose| driver.value(pose)), in_proportion)
         }
         Effect::JointHysteresis { joint, distance } => {
             let across = Quantity::new(format!("part of its friction that pulls joint {joint} back [−1 … +1]"), 1.0);
             let driver = Driver::Dragged { joint: joint - 1, distance };
-            let pulls = rows.poses.iter().map(|pose| driver.value(pose)).collect();
-            (joint, across, pulls, lever(joint), Box::new(move |pull| first * pull))
+            (joint, across, each(&|pose| driver.value(pose)), in_proportion)
         }
         Effect::JointThermalDriftLag { joint, time_constant } => {
             let reference = problem.data.reference_temperature.unwrap_or_default();
-            let across = Quantity::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0);
             let felt = rows.felt(reference, time_constant);
-            (joint, across, felt, lever(joint), Box::new(move |felt| first * (felt - reference)))
+            (joint, Quantity::lagging(time_constant), felt, Box::new(move |felt| first * (felt - reference)))
         }
-        // Δθ = c M, c₃ M³: the moment follows from the law itself.
-        Effect::JointCompliance { joint } => {
-            let levers = lever(joint);
-            let moments = own(&levers).into_iter().map(|own| own / first).collect();
-            (joint, moment(joint), moments, levers, Box::new(move |moment| first * moment))
-        }
+        Effect::JointCompliance { joint } => (joint, moment(joint), moments(joint, |moment| moment), in_proportion),
         Effect::JointNonlinearStiffness { joint } => {
-            let levers = lever(joint);
-            let moments = own(&levers).into_iter().map(|own| (own / first).cbrt()).collect();
-            (joint, moment(joint), moments, levers, Box::new(move |moment| first * moment.powi(3)))
+            (joint, moment(joint), moments(joint, f64::cbrt), Box::new(move |moment| first * moment.powi(3)))
         }
         _ => return None,
     };
     let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
     let up = Box::new(move |_| Quantity::error(&format!("joint {joint}"), unit));
-    Some(View { across, up, x, levers, law, reading: COORDINATE })
+    Some(View { across, up, x, levers: lever(joint), law, reading: COORDINATE })
 }
 
 type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
@@ -275,13 +262,10 @@ impl Rows<'_> {
         self.poses.iter().map(|pose| pose.temperature.unwrap_or_default()).collect()
     }
 
-    /// The effect's displacement over a size in each row; none where that is 0.
-    fn over(&self, size: impl Fn(&PoseView) -> f64) -> Vec<Vector3<f64>> {
-        let lever = |(own, pose): (&Vector3<f64>, &PoseView)| match size(pose) {
-            0.0 => Vector3::zeros(),
-            size => own / size,
-        };
-        self.own.iter().zip(&self.poses).map(lever).collect()
+    /// The effect's displacement over its size in each row; none where that is 0.
+    fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
+        let lever = |(own, size): (&Vector3<f64>, f64)| if size == 0.0 { Vector3::zeros() } else { own / size };
+        self.own.iter().zip(sizes).map(lever).collect()
     }
 }
 
@@ -311,8 +295,7 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
             let (across, felt) = match found {
                 Effect::LinkThermalBendingLag { time_constant, .. }
                 | Effect::LinkThermalExpansionLag { time_constant, .. } => {
-                    let name = format!("temperature that lags by {time_constant} s [°C]");
-                    (Quantity::new(name, 1.0), rows.felt(reference, *time_constant))
+                    (Quantity::lagging(*time_constant), rows.felt(reference, *time_constant))
                 }
                 _ => (Quantity::temperature(), rows.temperatures()),
             };
@@ -320,10 +303,6 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
             let link = link.clone();
             // An expansion has one coefficient with a sign; a bending's two make one size.
             let size = if bends { norm } else { sum };
-            let lever = |(own, felt): (&Vector3<f64>, &f64)| match size * (felt - reference) {
-                0.0 => Vector3::zeros(),
-                size => own / size,
-            };
             View {
                 across,
                 up: if bends {
@@ -331,7 +310,7 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
                 } else {
                     Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
                 },
-                levers: rows.own.iter().zip(&felt).map(lever).collect(),
+                levers: rows.over(felt.iter().map(|felt| size * (felt - reference))),
                 x: felt,
                 law: Box::new(move |t| size * (t - reference)),
                 reading: SIZE,
@@ -341,7 +320,7 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
             across: Quantity::new("payload [kg]", 1.0),
             up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
             x: rows.poses.iter().map(|pose| pose.payload.unwrap_or_default()).collect(),
-            levers: rows.over(|_| sum),
+            levers: rows.over(std::iter::repeat(sum)),
             law: Box::new(move |_| sum),
             reading: SIZE,
         },
@@ -463,7 +442,7 @@ impl Cause {
                 for (at, point) in points.iter().filter(|(_, point)| point.held_out == only) {
                     let style = if is_beyond(at) { line(WARM, 1.4) } else { colour.filled() };
                     tags.pose(point.row);
-                    chart.draw_series([Circle::new((at.0, at.1.clamp(y.0, y.1)), radius(2.2), style)])?;
+                    chart.draw_series([Circle::new((at.0, at.1.clamp(y.0, y.1)), pixels(2.2), style)])?;
                 }
             }
             chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;

@@ -1,15 +1,10 @@
 //! What the change of each parameter, and each effect, is worth over the measured poses.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
 use super::arm::{Arm, Poses};
-use super::frame::{ACCENT, BELOW, Drawing, FAINT, INK, MUTED, Mark, WARM, WIDTH, figure, legend, px, write};
 use super::pose::thin;
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::identify::Identification;
 use crate::problem::Problem;
-use crate::report::quantity::{decimals, fixed, number};
 
 /// Poses over which it is taken.
 const POSES: usize = 200;
@@ -83,9 +78,8 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
     let least = shown.last().map_or(most, |own| (own.moved * 1e3).log10()).max(most - DECADES) - 0.25;
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let bottom = 26 + ROW * count;
-    let room = f64::from(px(WIDTH - NAMES - NUMBERS));
-    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
-    let place = |value: f64| px(NAMES) + ((value.max(least) - least) / (most - least) * room).round() as i32;
+    let room = f64::from(WIDTH - NAMES - NUMBERS);
+    let place = |value: f64| px(NAMES) + pixels((value.max(least) - least) / (most - least) * room);
     let svg = figure((WIDTH, bottom + BELOW - 16), "What each parameter and effect contributes", |area| {
         let entries = [("parameter", FAINT, Mark::Bar), ("effect", ACCENT, Mark::Bar)];
         let has_effects = shown.iter().any(|own| own.is_effect);
@@ -100,7 +94,7 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
             if value.log10() < least {
                 area.draw(&Circle::new((px(NAMES), px(y)), px(2), WARM.filled()))?;
             }
-            let words = format!("{} mm", number(value, decimals(value, 4)));
+            let words = format!("{} mm", two_digits(value, 4));
             write(area, &words, (end / px(1) + 6, y), MUTED, HPos::Left)?;
         }
         let label = "rms move of the predicted position [mm], logarithmic";

@@ -1,13 +1,9 @@
 //! Which estimates go together.
 
 use nalgebra::DMatrix;
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
 
-use super::frame::{ACCENT, Drawing, GRID, MUTED, TEXT, WARM, WIDTH, figure, px, write, write_sized};
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::identify::Correlations;
-use crate::report::quantity::fixed;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 20;

@@ -14,27 +14,11 @@ use crate::error::{Location, Warning};
 use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
 use crate::measurement::Dataset;
 use crate::model::{Model, Pose, Shape};
-use crate::problem::{Joint, JointKind, Problem};
-use crate::quantity::Unit;
+use crate::problem::Problem;
+use crate::report::table::{Command, commands};
 
 /// Poses that a page knows one by one at most.
 const MOST: usize = 600;
-
-/// A joint that takes a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Command {
-    /// Counted from 0.
-    pub joint: usize,
-    /// Of an angle or a length.
-    pub unit: Unit,
-}
-
-impl Command {
-    /// `q2`
-    pub fn name(self) -> String {
-        format!("q{}", self.joint + 1)
-    }
-}
 
 /// What has been done for the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -231,16 +215,6 @@ impl PlotData {
     pub fn size(&self, row: usize) -> f64 {
         self.residuals[row].error.norm()
     }
-}
-
-/// Joints that take a command.
-fn commands(problem: &Problem) -> Vec<Command> {
-    let command = |(joint, kind)| match kind {
-        JointKind::Revolute => Some(Command { joint, unit: Unit::Angle }),
-        JointKind::Prismatic => Some(Command { joint, unit: Unit::Length }),
-        JointKind::Fixed => None,
-    };
-    problem.joints.iter().map(Joint::commanded).enumerate().filter_map(command).collect()
 }
 
 /// The arm with nothing but base and target fitted.

@@ -1,18 +1,11 @@
 //! Error of each held-out pose along each axis, state by state.
 
 use nalgebra::Vector3;
-use plotters::prelude::*;
 
 use super::data::{PlotData, Stage, StageErrors, own_stages};
-use super::frame::{
-    ACCENT, Area, Axis, Drawing, FAINT, Failure, INK, MUTED, Mark, WIDTH, chart, figure, legend, line, radius, range,
-    stacked,
-};
 use super::pose::{left_out, thin, thinned};
-use super::sheet::Sheet;
-use super::tags::Tags;
+use super::prelude::*;
 use crate::identify::{Before, Procedure};
-use crate::report::quantity::{fixed, number};
 
 /// Poses that are drawn at most.
 const MOST: usize = 90;
@@ -146,7 +139,7 @@ fn draw(
         for (k, _) in &points {
             tag(*k);
         }
-        chart.draw_series(points.into_iter().map(|(_, at)| Circle::new(at, radius(1.9), style)))?;
+        chart.draw_series(points.into_iter().map(|(_, at)| Circle::new(at, pixels(1.9), style)))?;
     }
     Ok(())
 }

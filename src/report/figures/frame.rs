@@ -227,7 +227,7 @@ pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
 }
 
 /// A length as drawn, to the nearest pixel.
-pub fn radius(shown: f64) -> i32 {
+pub fn pixels(shown: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "no longer than the paper")]
     let drawn = (shown * f64::from(SCALE)).round() as i32;
     drawn
@@ -257,6 +257,11 @@ pub fn write_sized(
 ) -> Result<(), Failure> {
     let style = font(colour, size).pos(Pos::new(side, VPos::Center));
     area.draw_text(&printable(text), &style, (px(at.0), px(at.1)))
+}
+
+/// Draws an upright line at a place as drawn, between two heights as shown.
+pub fn upright(area: &Area, at: i32, (from, to): (i32, i32), colour: RGBColor) -> Result<(), Failure> {
+    area.draw(&PathElement::new(vec![(at, px(from)), (at, px(to))], line(colour, 1.0)))
 }
 
 /// Draws a figure of some size as shown; `label` says what it is to who cannot see it.
@@ -342,8 +347,8 @@ pub fn legend<'a>(area: &Area<'a>, height: i32, entries: &[(&str, RGBColor, Mark
         let middle = (px(at + 4), px(10));
         let corners = |reach: i32| [(px(at), px(10 - reach)), (px(at + 8), px(10 + reach))];
         match mark {
-            Mark::Dot => area.draw(&Circle::new(middle, radius(3.2), colour.filled())),
-            Mark::Ring => area.draw(&Circle::new(middle, radius(3.2), line(colour, 1.2))),
+            Mark::Dot => area.draw(&Circle::new(middle, pixels(3.2), colour.filled())),
+            Mark::Ring => area.draw(&Circle::new(middle, pixels(3.2), line(colour, 1.2))),
             Mark::Line => {
                 area.draw(&PathElement::new(vec![(px(at - 2), px(10)), (px(at + 9), px(10))], line(colour, 2.2)))
             }

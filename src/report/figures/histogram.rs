@@ -1,14 +1,9 @@
 //! How the residuals scatter.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
 use super::data::PlotData;
-use super::frame::{ACCENT, Axis, Drawing, FAINT, LEFT, Mark, WARM, WIDTH, chart, figure, legend, line, write};
 use super::pose::PoseError;
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::numeric::median;
-use crate::report::quantity::fixed;
 
 const HEIGHT: i32 = 280;
 /// Least that the axis reaches \[σ\]; else four times what most residuals scatter. What lies beyond is counted into the outermost

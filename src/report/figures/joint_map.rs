@@ -1,13 +1,7 @@
 //! The residual by ranges of each joint.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
 use super::data::PlotData;
-use super::frame::{Drawing, FAINT, INK, MUTED, WARM, WIDTH, figure, line, px, range, write};
-use super::sheet::Sheet;
-use super::tags::Tags;
-use crate::report::quantity::{decimals, fixed, number};
+use super::prelude::*;
 
 /// Ranges of a joint.
 const PARTS: usize = 12;
@@ -98,12 +92,11 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
         }
         Ok(())
     });
-    let words = |value: f64| number(value * 1e3, decimals(value * 1e3, 4));
     let caption = format!(
         "Root mean square of the residual over the poses in which a joint stands in a twelfth of its measured range: pale {} \
          mm, deep {} mm; an empty box has no pose. A joint whose row changes along it is where to look.",
-        words(least),
-        words(most)
+        two_digits(least * 1e3, 4),
+        two_digits(most * 1e3, 4)
     );
     let header = ["joint", "unit", "from", "to", "poses", "rms_mm"];
     Some(

@@ -1,15 +1,8 @@
 //! What each misprint and each rival leaves, over what the rigid fit leaves.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
-use super::frame::{
-    ACCENT, Area, BELOW, Drawing, FAINT, Failure, GRID, INK, MUTED, Mark, WARM, WIDTH, figure, legend, line, px,
-    radius, write,
-};
+use super::prelude::*;
 use crate::monte_carlo::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
-use crate::report::quantity::number;
 
 const ROW: i32 = 19;
 /// Room for names.
@@ -51,16 +44,11 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
         marks.push(("the paper", WARM, Mark::Line));
         legend(area, TOP, &marks)?;
         for value in [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0] {
-            vertical(area, place(value), (TOP, bottom), GRID)?;
-            write(
-                area,
-                &number(value, if value < 1.0 { 2 } else { 0 }),
-                (place(value) / px(1), bottom + 10),
-                MUTED,
-                HPos::Center,
-            )?;
+            upright(area, place(value), (TOP, bottom), GRID)?;
+            let number = number(value, if value < 1.0 { 2 } else { 0 });
+            write(area, &number, (place(value) / px(1), bottom + 10), MUTED, HPos::Center)?;
         }
-        vertical(area, place(paper), (TOP, bottom), WARM)?;
+        upright(area, place(paper), (TOP, bottom), WARM)?;
         for (k, (name, spreads)) in (0..).zip(rows) {
             let y = TOP + ROW * k + ROW / 2;
             write(area, name, (NAMES - 10, y), INK, HPos::Right)?;
@@ -75,7 +63,7 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
                 let at = px(y) + shift;
                 let ends = vec![(place(mean - deviation), at), (place(mean + deviation), at)];
                 area.draw(&PathElement::new(ends, line(colour(j), 1.2)))?;
-                area.draw(&Circle::new((place(mean), at), radius(2.4), colour(j).filled()))?;
+                area.draw(&Circle::new((place(mean), at), pixels(2.4), colour(j).filled()))?;
             }
         }
         let middle = NAMES + (WIDTH - NAMES) / 2;
@@ -83,15 +71,9 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
     })
 }
 
-fn vertical(area: &Area, at: i32, (from, to): (i32, i32), colour: RGBColor) -> Result<(), Failure> {
-    area.draw(&PathElement::new(vec![(at, px(from)), (at, px(to))], line(colour, 1.0)))
-}
-
 /// Where a ratio stands, in pixels as drawn.
 fn place(value: f64) -> i32 {
     let (low, high) = (RANGE.0.log10(), RANGE.1.log10());
     let part = (value.max(RANGE.0).log10().clamp(low, high) - low) / (high - low);
-    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
-    let along = (part * f64::from(px(WIDTH - NAMES - 16))).round() as i32;
-    px(NAMES) + along
+    px(NAMES) + pixels(part * f64::from(WIDTH - NAMES - 16))
 }

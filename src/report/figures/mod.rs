@@ -13,6 +13,7 @@ mod joint_map;
 mod misprints;
 mod order;
 mod pose;
+mod prelude;
 mod ranking;
 mod reach;
 mod sheet;
@@ -21,67 +22,25 @@ mod strategies;
 mod tags;
 mod vectors;
 
+pub(super) use contribution::contributions;
+pub(super) use correlation::correlation;
+pub(super) use errors::{errors, of_procedure};
 pub(super) use frame::range;
-pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
-
-use crate::diagnose::{ClosedLoop, Trace};
-use crate::identify::{Before, Comparison, Procedure};
-use crate::least_squares::Identifiability;
-use crate::monte_carlo::{MisprintStudy, ReplicaResults};
+pub(super) use histogram::histogram;
+pub(super) use joint_map::joint_map;
+pub(super) use misprints::misprints;
+pub(super) use order::order;
+pub(super) use ranking::ranking;
+pub(super) use spectrum::spectrum;
+pub(super) use strategies::{ablations, rounds, strategies};
+pub(super) use vectors::vectors;
 
 pub use cause::{Cause, Point, Quantity};
 pub use contribution::Contribution;
 pub use coverage::Coverage;
-pub use data::{Command, PlotData, Stage, StageErrors};
+pub use data::{PlotData, Stage, StageErrors};
+pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 pub use pose::PoseError;
-
-/// A figure with its numbers.
-#[derive(Debug, Clone, Copy)]
-#[non_exhaustive]
-pub enum Figure<'a> {
-    Errors(&'a PlotData),
-    Vectors(&'a PlotData),
-    Histogram(&'a PlotData),
-    Order(&'a PlotData),
-    Correlations(&'a PlotData),
-    SingularValues(&'a Identifiability),
-    Ranking(&'a Trace),
-    /// The held-out errors of one procedure of a comparison.
-    Procedure(&'a Before, &'a Procedure),
-    Strategies(&'a Comparison),
-    Rounds(&'a ClosedLoop),
-    Ablations(&'a Comparison),
-    Misprints(&'a MisprintStudy, &'a ReplicaResults),
-    /// Of an effect, with its number from 1.
-    Cause(&'a PlotData, &'a Cause, usize),
-    Trend(&'a PlotData, &'a Cause),
-    Contributions(&'a PlotData),
-    JointMap(&'a PlotData),
-}
-
-impl Figure<'_> {
-    /// Its drawing; nothing where there is too little to draw.
-    pub fn draw(&self) -> Option<Drawing> {
-        match *self {
-            Self::Errors(data) => errors::errors(data),
-            Self::Vectors(data) => vectors::vectors(data),
-            Self::Histogram(data) => histogram::histogram(data),
-            Self::Order(data) => order::order(data),
-            Self::Correlations(data) => correlation::correlation(&data.correlations),
-            Self::SingularValues(found) => spectrum::spectrum(found),
-            Self::Ranking(trace) => ranking::ranking(trace),
-            Self::Procedure(before, own) => Some(errors::of_procedure(before, own)),
-            Self::Strategies(comparison) => Some(strategies::strategies(comparison)),
-            Self::Rounds(closure) => strategies::rounds(closure),
-            Self::Ablations(comparison) => strategies::ablations(comparison),
-            Self::Misprints(study, found) => Some(misprints::misprints(study, found)),
-            Self::Cause(data, own, number) => Some(own.draw_effect(number, &data.shown)),
-            Self::Trend(data, own) => Some(own.draw_unexplained(&data.shown)),
-            Self::Contributions(data) => contribution::contributions(&data.contributions),
-            Self::JointMap(data) => joint_map::joint_map(data),
-        }
-    }
-}
 
 /// Every name but those of effects, which are numbered, and of procedures, which are named.
 const NAMES: [&str; 14] = [

@@ -1,16 +1,9 @@
 //! Residuals one after another.
 
-use plotters::prelude::*;
-
 use super::data::PlotData;
-use super::frame::{
-    ACCENT, Axis, Drawing, FAINT, Mark, WARM, WIDTH, band, chart, figure, legend, line, note_beyond, radius, range,
-    stacked, with_margin,
-};
 use super::pose::{PoseError, left_out, thin, thinned};
+use super::prelude::*;
 use super::reach::{beyond, reach};
-use super::sheet::Sheet;
-use super::tags::Tags;
 
 /// Poses that are drawn at most.
 const MOST: usize = 300;
@@ -54,7 +47,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
                 let at = (own.time * factor, (own.error[axis] * 1e3).clamp(-most, most));
                 let style = if is_beyond(own, axis) { line(WARM, 1.4) } else { FAINT.filled() };
                 tags.pose(Some(*row));
-                chart.draw_series([Circle::new(at, radius(2.0), style)])?;
+                chart.draw_series([Circle::new(at, pixels(2.0), style)])?;
             }
             note_beyond(panel, outside(axis))?;
         }

@@ -1,13 +1,8 @@
 //! Candidates by what they explain.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
-use super::frame::{ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, WIDTH, figure, line, px, round_numbers, write};
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::diagnose::{Ranked, Trace};
 use crate::problem::Effect;
-use crate::report::quantity::{fixed, mm};
 
 /// Candidates that are drawn.
 const MOST: usize = 12;
@@ -49,25 +44,18 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let (top, bottom) = (10, 10 + ROW * count);
-    let room = f64::from(WIDTH - NAMES - 96);
-    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
-    let place = |value: f64| px(NAMES) + (value / most * room * f64::from(px(1))).round() as i32;
+    let place = |value: f64| px(NAMES) + pixels(value / most * f64::from(WIDTH - NAMES - 96));
     let svg = figure((WIDTH, bottom + BELOW), "Candidate effects by evidence", |area| {
         for (value, number) in round_numbers((0.0, most), 5) {
             let at = place(value);
-            area.draw(&PathElement::new(vec![(at, px(top)), (at, px(bottom))], line(GRID, 1.0)))?;
+            upright(area, at, (top, bottom), GRID)?;
             write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
         }
         for (k, ranked) in (0..).zip(&shown) {
             let y = top + ROW * k + ROW / 2;
             let stands_out = ranked.p_value < trace.level;
-            write(
-                area,
-                &named(&ranked.effect, trace),
-                (NAMES - 8, y),
-                if stands_out { INK } else { MUTED },
-                HPos::Right,
-            )?;
+            let colour = if stands_out { INK } else { MUTED };
+            write(area, &named(&ranked.effect, trace), (NAMES - 8, y), colour, HPos::Right)?;
             let end = place(evidence(ranked)).max(place(0.0) + px(1));
             let bar = [(place(0.0), px(y - 6)), (end, px(y + 6))];
             let style = match (k, alike(ranked), stands_out) {
@@ -83,7 +71,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
             write(area, &gain, (beside / px(1) + 6, y), MUTED, HPos::Left)?;
         }
         let level = place(-trace.level.log10());
-        area.draw(&PathElement::new(vec![(level, px(top - 4)), (level, px(bottom))], line(INK, 1.0)))?;
+        upright(area, level, (top - 4, bottom), INK)?;
         write(area, "evidence, −log₁₀ p", (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28), INK, HPos::Center)
     });
     let caption = format!(

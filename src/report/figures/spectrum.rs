@@ -1,9 +1,6 @@
 //! What the poses can tell: singular values.
 
-use plotters::prelude::*;
-
-use super::frame::{ACCENT, Axis, Drawing, FAINT, Mark, WARM, WIDTH, chart, figure, legend, line, radius};
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::least_squares::Identifiability;
 
 const HEIGHT: i32 = 280;
@@ -27,7 +24,7 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         for (k, at) in values.iter().enumerate() {
             let colour = if k < found.rank { ACCENT } else { WARM };
             chart.draw_series([PathElement::new(vec![(at.0, lowest), *at], line(FAINT, 1.0))])?;
-            chart.draw_series([Circle::new(*at, radius(2.6), colour.filled())])?;
+            chart.draw_series([Circle::new(*at, pixels(2.6), colour.filled())])?;
         }
         Ok(())
     });

@@ -1,16 +1,9 @@
 //! Strategies and parts of the elasticity side by side.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
-use super::frame::{
-    ACCENT, BELOW, Drawing, FAINT, GRID, INK, MUTED, Mark, WIDTH, figure, legend, line, px, radius, range, write,
-};
-use super::sheet::Sheet;
+use super::prelude::*;
 use crate::diagnose::{ClosedLoop, Round};
-use crate::identify::{Baseline, Comparison, Errors};
+use crate::identify::{Comparison, Errors};
 use crate::problem::Effect;
-use crate::report::quantity::{decimals, fixed, number};
 
 const ROW: i32 = 22;
 /// Room for names.
@@ -21,8 +14,8 @@ const TOP: i32 = 26;
 /// Decades in which 2 and 5 have room for their numbers, too.
 const CLOSE: f64 = 2.2;
 
-struct Entry<'a> {
-    strategy: &'a str,
+struct Entry {
+    strategy: String,
     name: String,
     /// How many solvers it stands for.
     solvers: usize,
@@ -44,50 +37,46 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
             entry.name = format!("{strategy}, {} solvers", entry.solvers);
         } else {
             let name = format!("{strategy} {}", found.solver.as_str());
-            entries.push(Entry { strategy, name, solvers: 1, errors });
+            entries.push(Entry { name, ..entry(strategy.to_owned(), errors) });
         }
     }
-    let papers: Vec<String> = comparison.paper.iter().map(Baseline::name).collect();
-    entries.extend(papers.iter().zip(&comparison.paper).map(|(name, own)| entry(name, own.errors)));
+    entries.extend(comparison.paper.iter().map(|own| entry(own.name(), own.errors)));
     let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
                    wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
                    share a row.";
-    let svg = rows(&entries, "Error of every strategy");
-    Drawing::new("strategies", "Strategies side by side", caption, svg).with(sheet(&entries))
+    drawn("strategies", ("Strategies side by side", "Error of every strategy"), caption, &entries)
 }
 
-fn entry(strategy: &str, errors: Errors) -> Entry<'_> {
-    Entry { strategy, name: strategy.to_owned(), solvers: 1, errors }
+fn entry(strategy: String, errors: Errors) -> Entry {
+    Entry { name: strategy.clone(), strategy, solvers: 1, errors }
 }
 
 /// The same for every part of the elasticity that is kept; nothing for an arm without any.
 pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     let entries: Vec<Entry> =
-        comparison.ablations.iter().map(|(part, found)| entry(part.as_str(), found.fitted)).collect();
+        comparison.ablations.iter().map(|(part, found)| entry(part.as_str().to_owned(), found.fitted)).collect();
     let caption = "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
                    rigid to complete, on a logarithmic scale.";
-    let title = "What each part of the elasticity is worth";
-    (entries.len() > 1).then(|| {
-        Drawing::new("ablations", title, caption, rows(&entries, "Error with parts of the elasticity"))
-            .with(sheet(&entries))
-    })
+    let titles = ("What each part of the elasticity is worth", "Error with parts of the elasticity");
+    (entries.len() > 1).then(|| drawn("ablations", titles, caption, &entries))
 }
 
 /// The same after each round of a loop, with what it added.
 pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
-    let names: Vec<String> = closure.rounds.iter().enumerate().map(|(k, _)| round_name(closure, k)).collect();
-    let declared = closure.before.fit.fitted;
-    let after = |(name, round): (&'_ String, &Round)| {
-        (name.clone(), Errors { identification: round.identification, held_out: round.held_out })
+    let after = |(k, round): (usize, &Round)| {
+        let errors = Errors { identification: round.identification, held_out: round.held_out };
+        entry(round_name(closure, k), errors)
     };
-    let all: Vec<(String, Errors)> = std::iter::once(("as declared".to_owned(), declared))
-        .chain(names.iter().zip(&closure.rounds).map(after))
-        .collect();
-    let entries: Vec<Entry> = all.iter().map(|(name, errors)| entry(name, *errors)).collect();
+    let mut entries = vec![entry("as declared".to_owned(), closure.before.fit.fitted)];
+    entries.extend(closure.rounds.iter().enumerate().map(after));
     let caption = "Mean position error after each round of the loop, on the fitted poses and on those held out, which took part in \
                    no choice, on a logarithmic scale. Where the two part, a round has learned noise.";
-    let svg = || rows(&entries, "Error after every round");
-    (entries.len() > 1).then(|| Drawing::new("rounds", "Round by round", caption, svg()).with(sheet(&entries)))
+    (entries.len() > 1).then(|| drawn("rounds", ("Round by round", "Error after every round"), caption, &entries))
+}
+
+/// Entries with a title, and a label for who cannot see them.
+fn drawn(name: &str, (title, label): (&str, &str), caption: &str, entries: &[Entry]) -> Drawing {
+    Drawing::new(name, title, caption, rows(entries, label)).with(sheet(entries))
 }
 
 /// What a round changed, counted from 0.
@@ -120,9 +109,8 @@ fn rows(entries: &[Entry], label: &str) -> String {
     let (low, high) = range(entries.iter().flat_map(of));
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
     let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
-    let room = f64::from(px(WIDTH - NAMES - NUMBERS));
-    #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
-    let place = |value: f64| px(NAMES) + ((value - low) / (high - low) * room).round() as i32;
+    let room = f64::from(WIDTH - NAMES - NUMBERS);
+    let place = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
     let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
     figure((WIDTH, bottom + BELOW), label, |area| {
         let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
@@ -132,16 +120,11 @@ fn rows(entries: &[Entry], label: &str) -> String {
                 let value = f64::from(decade) + part.log10();
                 if (low..=high).contains(&value) {
                     let at = place(value);
-                    area.draw(&PathElement::new(vec![(at, px(TOP)), (at, px(bottom))], line(GRID, 1.0)))?;
+                    upright(area, at, (TOP, bottom), GRID)?;
                     if part < 1.5 || high - low < CLOSE {
                         let digits = usize::try_from(-decade).unwrap_or_default();
-                        write(
-                            area,
-                            &number(10.0_f64.powf(value), digits),
-                            (at / px(1), bottom + 10),
-                            MUTED,
-                            HPos::Center,
-                        )?;
+                        let number = number(10.0_f64.powf(value), digits);
+                        write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
                     }
                 }
             }
@@ -157,8 +140,8 @@ fn rows(entries: &[Entry], label: &str) -> String {
             }
             let ends = vec![(place(fitted), px(y)), (place(held_out), px(y))];
             area.draw(&PathElement::new(ends, line(FAINT, 1.4)))?;
-            area.draw(&Circle::new((place(fitted), px(y)), radius(3.4), FAINT.filled()))?;
-            area.draw(&Circle::new((place(held_out), px(y)), radius(3.4), colour.filled()))?;
+            area.draw(&Circle::new((place(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
+            area.draw(&Circle::new((place(held_out), px(y)), pixels(3.4), colour.filled()))?;
             let value = entry.errors.held_out.mean.norm * 1e3;
             write(area, &number(value, decimals(value, 4) + 1), (WIDTH - 6, y), colour, HPos::Right)?;
         }

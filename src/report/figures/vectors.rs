@@ -1,17 +1,8 @@
 //! Residual vectors over the workspace.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-
 use super::data::PlotData;
-use super::frame::{
-    Area, Axis, BELOW, Drawing, FAINT, Failure, INK, LEFT, Mark, WIDTH, chart, figure, legend, line, px, radius, range,
-    stacked, with_margin, write,
-};
 use super::pose::{PoseError, left_out, thin, thinned};
-use super::sheet::Sheet;
-use super::tags::Tags;
-use crate::report::quantity::number;
+use super::prelude::*;
 
 /// Poses that are drawn at most.
 const MOST: usize = 400;
@@ -49,7 +40,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     let height = 24 + views.iter().map(|view| view.height + BELOW + 8).sum::<i32>();
     let svg = figure((WIDTH, height), "Residual vectors from above and from the side", |area| {
         let body = legend(area, 22, &[("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)])?;
-        let length = radius(LONG * width);
+        let length = pixels(LONG * width);
         let end = px(WIDTH - 12);
         area.draw(&PathElement::new(vec![(end - length, px(10)), (end, px(10))], line(INK, 1.6)))?;
         write(area, &format!("{} mm", short(bar * 1e3)), (WIDTH - 20 - length / 4, 10), INK, HPos::Right)?;
@@ -138,7 +129,7 @@ impl View {
             let to = (from.0 + part * (end.0 - from.0), from.1 + part * (end.1 - from.1));
             chart.draw_series([PathElement::new(vec![from, to], line(colour, 1.2))])?;
             tags.pose(Some(*row));
-            chart.draw_series([Circle::new(from, radius(1.5), colour.filled())])?;
+            chart.draw_series([Circle::new(from, pixels(1.5), colour.filled())])?;
         }
         Ok(())
     }

@@ -10,7 +10,7 @@ use super::text::marked;
 use crate::error::is_hidden;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
-use crate::report::figures::{Drawing, Figure};
+use crate::report::figures::Drawing;
 
 /// Half the width of a bar in standard errors: wider changes run off it.
 const REACH: f64 = 10.0;
@@ -64,13 +64,13 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
             }
         }
     };
-    let files = figures.iter().map(|own: &Drawing| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
+    let files = figures.iter().map(|own| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
     let html = printable(&page.into_string());
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
 
 /// What stands before the first heading, then a section for each heading.
-fn sections(blocks: &[Block], figures: &mut Vec<Drawing>) -> Markup {
+fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
     let shown = on_page(blocks);
     let starts: Vec<usize> = (1..shown.len()).filter(|&k| matches!(shown[k], Block::Heading(_))).collect();
     let ends = starts.iter().copied().chain([shown.len()]);
@@ -93,7 +93,7 @@ fn on_page<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     all
 }
 
-fn one(block: &Block, figures: &mut Vec<Drawing>) -> Markup {
+fn one<'a>(block: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
     html! {
         @match block {
             Block::Heading(text) => h2 { (words(text)) },
@@ -109,7 +109,7 @@ fn one(block: &Block, figures: &mut Vec<Drawing>) -> Markup {
             Block::Headline(own) => (headline(own)),
             Block::Blanks(own) => dl.blanks { @for term in own { div { dt { (term) } dd {} } } },
             Block::Poses(own) => (poses::section(own)),
-            Block::Figures(own) => (grid(own.iter().filter_map(Figure::draw).collect(), figures)),
+            Block::Figures(own) => (grid(own, figures)),
             Block::Folded(title, inner, on_paper) => {
                 details { summary { (words(title)) } @for block in inner { (one(block, figures)) } }
                 p.folded { (words(on_paper)) }
@@ -221,23 +221,13 @@ fn bar(own: &Bar) -> Markup {
 
 /// A table as an address that holds it.
 fn address(csv: &str) -> String {
-    let mut text = String::from("data:text/csv;charset=utf-8,");
-    for character in csv.chars() {
-        match character {
-            '%' => text.push_str("%25"),
-            '#' => text.push_str("%23"),
-            '\n' => text.push_str("%0A"),
-            '\r' => {}
-            ' ' => text.push_str("%20"),
-            '/' => text.push_str("%2F"),
-            other => text.push(other),
-        }
-    }
-    text
+    let escapes = [("%", "%25"), ("#", "%23"), ("\n", "%0A"), ("\r", ""), (" ", "%20"), ("/", "%2F")];
+    let csv = escapes.into_iter().fold(csv.to_owned(), |text, (letter, escape)| text.replace(letter, escape));
+    format!("data:text/csv;charset=utf-8,{csv}")
 }
 
 /// Figures side by side where there is room, numbered after those that were shown.
-fn grid(new: Vec<Drawing>, shown: &mut Vec<Drawing>) -> Markup {
+fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
     let first = shown.len() + 1;
     let grid = html! {
         @if !new.is_empty() {

@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::model::Shape;
-use crate::report::figures::{Command, PlotData, Point};
+use crate::report::figures::{PlotData, Point};
 use crate::report::quantity::{mm, number};
+use crate::report::table::Command;
 
 /// Poses in the table.
 const LISTED: usize = 12;
@@ -70,13 +71,9 @@ fn give(arm: &Shape) -> Vec<f64> {
     arm.bent.iter().zip(&arm.rigid).flat_map(|(bent, rigid)| millimetres(&(bent - rigid), 2)).collect()
 }
 
-fn angle(command: Command, q: f64) -> f64 {
-    q * command.unit.display(1.0).factor
-}
-
 impl Store {
     fn of(data: &PlotData) -> Self {
-        let joint = |own: &Command| (own.name(), own.unit.display(1.0).symbol, own.joint);
+        let joint = |own: &Command| (own.name(), own.symbol(), own.joint);
         let entry = |((&row, &count), arm): ((&usize, &f64), &Option<Shape>)| {
             let own = &data.residuals[row];
             Entry {
@@ -88,7 +85,7 @@ impl Store {
                 q: data
                     .commands
                     .iter()
-                    .map(|own_q| rounded(angle(*own_q, own.configuration[own_q.joint]), 5))
+                    .map(|own_q| rounded(own.configuration[own_q.joint] * own_q.factor(), 5))
                     .collect(),
                 position: millimetres(&own.position, 2),
                 before: millimetres(&own.before, 4),
@@ -213,7 +210,7 @@ fn largest(data: &PlotData) -> Markup {
         div.scroll tabindex="0" role="region" aria-label="The largest residuals" { table.sort {
             thead { tr {
                 th.l { "row" } th.l { "pose" }
-                @for own in &data.commands { th.o { (own.name()) ", " (own.unit.display(1.0).symbol) } }
+                @for own in &data.commands { th.o { (own.name()) ", " (own.symbol()) } }
                 th.o { "before, mm" } th { "residual, mm" } th.o { "in σ" }
             } }
             tbody { @for row in rows {
@@ -221,7 +218,7 @@ fn largest(data: &PlotData) -> Markup {
                 tr data-row=(row) {
                     td.l { (own.place) } td.l { @if own.held_out { "held out" } @else { "fitted" } }
                     @for command in &data.commands {
-                        td.o { (number(angle(*command, own.configuration[command.joint]), 2).replace('-', "−")) }
+                        td.o { (number(own.configuration[command.joint] * command.factor(), 2).replace('-', "−")) }
                     }
                     td.o { (mm(own.before.norm(), 3)) } td { (mm(own.error.norm(), 4)) } td.o { (number(own.error.norm() / own.sigma, 1)) }
                 }
