@@ -162,7 +162,7 @@ impl Fitted {
         self.neighbourhood_with(linearised, &[], None)
     }
 
-    /// The same at the identification rows, made once.
+    /// The same at the identification rows, made once: all of a loop is of the same rows.
     pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
         if let Some(known) = self.around.get() {
             return Arc::clone(known);
@@ -173,8 +173,7 @@ impl Fitted {
 
     /// The same fit, in which every row counts.
     pub fn with_all_rows(&self) -> Self {
-        let (set_aside, around) = (Vec::new(), OnceLock::new());
-        if self.set_aside.is_empty() { self.clone() } else { Self { set_aside, around, ..self.clone() } }
+        Self { set_aside: Vec::new(), around: OnceLock::new(), ..self.clone() }
     }
 
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.

@@ -116,7 +116,8 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
 /// nothing worth stating.
 fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hypothesis) -> Option<Correction> {
     // The peak of what is narrow may have been set aside; poses that are left out tell a peak from an outlier.
-    let whole = fitted.problem.robust.is_none().then(|| fitted.with_all_rows());
+    let bends = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
+    let whole = bends.then(|| fitted.with_all_rows());
     let fitted = whole.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
     let weighed = data.weighed();

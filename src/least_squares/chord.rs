@@ -18,8 +18,9 @@ const UNSEEN: f64 = 1e-10;
 /// Residuals and derivatives at a point, which serve at others.
 ///
 /// About x₀ with J₀ = Q₀ R₀: r(x) = r₀ + J₀ δ + ρ, δ = x − x₀. By J₀ the linearised problem at x is
-/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ; it leaves (J(x) − J₀)ᵀ r out of the gradient. Derivatives serve where ‖ρ‖ is a small part of
-/// ‖J₀ δ‖, or where ‖ρ‖² is no more than the mean square of one number: that changes N ln ‖r‖² by no more than 1.
+/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ; it leaves (J(x) − J₀)ᵀ r out of the gradient, which is of the order of ρ. So derivatives
+/// serve where ‖ρ‖ is a small part of ‖J₀ δ‖, or ‖ρ‖² no more than the mean ‖r‖² / N of one number, and no unknown was without effect
+/// at x₀: such a one may have one elsewhere.
 #[derive(Debug)]
 pub(super) struct Base {
     /// Which data.
@@ -30,7 +31,7 @@ pub(super) struct Base {
     chunks: Vec<Chunk>,
     triangle: Triangle,
     /// Made when first derivatives are asked to serve elsewhere.
-    within: OnceLock<Within>,
+    within: OnceLock<Option<Within>>,
 }
 
 /// Some items with their residuals and derivatives.
@@ -52,16 +53,19 @@ struct Within {
 }
 
 impl Within {
-    fn new(triangle: &Triangle) -> Self {
+    /// `None` where an unknown has no effect, or numbers are not finite.
+    fn new(triangle: &Triangle) -> Option<Self> {
         let Linearisation { triangle: mut scaled, projected: constant, .. } = triangle.clone().into_linearisation();
         let n = constant.len();
-        let lengths = scaled.column_iter().map(|column| if column.amax() > 0.0 { column.norm() } else { 1.0 });
-        let lengths = DVector::from_iterator(n, lengths);
+        let lengths = DVector::from_iterator(n, scaled.column_iter().map(|column| column.norm()));
+        if !lengths.iter().all(|length| length.is_normal()) {
+            return None;
+        }
         scaled.column_iter_mut().zip(&lengths).for_each(|(mut column, length)| column /= *length);
         let mut normal = gram(&scaled);
         (0..n).for_each(|j| normal[(j, j)] += UNSEEN);
-        let root = inverse_factor(&normal).unwrap_or_else(|| DMatrix::zeros(n, n));
-        Self { scaled, constant, lengths, root }
+        let root = inverse_factor(&normal)?;
+        Some(Self { scaled, constant, lengths, root })
     }
 
     /// c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ.
@@ -81,16 +85,6 @@ impl Base {
     /// Of all items, linearised at `x`, and their factor.
     pub fn new(x: &DVector<f64>, (data, unit): (u64, f64), chunks: Vec<Chunk>, triangle: Triangle) -> Self {
         Self { data, unit, x: x.clone(), chunks, triangle, within: OnceLock::new() }
-    }
-
-    /// Whether it was taken there, of residuals in this unit.
-    pub fn is_at(&self, x: &DVector<f64>, unit: f64) -> bool {
-        self.x == *x && self.unit.to_bits() == unit.to_bits()
-    }
-
-    /// Residuals and derivatives of a chunk.
-    pub fn block(&self, index: usize) -> &Block {
-        &self.chunks[index].block
     }
 
     /// The factor where it was taken.
@@ -125,10 +119,21 @@ impl Base {
         }
         let [squares, way, rest] = sums;
         let rows: usize = self.chunks.iter().map(|chunk| chunk.block.rows()).sum();
-        let serves = rest <= (MISSED * MISSED * way).max(squares / (larger * larger * rows as f64));
-        serves.then(|| {
-            let constant = self.within.get_or_init(|| Within::new(&self.triangle)).constant(&step, &gradient);
-            self.triangle().with_residual(&constant, squares / (larger * larger)).times(larger)
-        })
+        let least = (MISSED * MISSED * way).max(squares / (larger * larger * rows as f64));
+        // An infinite residual is no more than an infinite one.
+        if !(rest.is_finite() && rest <= least) {
+            return None;
+        }
+        let constant = self.within()?.constant(&step, &gradient);
+        Some(self.triangle().with_residual(&constant, squares / (larger * larger)).times(larger))
+    }
+
+    fn within(&self) -> Option<&Within> {
+        if let Some(known) = self.within.get() {
+            return known.as_ref();
+        }
+        // Before the cell waits for it: it is made on several threads.
+        let new = Within::new(&self.triangle);
+        self.within.get_or_init(|| new).as_ref()
     }
 }

@@ -123,11 +123,7 @@ pub trait Objective {
     /// By differences of the gradient unless an objective knows better; evaluated only where `within` allows. Nothing where
     /// derivatives are not finite.
     fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
-        let slopes = |x: &DVector<f64>| {
-            let Linearisation { cost, triangle, projected } = self.linearise(x);
-            Slopes { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
-        };
-        by_differences(slopes, x, within)
+        by_differences(|x| Slopes::from(self.linearise(x)), x, within)
     }
 
     /// How far each unknown may plausibly go, where that is known.

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::chord::{Base, Chunk};
+use super::curvature::{Slopes, by_differences};
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
 use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle};
@@ -24,7 +25,7 @@ const ROWS_PER_UNKNOWN: usize = 4;
 /// Chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Unknowns from which on derivatives of all data are kept, and how many numbers at most: 128 MB.
+/// Unknowns from which on derivatives of all data are kept in passing, and how many numbers at most: 128 MB.
 const MANY: usize = 100;
 const MOST_KEPT: usize = 1 << 24;
 
@@ -210,15 +211,16 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     fn factor(&self, x: &DVector<f64>) -> Triangle {
         let Some((memory, data, unit)) = self.memory else { return self.reduce(x) };
         memory.recall(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
-            if !self.keeps_derivatives() {
+            if !(memory.is_in_passing() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }
-            let earlier = || memory.base(data)?.at(self.problem, x, unit);
-            let earlier = if memory.is_in_passing() { earlier() } else { None };
+            let earlier = memory.base(data).and_then(|base| base.at(self.problem, x, unit));
             earlier.unwrap_or_else(|| {
                 let base = self.base(x, (data, unit));
                 let triangle = base.triangle();
-                memory.keep(Arc::new(base));
+                if triangle.sum_of_squares().is_finite() {
+                    memory.keep(Arc::new(base));
+                }
                 triangle
             })
         })
@@ -236,17 +238,18 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Base::new(x, key, chunks, triangle)
     }
 
-    /// Whether derivatives of all data are kept: those of squares and of many unknowns, which are asked for again, and of no more data than
-    /// memory has room for.
+    /// Whether derivatives of all data may be kept: those of squares and of many unknowns, of which they take the time, and of no more data
+    /// than memory has room for.
     fn keeps_derivatives(&self) -> bool {
         let (n, rows) = (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
         self.loss == Loss::Squares && n >= MANY && rows * n <= MOST_KEPT
     }
 
-    /// Jᵀ r″ of a chunk with such residuals and derivatives, r″ = 2 (r(x + h p) − r − h J p) / h².
-    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &Block) -> DVector<f64> {
-        let (n, rows) = (block.parameters(), block.rows());
-        let mut moved = vec![0.0; rows];
+    /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
+    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &mut Block) -> DVector<f64> {
+        self.fill(x, index, block);
+        let n = block.parameters();
+        let mut moved = vec![0.0; block.rows()];
         self.problem.residuals(&(x + BEND_STEP * step), self.chunk(index), &mut moved);
         for (i, moved) in moved.iter_mut().enumerate() {
             let straight: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
@@ -304,6 +307,12 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         linearisation
     }
 
+    /// By differences of the gradients of each point itself.
+    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+        let plain = Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, memory: None };
+        by_differences(|x| Slopes::from(plain.linearise(x)), x, within)
+    }
+
     /// 1 σ of the prior of each unknown that has one: a linear row a x + b of it alone, σ = 1/|a|.
     fn reach(&self) -> Vec<Option<f64>> {
         let mut reach = vec![None; self.parameters()];
@@ -321,15 +330,8 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing()) && self.keeps_derivatives() {
             return None;
         }
-        let kept = self.memory.and_then(|(memory, data, unit)| memory.base(data).filter(|base| base.is_at(x, unit)));
         let mut total = DVector::zeros(x.len());
-        let map = |index, block: &mut Block| {
-            if let Some(base) = &kept {
-                return self.chunk_bend((x, step), index, base.block(index));
-            }
-            self.fill(x, index, block);
-            self.chunk_bend((x, step), index, block)
-        };
+        let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);
         in_order(self.chunks(), || self.empty_block(), map, |bend| total += bend);
         total.iter().all(|value| value.is_finite()).then_some(total)
     }
@@ -481,9 +483,80 @@ mod tests {
             let gradient = columns.tr_mul(&residual) * (0.1 / unit);
             assert!((there.triangle.tr_mul(&there.projected) - &gradient).norm() < 1e-6 * gradient.norm());
             assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
-            // What two unknowns do alike is no part of what is left.
+            // Of what two unknowns do alike nothing runs off.
             assert!(there.projected.norm_squared() < residual.norm_squared());
         }
         assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());
+    }
+
+    /// Waves of many orders, each with an amplitude, and a height times a slope.
+    struct Waves {
+        unit: f64,
+    }
+
+    impl LeastSquares for Waves {
+        fn parameters(&self) -> usize {
+            MANY + 2
+        }
+
+        fn items(&self) -> usize {
+            900
+        }
+
+        fn rows_per_item(&self) -> usize {
+            1
+        }
+
+        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+            for (out, t) in out.iter_mut().zip(items.map(|i| i as f64 / 900.0)) {
+                let waves: f64 = (0..MANY).map(|k| x[k] * (3.0 * k as f64 * t).cos()).sum();
+                *out = (waves + 5.0 * x[MANY] * (x[MANY + 1] * t).sin() - (700.0 * t * t).cos()) / self.unit;
+            }
+        }
+
+        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+            self.residuals(x, items.clone(), block.column_mut(MANY + 2));
+            for (row, t) in items.map(|i| i as f64 / 900.0).enumerate() {
+                for k in 0..MANY {
+                    block.column_mut(k)[row] = (3.0 * k as f64 * t).cos() / self.unit;
+                }
+                block.column_mut(MANY)[row] = 5.0 * (x[MANY + 1] * t).sin() / self.unit;
+                block.column_mut(MANY + 1)[row] = 5.0 * x[MANY] * t * (x[MANY + 1] * t).cos() / self.unit;
+            }
+        }
+    }
+
+    #[test]
+    fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
+        let memory = Memory::in_passing();
+        let gradient = |found: &Linearisation| found.triangle.tr_mul(&found.projected);
+        let at = |height: f64| {
+            let mut x = DVector::from_element(MANY + 2, 0.01);
+            x[MANY] = height;
+            x
+        };
+        let (start, near) = (at(0.2), at(0.2004));
+        for (x, unit) in [(&start, 0.1), (&near, 0.1), (&near, 0.3), (&start, 0.3)] {
+            let waves = Waves { unit };
+            let (fit, plain) = (Fit::new(&waves).remembering(&memory, 1, unit), Fit::new(&waves).linearise(x));
+            let found = fit.linearise(x);
+            assert!((found.cost / plain.cost - 1.0).abs() < 1e-9, "{unit}");
+            assert!((gradient(&found) - gradient(&plain)).norm() < 0.01 * gradient(&plain).norm(), "{unit}");
+            // Differences are of the derivatives of each point.
+            let second = |fit: &Fit<Waves>| fit.curvature(x, &|_| true).unwrap();
+            assert_eq!(second(&fit), second(&Fit::new(&waves)));
+        }
+    }
+
+    #[test]
+    fn in_passing_what_had_no_effect_is_looked_at_again() {
+        let memory = Memory::in_passing();
+        let mut x = DVector::from_element(MANY + 2, 0.01);
+        x[MANY] = 0.0;
+        let waves = Waves { unit: 0.1 };
+        let fit = Fit::new(&waves).remembering(&memory, 1, 0.1);
+        assert_eq!(fit.linearise(&x).triangle.column(MANY + 1).amax(), 0.0);
+        x[MANY] = 1e-3;
+        assert!(fit.linearise(&x).triangle.column(MANY + 1).amax() > 0.0);
     }
 }

@@ -6,7 +6,7 @@ mod product;
 
 pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
-pub(crate) use factor::{inverse_factor, solve_positive};
+pub(crate) use factor::{inverse_factor, inverse_lower, solve_positive};
 pub(crate) use product::{gram, product};
 
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.

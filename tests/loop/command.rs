@@ -177,6 +177,22 @@ fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
 }
 
 #[test]
+fn orientations_that_are_fitted_take_no_part_in_the_loop() {
+    let bench = Bench::new(NONE);
+    bench.edit("arm/problem.toml", |text| {
+        let free = text.replace("sigma_mm = 5.0 }", "sigma_mm = 5.0, sigma_deg = 90 }\n\"tool.r*\" = { free = true }");
+        free.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0.05\norientation_sigma_deg = 0.01")
+    });
+    let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml");
+    let truth = truth.to_str().unwrap();
+    bench.run(&["simulate", "arm", "--truth", truth, "--poses", "78", "--seed", "5", "--out", "sim"]).success();
+    fs::copy(bench.path("sim/measurements.csv"), bench.path("arm/data.csv")).unwrap();
+    bench.run(&["identify", "arm"]).success();
+    let closed = bench.json(&["loop", "arm"]);
+    assert_eq!(closed["verdict"], "nothing-found", "{closed:#}");
+}
+
+#[test]
 fn other_data_go_into_the_closed_problem() {
     let bench = Bench::new(THERMAL);
     fs::rename(bench.path("arm/data.csv"), bench.path("other data.csv")).unwrap();

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::{gram, inverse_factor, product};
+use crate::numeric::{gram, inverse_factor, inverse_lower, product};
 
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
@@ -18,24 +18,23 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
     let n = columns.ncols();
     let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
     let (kept, first) = independent(columns, &own, lengths.unwrap_or(&own));
-    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
-    let turning = |gram: &DMatrix<f64>| inverse_factor(gram).map(|inverse| inverse.transpose());
     let mut basis = columns.select_columns(&kept);
     let mut within = DMatrix::zeros(n, kept.len());
     for (k, &j) in kept.iter().enumerate() {
         basis.column_mut(k).unscale_mut(own[j]);
         within[(j, k)] = own[j].recip();
     }
-    let inverse = turning(&first).unwrap_or_default();
+    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+    let inverse = inverse_lower(&first).transpose();
     basis = product(&basis, &inverse);
     within *= inverse;
     // Once more, for what rounding left.
-    let again = turning(&gram(&basis));
+    let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
     let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
     (product(&basis, &again), within * again)
 }
 
-/// Columns that are directions of their own, and the Gram matrix of these, scaled to length one.
+/// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
 fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let gram = gram(columns);
     let mut kept: Vec<usize> = Vec::new();
@@ -54,9 +53,8 @@ fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usi
             kept.push(j);
         }
     }
-    let scaled = |i: usize, j: usize| gram[(kept[i], kept[j])] / (own[kept[i]] * own[kept[j]]);
-    let gram = DMatrix::from_fn(kept.len(), kept.len(), scaled);
-    (kept, gram)
+    let lower = DMatrix::from_fn(kept.len(), kept.len(), |i, j| if j <= i { factor[i][j] } else { 0.0 });
+    (kept, lower)
 }
 
 /// Z with A D⁻¹ Z = 0 and ZᵀZ = I for the rows A of active constraints, shape = (constraints, n), and the scale D of the
@@ -92,5 +90,13 @@ mod tests {
         let moved = DMatrix::from_fn(4, 2, |j, k| left[(j, k)] / scale[j]);
         assert!((active * moved).amax() < 1e-12);
         assert_eq!(open(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
+    }
+
+    #[test]
+    fn columns_that_nearly_depend_on_others_keep_a_basis() {
+        let columns = DMatrix::from_fn(300, 60, |i, j| ((1.0 + 0.02 * j as f64) * i as f64 / 300.0).sin());
+        let (basis, within) = orthonormal(&columns, None);
+        assert!(basis.ncols() > 3 && within.ncols() == basis.ncols(), "{}", basis.ncols());
+        assert!((basis.transpose() * &basis - DMatrix::identity(basis.ncols(), basis.ncols())).amax() < 1e-10);
     }
 }

@@ -1,6 +1,7 @@
 //! Every candidate tried against what a fit leaves.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -14,7 +15,7 @@ use crate::problem::{Effect, Problem};
 /// The candidates with what the residual says about each.
 pub(crate) struct Scan<'a, 'l> {
     linearised: &'l Linearised<'a>,
-    pub linear: LinearNeighbourhood,
+    pub linear: Arc<LinearNeighbourhood>,
     /// The candidates tried.
     pub effects: Vec<Effect>,
     driven: Driven,
@@ -49,7 +50,7 @@ impl<'a, 'l> Scan<'a, 'l> {
     /// Tries `effects` against the fit that `linear` describes.
     pub fn new(
         linearised: &'l Linearised<'a>,
-        linear: LinearNeighbourhood,
+        linear: Arc<LinearNeighbourhood>,
         effects: Vec<Effect>,
         rules: &'l SelectionRules,
     ) -> Self {
@@ -130,7 +131,7 @@ impl<'a, 'l> Scan<'a, 'l> {
     pub fn take(&mut self, index: usize) {
         let columns = self.columns(index);
         let before = self.linear.residual().clone();
-        let added = self.linear.add(&columns);
+        let added = Arc::make_mut(&mut self.linear).add(&columns);
         let data = added.rows(0, self.linear.rows()).into_owned();
         let given = added.tr_mul(&before);
         let along = self.linearised.along(&self.driven, &data);

@@ -11,11 +11,11 @@ use super::chance::{Chance, Drawn};
 use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
 
-/// Number of draws, fewer where refitting them all takes more multiplications than these: of a fit of hundreds of parameters to thousands
-/// of poses chance varies little from draw to draw.
+/// Number of draws. Fewer where a product of all of them with Q takes more multiplications than `WORK`: of a fit of hundreds of parameters
+/// to thousands of poses what is less probable than one in a hundred is then told by the fitted tail, instead of one in two hundred.
 const DRAWS: usize = 1999;
-const FEWEST: usize = 399;
-const WORK: usize = 1 << 32;
+const FEWEST: usize = 999;
+const WORK: u64 = 1 << 32;
 /// Draws that are fitted together, fewer where they have more than so many numbers: Q is gone through once for all of them.
 const TOGETHER: usize = 96;
 const FEWEST_TOGETHER: usize = 16;
@@ -41,7 +41,8 @@ pub(super) fn chances(
         return Vec::new();
     }
     let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
-    let draws = (WORK / leverage.fitted.len().max(1)).clamp(FEWEST, DRAWS);
+    let affordable = WORK / (leverage.fitted.len() as u64).max(1);
+    let draws = usize::try_from(affordable).unwrap_or(DRAWS).clamp(FEWEST, DRAWS);
     let starts: Vec<usize> = (0..draws).step_by(together).collect();
     let drawn: Vec<Vec<f64>> = starts
         .into_par_iter()

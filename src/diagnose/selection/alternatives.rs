@@ -18,7 +18,7 @@ impl<'f, 'a> Replacements<'f, 'a> {
     /// Tries `candidates`, whose places `linearised` holds.
     pub fn new(fitted: &'f Fitted, linearised: &'f Linearised<'a>, candidates: &[Effect], data: &'f Data) -> Self {
         let fit = fitted.around(data);
-        let scan = Scan::new(linearised, LinearNeighbourhood::clone(&fit), candidates.to_vec(), data.rules);
+        let scan = Scan::new(linearised, Arc::clone(&fit), candidates.to_vec(), data.rules);
         Self { fitted, fit, scan }
     }
 

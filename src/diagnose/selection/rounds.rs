@@ -87,12 +87,12 @@ impl<'a> Rounds<'a> {
             candidates.testable.retain(|effect| !added.iter().any(|known| known.remembers_like(effect)));
             let (picks, staying) = {
                 let linearised = fitted.linearised(self.data, &candidates.testable);
-                let fit = LinearNeighbourhood::clone(&fitted.around(self.data));
+                let fit = fitted.around(self.data);
                 let own = fit.unknowns();
                 let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
                 let picks = pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1);
                 let picked: Vec<Effect> = picks.iter().map(|pick| pick.effect.clone()).collect();
-                let staying = self.staying(&fitted, (&[], &picked), own, || scan.linear.clone());
+                let staying = self.staying(&fitted, (&[], &picked), own, || LinearNeighbourhood::clone(&scan.linear));
                 (picks, staying)
             };
             if staying.is_some_and(|effects| self.was_fitted(&effects)) {

@@ -111,7 +111,9 @@ impl PlotData {
     /// Problem and data do not fit each other.
     pub fn of_loop(problem: &Problem, data: &Dataset, closure: &ClosedLoop) -> Result<Self, IdentifyError> {
         let (poses, fit) = (Poses::new(data), &closure.before.fit);
-        let (before, after) = (poses.arm(problem, fit)?, poses.arm(&closure.closed, &closure.after)?);
+        // Loops fit positions alone.
+        let (before, after) =
+            (poses.arm(&problem.positions_alone(), fit)?, poses.arm(&closure.closed, &closure.after)?);
         let stages = vec![
             registered(&poses, &before, fit),
             identified(&poses, &before, fit),
