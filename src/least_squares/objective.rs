@@ -555,7 +555,7 @@ mod tests {
         x[MANY] = 0.0;
         let waves = Waves { unit: 0.1 };
         let fit = Fit::new(&waves).remembering(&memory, 1, 0.1);
-        assert_eq!(fit.linearise(&x).triangle.column(MANY + 1).amax(), 0.0);
+        assert!(fit.linearise(&x).triangle.column(MANY + 1).iter().all(|value| *value == 0.0));
         x[MANY] = 1e-3;
         assert!(fit.linearise(&x).triangle.column(MANY + 1).amax() > 0.0);
     }
