@@ -18,6 +18,8 @@ mod inequalities;
 mod more_garbow_hillstrom;
 #[path = "solver/nist.rs"]
 mod nist;
+#[path = "solver/passing.rs"]
+mod passing;
 #[path = "solver/robust.rs"]
 mod robust;
 #[path = "solver/threads.rs"]

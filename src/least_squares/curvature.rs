@@ -2,8 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Linearisation;
-
 /// How far each unknown is moved: by its effect on all residuals together, as a part of their length.
 const STEP: f64 = 1e-4;
 
@@ -15,12 +13,6 @@ pub(super) struct Slopes {
     pub gradient: DVector<f64>,
     /// JᵀJ.
     pub normal: DMatrix<f64>,
-}
-
-impl From<Linearisation> for Slopes {
-    fn from(Linearisation { cost, triangle, projected }: Linearisation) -> Self {
-        Self { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
-    }
 }
 
 /// S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ, by differences of the gradient Jᵀr.

@@ -123,7 +123,7 @@ pub trait Objective {
     /// By differences of the gradient unless an objective knows better; evaluated only where `within` allows. Nothing where
     /// derivatives are not finite.
     fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
-        by_differences(|x| Slopes::from(self.linearise(x)), x, within)
+        by_differences(|x| slopes(self.linearise(x)), x, within)
     }
 
     /// How far each unknown may plausibly go, where that is known.
@@ -191,4 +191,9 @@ impl Linearisation {
         triangle.absorb(&mut block);
         Self { cost: self.cost, ..triangle.into_linearisation() }
     }
+}
+
+/// What a linearised problem says of slopes.
+fn slopes(Linearisation { cost, triangle, projected }: Linearisation) -> Slopes {
+    Slopes { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
 }

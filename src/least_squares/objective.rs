@@ -7,10 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::chord::{Base, Chunk};
-use super::curvature::{Slopes, by_differences};
+use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
-use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle};
+use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle, slopes};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
@@ -310,7 +310,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     /// By differences of the gradients of each point itself.
     fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
         let plain = Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, memory: None };
-        by_differences(|x| Slopes::from(plain.linearise(x)), x, within)
+        by_differences(|x| slopes(plain.linearise(x)), x, within)
     }
 
     /// 1 σ of the prior of each unknown that has one: a linear row a x + b of it alone, σ = 1/|a|.
@@ -487,76 +487,5 @@ mod tests {
             assert!(there.projected.norm_squared() < residual.norm_squared());
         }
         assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());
-    }
-
-    /// Waves of many orders, each with an amplitude, and a height times a slope.
-    struct Waves {
-        unit: f64,
-    }
-
-    impl LeastSquares for Waves {
-        fn parameters(&self) -> usize {
-            MANY + 2
-        }
-
-        fn items(&self) -> usize {
-            900
-        }
-
-        fn rows_per_item(&self) -> usize {
-            1
-        }
-
-        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-            for (out, t) in out.iter_mut().zip(items.map(|i| i as f64 / 900.0)) {
-                let waves: f64 = (0..MANY).map(|k| x[k] * (3.0 * k as f64 * t).cos()).sum();
-                *out = (waves + 5.0 * x[MANY] * (x[MANY + 1] * t).sin() - (700.0 * t * t).cos()) / self.unit;
-            }
-        }
-
-        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
-            self.residuals(x, items.clone(), block.column_mut(MANY + 2));
-            for (row, t) in items.map(|i| i as f64 / 900.0).enumerate() {
-                for k in 0..MANY {
-                    block.column_mut(k)[row] = (3.0 * k as f64 * t).cos() / self.unit;
-                }
-                block.column_mut(MANY)[row] = 5.0 * (x[MANY + 1] * t).sin() / self.unit;
-                block.column_mut(MANY + 1)[row] = 5.0 * x[MANY] * t * (x[MANY + 1] * t).cos() / self.unit;
-            }
-        }
-    }
-
-    #[test]
-    fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
-        let memory = Memory::in_passing();
-        let gradient = |found: &Linearisation| found.triangle.tr_mul(&found.projected);
-        let at = |height: f64| {
-            let mut x = DVector::from_element(MANY + 2, 0.01);
-            x[MANY] = height;
-            x
-        };
-        let (start, near) = (at(0.2), at(0.2004));
-        for (x, unit) in [(&start, 0.1), (&near, 0.1), (&near, 0.3), (&start, 0.3)] {
-            let waves = Waves { unit };
-            let (fit, plain) = (Fit::new(&waves).remembering(&memory, 1, unit), Fit::new(&waves).linearise(x));
-            let found = fit.linearise(x);
-            assert!((found.cost / plain.cost - 1.0).abs() < 1e-9, "{unit}");
-            assert!((gradient(&found) - gradient(&plain)).norm() < 0.01 * gradient(&plain).norm(), "{unit}");
-            // Differences are of the derivatives of each point.
-            let second = |fit: &Fit<Waves>| fit.curvature(x, &|_| true).unwrap();
-            assert_eq!(second(&fit), second(&Fit::new(&waves)));
-        }
-    }
-
-    #[test]
-    fn in_passing_what_had_no_effect_is_looked_at_again() {
-        let memory = Memory::in_passing();
-        let mut x = DVector::from_element(MANY + 2, 0.01);
-        x[MANY] = 0.0;
-        let waves = Waves { unit: 0.1 };
-        let fit = Fit::new(&waves).remembering(&memory, 1, 0.1);
-        assert!(fit.linearise(&x).triangle.column(MANY + 1).iter().all(|value| *value == 0.0));
-        x[MANY] = 1e-3;
-        assert!(fit.linearise(&x).triangle.column(MANY + 1).amax() > 0.0);
     }
 }
