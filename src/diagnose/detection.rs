@@ -124,7 +124,7 @@ pub(super) fn with_linear<T>(
     let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
     priors.extend(linearised.relaxed());
     let unknowns = Unknowns { x: vec![0.0; priors.len()], priors, active: DMatrix::zeros(0, columns.ncols()) };
-    let linear = LinearNeighbourhood::new(&columns, &DVector::zeros(columns.nrows()), &unknowns, linearised.empty());
+    let linear = LinearNeighbourhood::new(columns, &DVector::zeros(columns.nrows()), &unknowns, linearised.empty());
     Ok(with(&linearised, &linear))
 }
 

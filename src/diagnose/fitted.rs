@@ -179,7 +179,7 @@ impl Fitted {
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.
     pub fn neighbourhood_as_fitted(&self, linearised: &Linearised) -> LinearNeighbourhood {
         let unknowns = self.unknowns_without(linearised, &[], self.found.noise_factor.max(1.0).sqrt());
-        LinearNeighbourhood::new(&linearised.fitted(), linearised.residual(), &unknowns, linearised.empty())
+        LinearNeighbourhood::new(linearised.fitted(), linearised.residual(), &unknowns, linearised.empty())
     }
 
     /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is divided by `weight`.
@@ -213,6 +213,9 @@ impl Fitted {
         let added = more.map_or(0, |(columns, _)| columns.ncols());
         unknowns.x.extend(std::iter::repeat_n(0.0, added));
         unknowns.priors.extend(std::iter::repeat_n(more.map(|(_, sigma)| sigma), added));
+        if without.is_empty() && added == 0 {
+            return LinearNeighbourhood::new(columns, &residual, &unknowns, linearised.empty());
+        }
         let fitted: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
         let mut columns = columns.select_columns(&fitted);
         if let Some((more, _)) = more {
@@ -290,14 +293,14 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 /// 1 + A (AᵀA)⁻¹ Aᵀ of one beside it, over the median of all.
 fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
-    let (mut columns, mut here) = (whole.clone(), residual.clone());
+    let (mut columns, mut here) = (whole.into_owned(), residual.clone());
     for &pose in aside {
         columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
         here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
     }
     let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
     let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
-    let (left, along) = (residual + &whole * fit.step(), fit.fitted());
+    let (left, along) = (residual + whole * fit.step(), fit.fitted());
     let square = |pose: usize| {
         let (own, r) = (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
         let hat = Matrix3::from_fn(|i, j| own.row(i).dot(&own.row(j)));

@@ -36,7 +36,7 @@ impl Memory {
     }
 
     /// Whether it is one for fits after which others follow.
-    pub(super) fn is_in_passing(&self) -> bool {
+    pub(crate) fn is_in_passing(&self) -> bool {
         self.base.is_some()
     }
 

@@ -1,6 +1,6 @@
 //! Factors of symmetric matrices by products of parts, which are fast where columns one by one are not.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Rows up to which a matrix is factored, or a triangle inverted, column by column.
 const FEW: usize = 24;
@@ -10,8 +10,11 @@ const PANEL: usize = 64;
 /// L of M = L Lᵀ, of which the lower half is read; `None` where M is not positive definite.
 ///
 /// Panel after panel: with M = (A · ; B C) and A = L Lᵀ, the rows below are P = B L⁻ᵀ and what is left is C − P Pᵀ.
-fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
+    if n <= PANEL {
+        return matrix.cholesky().map(Cholesky::unpack);
+    }
     for first in (0..n).step_by(PANEL) {
         let (wide, behind) = (PANEL.min(n - first), (first + PANEL).min(n));
         let own = matrix.view((first, first), (wide, wide)).into_owned().cholesky()?.unpack();

@@ -11,6 +11,16 @@ const WORTH_THREADS: usize = 1 << 20;
 
 /// A B.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    product_of(a, b, |_| a.ncols())
+}
+
+/// A B of an upper triangle B.
+pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    product_of(a, b, |columns| columns)
+}
+
+/// A B, of which the first columns, so many, have nothing below so many rows of B.
+fn product_of(a: &DMatrix<f64>, b: &DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) -> DMatrix<f64> {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < WORTH_THREADS || inner == 0 {
         return a * b;
@@ -18,8 +28,9 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(rows, columns);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * TOGETHER, own.len() / rows);
+        let filled = filled(first + count);
         let mut own = nalgebra::DMatrixViewMut::from_slice(own, rows, count);
-        own.gemm(1.0, a, &b.columns(first, count), 0.0);
+        own.gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
     };
     out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().for_each(form);
     out
@@ -28,11 +39,11 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 /// AᵀA: its upper triangle, mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    // The narrow side is transposed: this is the product that is fast.
-    let transposed = a.transpose();
     if rows * n * n < WORTH_THREADS {
-        return transposed * a;
+        return a.transpose() * a;
     }
+    // The narrow side is transposed: this is the product that is fast.
+    let transposed = transposed(a);
     let mut out = DMatrix::zeros(n, n);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * TOGETHER, own.len() / n);
@@ -42,6 +53,19 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     };
     out.as_mut_slice().par_chunks_mut(n * TOGETHER).enumerate().for_each(form);
     out.fill_lower_triangle_with_upper_triangle();
+    out
+}
+
+/// Aᵀ of a tall matrix.
+pub(crate) fn transposed(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, n) = a.shape();
+    let mut out = DMatrix::zeros(n, rows);
+    let form = |(part, own): (usize, &mut [f64])| {
+        let count = own.len() / n;
+        let mut own = nalgebra::DMatrixViewMut::from_slice(own, n, count);
+        a.rows(part * TOGETHER, count).transpose_to(&mut own);
+    };
+    out.as_mut_slice().par_chunks_mut((n * TOGETHER).max(1)).enumerate().for_each(form);
     out
 }
 
@@ -56,6 +80,8 @@ mod tests {
             let (a, b) = (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
             let scale = 1e-15 * rows as f64;
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
+            let upper = DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
+            assert!((product_with_upper(&a, &upper) - &a * &upper).amax() <= scale);
             let own = gram(&a);
             assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
         }

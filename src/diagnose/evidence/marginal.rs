@@ -9,7 +9,9 @@
 //! over a grid. c runs over what positions can show, from a third of σ to a hundred of it; ln f has a Cauchy
 //! distribution about 0: mostly a declared σ is right to a tenth, and where it is not, it may be far off.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
+
+use crate::numeric::lower_factor;
 
 /// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in steps of a twentieth, or closer: of half of what the likelihood
 /// of ν degrees of freedom is wide, 1/√(2ν).
@@ -110,8 +112,7 @@ impl Normal {
         match self {
             Self::Dense { product, .. } => {
                 // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
-                let factor = self.factor(size)?;
-                let lower = factor.l_dirty();
+                let lower = lower_factor(self.precision(size)?)?;
                 let mut taken = product.clone();
                 if !lower.solve_lower_triangular_mut(&mut taken) {
                     return None;
@@ -127,25 +128,25 @@ impl Normal {
                 let along = product.component_div(&root);
                 let mut inner = DMatrix::identity(less.nrows(), less.nrows());
                 inner.gemm(-1.0, &scaled, &scaled.transpose(), 1.0);
-                let factor = inner.cholesky()?;
+                let lower = lower_factor(inner)?;
                 let mut beside = scaled * &along;
-                if !factor.l_dirty().solve_lower_triangular_mut(&mut beside) {
+                if !lower.solve_lower_triangular_mut(&mut beside) {
                     return None;
                 }
-                let determinant = ln_product(&root, size) + ln_product(&factor.l_dirty().diagonal(), 1.0);
+                let determinant = ln_product(&root, size) + ln_product(&lower.diagonal(), 1.0);
                 Some((determinant, along.norm_squared() + beside.norm_squared()))
             }
         }
     }
 
-    /// The factor of 1/c² + G; `None` where G is not kept whole.
-    fn factor(&self, size: f64) -> Option<Cholesky<f64, Dyn>> {
+    /// 1/c² + G; `None` where G is not kept whole.
+    fn precision(&self, size: f64) -> Option<DMatrix<f64>> {
         let Self::Dense { gram, .. } = self else { return None };
         let mut inner = gram.clone();
         for j in 0..inner.nrows() {
             inner[(j, j)] += (size * size).recip();
         }
-        inner.cholesky()
+        Some(inner)
     }
 }
 
@@ -221,7 +222,8 @@ fn of_columns(
         let left = (squares - taken).max(0.0);
         let signs = match normal {
             Normal::Dense { product, .. } if never_negative.contains(&true) => normal
-                .factor(size)
+                .precision(size)
+                .and_then(DMatrix::cholesky)
                 .map(|factor| signs(&factor.inverse(), product, (left / freedom).sqrt().max(1.0), never_negative)),
             _ => None,
         };

@@ -110,20 +110,20 @@ impl Evidence {
         self
     }
 
-    /// Effects that may stand in the place of one of an explanation, each as probable without it as the part `beside` of it, best
-    /// first.
-    pub fn alternatives(&self, effect: &Effect, best: &Explanation, beside: f64) -> Vec<Effect> {
+    /// Effects that may stand in the place of one of those that a model holds, each as probable without it as the part `beside` of it,
+    /// best first.
+    pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
         // Of very many effects in a model most are in no explanation: nothing else need be looked at.
         let mut all = self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
         if !all.by_ref().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect)) {
             return Vec::new();
         }
-        let others: Vec<Effect> = best.effects().into_iter().filter(|own| own != effect).collect();
+        let others: Vec<&Effect> = held.iter().filter(|own| *own != effect).collect();
         // What an explanation holds beside these; of one that is searched another value stands for it where its own is not there.
         let beside_others = |explanation: &Explanation| {
             let mut rest = explanation.effects();
             for other in &others {
-                let exact = rest.iter().position(|known| known == other);
+                let exact = rest.iter().position(|known| known == *other);
                 let place = exact.or_else(|| rest.iter().position(|known| known.is_but_for_search(other)));
                 place.map(|place| rest.remove(place));
             }
@@ -219,11 +219,11 @@ mod tests {
             of(&[shift(12.0), drift()], 0.1),
             of(&[settling(), shift(10.0)], 0.1),
         ];
-        let best = explanations[0].clone();
+        let held = explanations[0].effects();
         let evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         // Two later moves together are twice as probable as settling.
-        assert_eq!(evidence.alternatives(&drift(), &best, 0.1), [shift(30.0), settling()]);
-        assert_eq!(evidence.alternatives(&shift(10.0), &best, 0.1), []);
+        assert_eq!(evidence.alternatives(&drift(), &held, 0.1), [shift(30.0), settling()]);
+        assert_eq!(evidence.alternatives(&shift(10.0), &held, 0.1), []);
     }
 
     #[test]

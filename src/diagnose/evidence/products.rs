@@ -1,7 +1,9 @@
 //! Products of the columns of hypotheses with one another and with the residual: what a set leaves, and what a further hypothesis gains
 //! beside it, is told by these alone. Each is made when the first set asks for it, and kept, further hypotheses or not.
 
-use std::sync::{Arc, OnceLock};
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -11,7 +13,7 @@ use super::marginal::{Noise, Normal, over_noise};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
 use crate::identify::Stop;
-use crate::numeric::inverse_factor;
+use crate::numeric::{inverse_factor, inverse_lower, lower_factor};
 
 /// Hypotheses whose gains are worked out together: one product of many columns is fast.
 const TOGETHER: usize = 16;
@@ -39,11 +41,52 @@ pub(super) struct Products<'a> {
     pub squares: f64,
     /// Of the noise.
     grid: Vec<(f64, f64)>,
-    members: Known,
+    known: Known,
 }
 
-/// Products that were made, by the number of the hypothesis.
-pub(super) type Known = Vec<OnceLock<Member>>;
+/// What was worked out, and stays true when further hypotheses come.
+#[derive(Default)]
+pub(super) struct Known {
+    /// Products, by the number of the hypothesis.
+    members: Vec<OnceLock<Member>>,
+    /// How many hypotheses there were each time that further ones came; 0 first.
+    came: Vec<usize>,
+    /// What some hypotheses gain beside a set.
+    gains: Recalled<Beside, Vec<(f64, f64)>>,
+    /// What settled sets come to.
+    settled: Recalled<Sized, (Vec<f64>, f64)>,
+}
+
+/// A set: its members and their sizes, in the order in which they were taken.
+type Sized = Vec<(usize, u64)>;
+/// A set, and hypotheses that are tried beside it.
+type Beside = (Sized, Vec<usize>);
+
+fn sized(members: &[usize], sizes: &[f64]) -> Sized {
+    members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
+}
+
+/// Results by what they are of.
+struct Recalled<K, V>(Mutex<BTreeMap<K, V>>);
+
+impl<K, V> Default for Recalled<K, V> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
+    /// What is known of `key`, or what `make` makes of it; that is kept where there is any.
+    fn recall(&self, key: &K, make: impl FnOnce(&K) -> Option<V>) -> Option<V> {
+        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = all().get(key).cloned();
+        known.or_else(|| {
+            let new = make(key)?;
+            all().insert(key.clone(), new.clone());
+            Some(new)
+        })
+    }
+}
 
 /// A hypothesis of some set.
 pub(super) struct Member {
@@ -57,22 +100,23 @@ pub(super) struct Member {
 
 impl<'a> Products<'a> {
     pub fn new((blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
-        Self::knowing(Known::new(), (blocks, target), rules)
+        Self::knowing(Known::default(), (blocks, target), rules)
     }
 
     /// The same where products of the first of these hypotheses are known.
     pub fn knowing(mut known: Known, (blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
         let squares = target.fit.residual().norm_squared();
-        for member in known.iter_mut().filter_map(OnceLock::get_mut) {
+        for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
             member.products.resize_with(blocks.len(), OnceLock::new);
         }
-        known.resize_with(blocks.len(), OnceLock::new);
-        Self { blocks, target, rules, squares, grid: target.noise.grid(), members: known }
+        known.came.push(known.members.len());
+        known.members.resize_with(blocks.len(), OnceLock::new);
+        Self { blocks, target, rules, squares, grid: target.noise.grid(), known }
     }
 
-    /// The products that were made.
+    /// What was worked out.
     pub fn into_known(self) -> Known {
-        self.members
+        self.known
     }
 
     /// ln of the density of a residual of such squares, up to a constant.
@@ -87,20 +131,50 @@ impl<'a> Products<'a> {
     }
 
     fn member(&self, block: usize) -> &Member {
-        if let Some(known) = self.members[block].get() {
+        if let Some(known) = self.known.members[block].get() {
             return known;
         }
         // Before the cell waits for it: a thread that helps others with this product may come to the same member.
         let columns = self.blocks[block].columns(&self.target.fit);
         let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
         let new = Member { transposed: columns.transpose(), columns, products };
-        self.members[block].get_or_init(|| new)
+        self.known.members[block].get_or_init(|| new)
     }
 
     /// AᵀC of a member of a set and another hypothesis.
     fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
         let member = self.member(member);
         member.products[other].get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
+    }
+
+    /// What each hypothesis that is tried gains beside a set at some sizes, and its most probable size; none where it is stopped, or the set
+    /// leaves nothing that can be told.
+    pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
+        let left = OnceCell::new();
+        let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
+        // What is multiplied together does not depend on what other threads know: so that rounding is the same for any number of them.
+        for came in self.known.came.iter().zip(self.known.came.iter().skip(1).chain([&self.blocks.len()])) {
+            let own: Vec<usize> = (0..tried.len()).filter(|&k| (*came.0..*came.1).contains(&tried[k])).collect();
+            if own.is_empty() {
+                continue;
+            }
+            let key = (sized(members, sizes), own.iter().map(|&k| tried[k]).collect::<Vec<usize>>());
+            let gains = self.known.gains.recall(&key, |(_, some)| {
+                let left = left.get_or_init(|| self.left(members, sizes)).as_ref()?;
+                Some(left.gains(some)).filter(|gains| gains.len() == some.len())
+            });
+            own.into_iter().zip(gains.unwrap_or_default()).for_each(|(k, gain)| all[k] = Some(gain));
+        }
+        all.into_iter().collect::<Option<_>>().unwrap_or_default()
+    }
+
+    /// What `settle` makes of a set at some sizes: the sizes that its members have beside one another, and ln of its posterior.
+    pub fn settled(
+        &self,
+        (members, sizes): (&[usize], &[f64]),
+        settle: impl FnOnce() -> Option<(Vec<f64>, f64)>,
+    ) -> Option<(Vec<f64>, f64)> {
+        self.known.settled.recall(&sized(members, sizes), |_| settle())
     }
 
     /// What a set leaves at some sizes.
@@ -188,12 +262,13 @@ impl Left<'_, '_> {
         // Of the lower L⁻¹D, columns of k have rows from the first of these on.
         let (first, count) = (self.begins[k], block.product().len());
         let own = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
-        let inner = (own.transpose() * &own).cholesky()?;
-        let ln_determinant = inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let lower = lower_factor(own.transpose() * &own)?;
+        let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let inverse = inverse_lower(&lower);
         let along = own.tr_mul(&self.taken.rows_range(first..));
-        let product = inner.solve(&along);
+        let product = inverse.tr_mul(&(&inverse * &along));
         let squares = self.squares + along.dot(&product);
-        let mut gram = inner.inverse();
+        let mut gram = inverse.transpose() * inverse;
         (0..count).for_each(|j| gram[(j, j)] -= 1.0);
         let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
         let (ln_summed, size) = block.over_sizes(&normal, (squares, target.noise.freedom), grid, rules);

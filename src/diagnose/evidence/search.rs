@@ -60,31 +60,40 @@ impl Set {
         if self.members.len() < 2 || self.has_wide(products.blocks, products.rules) {
             return self;
         }
-        let Some(mut all) = products.left(&self.members, &self.sizes) else { return self };
-        let mut summed = vec![0.0; self.members.len()];
+        let settled = products.settled((&self.members, &self.sizes), || self.at_rest(products));
+        if let Some((sizes, ln_posterior)) = settled {
+            (self.sizes, self.ln_posterior) = (sizes, ln_posterior);
+        }
+        self
+    }
+
+    /// The sizes of its members beside all others, and ln of its posterior at these.
+    fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
+        let (members, mut sizes) = (&self.members, self.sizes.clone());
+        let mut all = products.left(members, &sizes)?;
+        let mut summed = vec![0.0; members.len()];
         // Beside others that stayed a size stays.
-        let mut stale = vec![true; self.members.len()];
+        let mut stale = vec![true; members.len()];
         for _ in 0..SETTLING {
-            for k in 0..self.members.len() {
+            for k in 0..members.len() {
                 if !std::mem::take(&mut stale[k]) {
                     continue;
                 }
-                let Some((ln_summed, size)) = all.of_member(k) else { return self };
+                let (ln_summed, size) = all.of_member(k)?;
                 summed[k] = ln_summed;
-                if size.to_bits() != self.sizes[k].to_bits() {
+                if size.to_bits() != sizes[k].to_bits() {
                     stale.fill(true);
                     stale[k] = false;
-                    self.sizes[k] = size;
-                    let Some(at_new) = products.left(&self.members, &self.sizes) else { return self };
-                    all = at_new;
+                    sizes[k] = size;
+                    all = products.left(members, &sizes)?;
                 }
             }
         }
-        let further = |(k, &member)| products.ln_prior(&products.blocks[member], &self.members[..k]);
-        let prior: f64 = self.members.iter().enumerate().map(further).sum();
+        let further = |(k, &member)| products.ln_prior(&products.blocks[member], &members[..k]);
+        let prior: f64 = members.iter().enumerate().map(further).sum();
         let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
-        self.ln_posterior = all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
-        self
+        let ln_posterior = all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
+        Some((sizes, ln_posterior))
     }
 }
 
@@ -161,9 +170,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 
 /// A set with each of some further members.
 fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
-    let Some(left) = products.left(&set.members, &set.sizes) else { return Vec::new() };
     let new: Vec<usize> = tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
-    let gains = left.gains(&new);
+    let gains = products.gains(&set.members, &set.sizes, &new);
     new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
 }
 

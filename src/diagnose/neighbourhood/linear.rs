@@ -1,7 +1,7 @@
 //! A fit in its linear neighbourhood: what its residual can still give to columns that were not fitted, and what each
 //! fitted parameter gives it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use super::estimated::Estimated;
@@ -67,11 +67,19 @@ pub(crate) struct Share {
 impl LinearNeighbourhood {
     /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given; so many rows are
     /// `empty`: 0, since poses measure fewer numbers than three.
-    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
+    pub fn new<'m>(
+        jacobian: impl Into<DMatrixView<'m, f64>>,
+        residual: &DVector<f64>,
+        unknowns: &Unknowns,
+        empty: usize,
+    ) -> Self {
+        let jacobian: DMatrixView<f64> = jacobian.into();
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut columns = jacobian.clone().resize_vertically(rows + known.len(), 0.0);
+        let mut columns = DMatrix::zeros(rows + known.len(), n);
+        let long_columns = columns.as_mut_slice().par_chunks_mut((rows + known.len()).max(1)).enumerate();
+        long_columns.for_each(|(j, long)| long[..rows].copy_from_slice(jacobian.column(j).as_slice()));
         let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
         for (row, &(j, sigma)) in known.iter().enumerate() {
             columns[(rows + row, j)] = sigma.recip();
@@ -82,12 +90,12 @@ impl LinearNeighbourhood {
         let (basis, root) = match open(&active, &scale) {
             Some(open) => {
                 columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-                let (basis, within) = orthonormal(&product(&columns, &open), None);
+                let (basis, within) = orthonormal(product(&columns, &open), None);
                 let mut root = open * within;
                 root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
                 (basis, root)
             }
-            None => orthonormal(&columns, None),
+            None => orthonormal(columns, None),
         };
         let mut fit = Self {
             residual: long,
@@ -132,7 +140,7 @@ impl LinearNeighbourhood {
                 break;
             }
         }
-        let (new, within) = orthonormal(&left, Some(&lengths));
+        let (new, within) = orthonormal(left, Some(&lengths));
         let rank = new.ncols();
         self.basis = std::mem::take(&mut self.basis).resize_horizontally(first + rank, 0.0);
         self.basis.columns_range_mut(first..).copy_from(&new);
@@ -210,7 +218,7 @@ impl LinearNeighbourhood {
     fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let own = self.root.select_rows(unknowns).transpose();
         // U = T_xᵀ W with W = S⁻¹.
-        let (turned, within) = orthonormal(&own, None);
+        let (turned, within) = orthonormal(own, None);
         let x = self.optimum.select_rows(unknowns);
         (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
     }

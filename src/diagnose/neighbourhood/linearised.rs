@@ -1,6 +1,6 @@
 //! Columns of every effect without a fit of it: the derivative at the place where it enters, times what it is multiplied by.
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
 use crate::least_squares::{Block, LeastSquares};
@@ -93,8 +93,8 @@ impl<'a> Linearised<'a> {
     }
 
     /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
-    pub fn fitted(&self) -> DMatrix<f64> {
-        self.jacobian.columns(0, self.fitted + self.relaxed.len()).into_owned()
+    pub fn fitted(&self) -> DMatrixView<'_, f64> {
+        self.jacobian.columns(0, self.fitted + self.relaxed.len())
     }
 
     /// σ of the priors of what is relaxed, in the order of its columns.
@@ -225,13 +225,10 @@ fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVec
             block
         })
         .collect();
-    let mut row = 0;
-    for block in blocks {
-        for j in 0..n {
-            jacobian.view_mut((row, j), (block.rows(), 1)).copy_from_slice(block.column(j));
-        }
-        residual.rows_mut(row, block.rows()).copy_from_slice(block.column(n));
-        row += block.rows();
-    }
+    let gather = |(j, column): (usize, &mut [f64])| {
+        column.chunks_mut(3 * CHUNK).zip(&blocks).for_each(|(out, block)| out.copy_from_slice(block.column(j)));
+    };
+    jacobian.as_mut_slice().par_chunks_mut((3 * poses).max(1)).enumerate().for_each(gather);
+    gather((n, residual.as_mut_slice()));
     (jacobian, residual)
 }

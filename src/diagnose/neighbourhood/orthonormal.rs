@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::{gram, inverse_factor, inverse_lower, product};
+use crate::numeric::{gram, inverse_factor, inverse_lower, product_with_upper};
 
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
@@ -14,11 +14,11 @@ pub(crate) const RANK: f64 = 1e-6;
 /// them take up, have no part in it. `lengths` are those that a column had before others were projected out.
 ///
 /// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are directions of their own.
-pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
+pub(super) fn orthonormal(columns: DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
     let n = columns.ncols();
     let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
-    let (kept, first) = independent(columns, &own, lengths.unwrap_or(&own));
-    let mut basis = columns.select_columns(&kept);
+    let (kept, first) = independent(&columns, &own, lengths.unwrap_or(&own));
+    let mut basis = if kept.len() == n { columns } else { columns.select_columns(&kept) };
     let mut within = DMatrix::zeros(n, kept.len());
     for (k, &j) in kept.iter().enumerate() {
         basis.column_mut(k).unscale_mut(own[j]);
@@ -26,12 +26,12 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
     }
     // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
     let inverse = inverse_lower(&first).transpose();
-    basis = product(&basis, &inverse);
-    within *= inverse;
+    basis = product_with_upper(&basis, &inverse);
+    within = product_with_upper(&within, &inverse);
     // Once more, for what rounding left.
     let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
     let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
-    (product(&basis, &again), within * again)
+    (product_with_upper(&basis, &again), product_with_upper(&within, &again))
 }
 
 /// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn columns_that_nearly_depend_on_others_keep_a_basis() {
         let columns = DMatrix::from_fn(300, 60, |i, j| ((1.0 + 0.02 * j as f64) * i as f64 / 300.0).sin());
-        let (basis, within) = orthonormal(&columns, None);
+        let (basis, within) = orthonormal(columns, None);
         assert!(basis.ncols() > 3 && within.ncols() == basis.ncols(), "{}", basis.ncols());
         assert!((basis.transpose() * &basis - DMatrix::identity(basis.ncols(), basis.ncols())).amax() < 1e-10);
     }

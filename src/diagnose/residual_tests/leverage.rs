@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::diagnose::neighbourhood::LEAST_DECIDED;
-use crate::numeric::{gram, product};
+use crate::numeric::{gram, product, transposed};
 
 /// Degrees of freedom below which nothing is tested.
 const LEAST_FREEDOM: f64 = 4.0;
@@ -40,7 +40,7 @@ impl Leverage {
     /// The fit leaves too few degrees of freedom.
     pub fn of(fitted: &DMatrix<f64>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let p = fitted.ncols();
-        let (transposed, gram) = (fitted.transpose(), gram(fitted));
+        let (transposed, gram) = (transposed(fitted), gram(fitted));
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
         if freedom < LEAST_FREEDOM {
             return Err(Untestable::NoFreedom);

@@ -380,6 +380,7 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
 /// Every added effect with what is known of it; harmonics may share a prior.
 fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation)>, common_prior: bool) -> Vec<Found> {
     let added = rounds.added(fitted);
+    let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
     let stable = best.map(|best| stability(fitted, rounds.data, best, &added)).unwrap_or_default();
     // Of many orders under one prior none may stand out by itself.
     let tested = if common_prior { rounds.test(fitted, added.clone()) } else { rounds.tested(fitted) };
@@ -390,7 +391,8 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| {
-        let alternatives = best.map_or_else(Vec::new, |best| alternatives(best, &effect, rounds.data.rules.beside));
+        let alternatives =
+            best.map_or_else(Vec::new, |(evidence, _)| alternatives(evidence, &effect, &parts, rounds.data.rules.beside));
         let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
         Found {
             stability: own.reduce(f64::min),
@@ -415,9 +417,9 @@ fn claims(evidence: &Evidence, effect: &Effect, several: usize) -> Option<Claims
 }
 
 /// What may stand in the place of an effect: of a family at one place the most probable.
-fn alternatives((evidence, best): (&Evidence, &Explanation), effect: &Effect, beside: f64) -> Vec<Effect> {
+fn alternatives(evidence: &Evidence, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
     let mut all: Vec<Effect> = Vec::new();
-    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, best, beside)) {
+    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, held, beside)) {
         let is_known = |known: &Effect| known.name_and_place() == other.name_and_place();
         if !all.iter().any(is_known) {
             all.push(other);

@@ -134,8 +134,13 @@ struct Rows<'a> {
     values: &'a [f64],
 }
 
-/// The cause of an effect at the fit of `problem`, which declares it.
-pub fn of(found: &Effect, problem: &Problem, arm: &Arm, poses: &Poses) -> Option<Cause> {
+/// The cause of an effect at the fit of `problem`, which declares it, and what that fit leaves of every row.
+pub fn of(
+    found: &Effect,
+    problem: &Problem,
+    (arm, left): (&Arm, &[Vector3<f64>]),
+    poses: &Poses,
+) -> Option<Cause> {
     let parameters = found.parameters(problem);
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
@@ -143,12 +148,12 @@ pub fn of(found: &Effect, problem: &Problem, arm: &Arm, poses: &Poses) -> Option
     for &k in &places {
         without.x[k] = 0.0;
     }
-    let (left, with) = (poses.errors(arm, &poses.rows()), poses.errors(&without, &poses.rows()));
+    let with = poses.errors(&without, &poses.rows());
     let all = poses.all(1.0);
     let values: Vec<f64> = places.iter().map(|&k| arm.x[k]).collect();
     let rows = Rows {
         poses: all.iter().map(|pose| pose.setup).collect(),
-        own: with.iter().zip(&left).map(|(with, left)| with - left).collect(),
+        own: with.iter().zip(left).map(|(with, left)| with - left).collect(),
         parameters: &parameters,
         values: &values,
     };

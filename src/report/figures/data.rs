@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::arm::{Arm, Poses};
 use super::cause::{self, Cause};
 use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted};
-use crate::diagnose::{ClosedLoop, Findings, examine};
+use crate::diagnose::{ClosedLoop, Findings, Found, examine};
 use crate::error::{Location, Warning};
 use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
 use crate::measurement::Dataset;
@@ -119,9 +120,11 @@ impl PlotData {
             identified(&poses, &before, fit),
             stage(&poses, Stage::Closed, &after),
         ];
-        let effects = closure.effects.iter();
+        let left = poses.errors(&after, &poses.rows());
+        let cause = |found: &Found| cause::of(&found.effect, &closure.closed, (&after, &left), &poses);
+        let causes: Vec<Option<Cause>> = closure.effects.par_iter().map(cause).collect();
         Ok(Self {
-            causes: effects.filter_map(|found| cause::of(&found.effect, &closure.closed, &after, &poses)).collect(),
+            causes: causes.into_iter().flatten().collect(),
             trend: closure.unexplained.iter().find_map(|left| cause::unexplained(left, &closure.closed, poses.split)),
             ..Self::of(&closure.closed, &poses, stages, (&after, &closure.after), closure.findings.clone())
         })
