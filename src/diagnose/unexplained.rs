@@ -67,7 +67,8 @@ pub struct PartialResidual {
     pub lever: f64,
 }
 
-/// What is known of structure that has no law, the surest first, with the correction of the first.
+/// What is known of structure that has no law, the surest first, with the correction of the first: of the functions of the best explanation
+/// those that are at work as surely as `located` says, or all where there are as many hypotheses as surely.
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
@@ -76,6 +77,9 @@ pub(super) fn without_law(
     let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
+        if evidence.as_many(best).max(claims.law.1) < data.rules.located {
+            continue;
+        }
         let found = Unexplained {
             part: Some(hypothesis.part),
             depends_on: hypothesis.depends_on.clone(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Rows up to which a matrix is factored, or a triangle inverted, column by column.
+/// Rows up to which a triangle is solved with, or inverted, column by column.
 const FEW: usize = 24;
 /// Columns that are factored together.
 const PANEL: usize = 64;
@@ -19,7 +19,7 @@ pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
         let (wide, behind) = (PANEL.min(n - first), (first + PANEL).min(n));
         let own = matrix.view((first, first), (wide, wide)).into_owned().cholesky()?.unpack();
         let mut across = matrix.view((behind, first), (n - behind, wide)).transpose();
-        own.solve_lower_triangular_mut(&mut across);
+        solve_lower(&own, &mut across);
         let panel = across.transpose();
         for next in (behind..n).step_by(PANEL) {
             let (count, place) = (PANEL.min(n - next), next - behind);
@@ -31,6 +31,18 @@ pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     }
     matrix.fill_upper_triangle(0.0, 1);
     Some(matrix)
+}
+
+/// Makes L⁻¹B of B, a few rows after the other: of those before them a product is taken off.
+fn solve_lower(lower: &DMatrix<f64>, right: &mut DMatrix<f64>) {
+    let n = lower.nrows();
+    for first in (0..n).step_by(FEW) {
+        let count = FEW.min(n - first);
+        let (known, mut rest) = right.rows_range_pair_mut(..first, first..);
+        let mut own = rest.rows_mut(0, count);
+        own.gemm(-1.0, &lower.view((first, 0), (count, first)), &known, 1.0);
+        lower.view((first, first), (count, count)).solve_lower_triangular_mut(&mut own);
+    }
 }
 
 /// L⁻¹ of a lower triangle whose diagonal has no zero.

@@ -1,11 +1,12 @@
 //! How much of each pose the fit takes away, and what it would leave without some of its poses.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::diagnose::neighbourhood::LEAST_DECIDED;
-use crate::numeric::{gram, product, transposed};
+use crate::numeric::{gram, product, product_with_upper, transposed};
 
 /// Degrees of freedom below which nothing is tested.
 const LEAST_FREEDOM: f64 = 4.0;
@@ -21,6 +22,8 @@ pub(super) struct Leverage {
     pub fitted: DMatrix<f64>,
     /// Qᵀ.
     pub transposed: DMatrix<f64>,
+    /// QᵀQ.
+    gram: DMatrix<f64>,
     /// A root of I − QᵀQ, shape = (p, k): what priors add to the residuals, k directions.
     pub prior: DMatrix<f64>,
     /// Degrees of freedom ν = tr(I − H).
@@ -46,8 +49,8 @@ impl Leverage {
             return Err(Untestable::NoFreedom);
         }
         let squared_freedom = freedom - gram.trace() + gram.norm_squared();
-        let prior = prior_root(DMatrix::identity(p, p) - gram);
-        let whiteners = (0..fitted.nrows() / 3).map(|pose| {
+        let prior = prior_root(DMatrix::identity(p, p) - &gram);
+        let whiteners = (0..fitted.nrows() / 3).into_par_iter().map(|pose| {
             let rows = transposed.columns(3 * pose, 3);
             let taken = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
             inverse_root(Matrix3::identity() - taken)
@@ -59,6 +62,7 @@ impl Leverage {
             squared_freedom,
             whiteners: whiteners.collect(),
             transposed,
+            gram,
             coordinates,
         })
     }
@@ -128,7 +132,7 @@ impl Kept {
         let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
         let residual = fit.residual.select_rows(&kept) + &fitted * pull;
         let inverse = decided.l().solve_lower_triangular(&DMatrix::identity(p, p))?;
-        let fitted = product(&fitted, &inverse.transpose());
+        let fitted = product_with_upper(&fitted, &inverse.transpose());
         Some(Self { poses, residual, leverage: Leverage::of(&fitted, coordinates).ok()? })
     }
 }
@@ -149,11 +153,12 @@ pub(super) struct Others {
 /// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a,  tr H becomes tr H − tr H_bb + tr D (W − H_bb²)
 pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
     let fitted = &leverage.fitted;
-    let gram_rows = product(&gram(fitted), &leverage.transposed);
+    let gram_rows = product(&leverage.gram, &leverage.transposed);
     let again = fitted * (&leverage.transposed * residual);
     let total = residual.norm_squared();
     let poses = residual.as_slice().chunks_exact(3).zip(again.as_slice().chunks_exact(3)).zip(&leverage.whiteners);
-    let others = poses.enumerate().map(|(pose, ((own, again), whitener))| {
+    let poses: Vec<_> = poses.collect();
+    let others = poses.into_par_iter().enumerate().map(|(pose, ((own, again), whitener))| {
         let (own, again) = (Vector3::from_column_slice(own), Vector3::from_column_slice(again));
         let rows = leverage.transposed.columns(3 * pose, 3);
         let products = |of: &DMatrix<f64>| Matrix3::from_fn(|i, j| rows.column(i).dot(&of.column(3 * pose + j)));

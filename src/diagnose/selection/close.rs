@@ -163,8 +163,7 @@ pub fn close_by(
     let is_wanted = trusted && !(interrupted && added.is_empty());
     let evidence = evidence.or_else(|| if is_wanted { weigh(&fitted, &data, taken_out) } else { None });
     let best = evidence.as_ref().and_then(|all| Some((all, all.sure(rules.sure)?)));
-    let located = best.filter(|(all, best)| all.as_many(best) >= rules.located);
-    let mut unexplained = located.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
+    let mut unexplained = best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
     let effects = found(&rounds, &fitted, best, harmonic_prior.is_some());
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
