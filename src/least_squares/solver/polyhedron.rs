@@ -50,6 +50,15 @@ impl Faces {
         self.bounds.iter().all(Option::is_none) && !self.rows.contains(&true)
     }
 
+    /// Takes over the last difference to others.
+    pub(super) fn take_last_of(&mut self, other: &Self) {
+        if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {
+            self.rows[i] = other.rows[i];
+        } else if let Some(j) = (0..self.bounds.len()).rfind(|&j| self.bounds[j] != other.bounds[j]) {
+            self.bounds[j] = other.bounds[j];
+        }
+    }
+
     /// Half-spaces among the faces.
     fn chosen(&self) -> Vec<usize> {
         (0..self.rows.len()).filter(|&i| self.rows[i]).collect()

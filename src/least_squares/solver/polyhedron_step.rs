@@ -11,8 +11,10 @@ use crate::least_squares::{Linearisation, Triangle};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 pub(super) const NEAR: f64 = 1e-6;
-/// Corrections of the active set allowed to a guess: each costs a factorisation, the interior point some twenty.
+/// Corrections of the active set allowed to a guess, of all faces at once and then of one at a time: each costs a factorisation, the
+/// interior point some twenty and more.
 const GUESSES: usize = 10;
+const ONE_BY_ONE: usize = 40;
 /// Corrections allowed to the faces near the interior point.
 const CORRECTIONS: usize = 30;
 /// Rounding allowed in the optimality conditions.
@@ -46,10 +48,10 @@ impl<'a> PolyhedronProblem<'a> {
 
     /// The minimiser for damping λ, exact on its faces.
     pub(super) fn solve(&mut self, lambda: f64) -> PolyhedronSolution {
-        let solution = self.polish(self.guess.clone(), lambda, GUESSES).unwrap_or_else(|| {
+        let solution = self.polish(self.guess.clone(), lambda, (GUESSES, ONE_BY_ONE)).unwrap_or_else(|| {
             let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None).map(|(q, _)| q);
             let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, NEAR);
-            let polished = interior.as_ref().and_then(|q| self.polish(near(q), lambda, CORRECTIONS));
+            let polished = interior.as_ref().and_then(|q| self.polish(near(q), lambda, (CORRECTIONS, 0)));
             polished.unwrap_or_else(|| {
                 let q = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
                 self.polyhedron.within(q, 0.0)
@@ -59,11 +61,17 @@ impl<'a> PolyhedronProblem<'a> {
         solution
     }
 
-    /// Solves on some faces and corrects the choice until the optimality conditions hold, within `corrections` rounds.
+    /// Solves on some faces and corrects the choice until the optimality conditions hold, within so many rounds.
     ///
-    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed.
-    fn polish(&self, mut faces: Faces, lambda: f64, corrections: usize) -> Option<PolyhedronSolution> {
-        for _ in 0..corrections {
+    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed: all of them `at_once`, which may run
+    /// in circles, then the last of them alone, which does not where the minimiser is unique [Murty 1974; Júdice & Pires 1994].
+    fn polish(
+        &self,
+        mut faces: Faces,
+        lambda: f64,
+        (at_once, one_by_one): (usize, usize),
+    ) -> Option<PolyhedronSolution> {
+        for round in 0..at_once + one_by_one {
             let q = self.on_faces(&faces, lambda);
             let corrected = self.corrected(&faces, &q, lambda);
             if corrected == faces {
@@ -71,7 +79,7 @@ impl<'a> PolyhedronProblem<'a> {
                 let holds = (0..faces.rows.len()).all(|i| !self.polyhedron.leaves(i, &q));
                 return holds.then_some(PolyhedronSolution { q, faces });
             }
-            faces = corrected;
+            if round < at_once { faces = corrected } else { faces.take_last_of(&corrected) }
         }
         None
     }

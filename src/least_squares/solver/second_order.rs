@@ -10,12 +10,12 @@ const FORECAST: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 const CLOSE_FORECAST: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// Misses after which steps are bent.
 const BENDING_MISSES: usize = 2;
-/// Misses, and slow steps, of linearised residuals after which S is formed; for many unknowns, such a part of their number, since
-/// forming S costs about as many linearisations as there are unknowns.
+/// Misses of linearised residuals after which S is formed; for many unknowns, such a part of their number, since forming S costs about as
+/// many linearisations as there are unknowns.
 const MISSES: usize = 15;
 const MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
+/// Slow steps after which S is formed, if as many steps as there are unknowns would follow without it.
 const SLOW_STEPS: usize = 3;
-const SLOW_STEPS_PER_UNKNOWN: f64 = 1.0 / 12.0;
 /// Steps for each unknown after which S may be formed again.
 const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
 /// A step without damping is slow if it is longer than this part of the one before.
@@ -88,11 +88,22 @@ impl SecondOrder {
         self.misses += usize::from(!FORECAST.contains(&ratio));
     }
 
-    /// Takes in a step of length ‖D p‖; whether S should be formed at the point where the solver is now.
-    pub fn judge(&mut self, ratio: f64, taken: bool, (length, damping): (f64, f64), unknowns: usize) -> bool {
+    /// Takes in a step of length ‖D p‖, whose forecast was so many times the gain below which no step is worth it; whether S should be
+    /// formed at the point where the solver is now.
+    ///
+    /// Steps that shrink by a factor s gain s² times what the one before did: of those to come there are ln(forecast / least) / (2 ln 1/s).
+    pub fn judge(
+        &mut self,
+        (ratio, taken): (f64, bool),
+        (length, damping): (f64, f64),
+        forecast: f64,
+        unknowns: usize,
+    ) -> bool {
         let near = self.matrix.is_some() && damping == 0.0;
         let missed = !(if near { CLOSE_FORECAST } else { FORECAST }).contains(&ratio);
-        let slow = taken && damping == 0.0 && self.last.is_some_and(|last| length > SLOW * last);
+        let shrinks = self.last.map(|last| length / last).filter(|_| taken && damping == 0.0);
+        let slow = shrinks.is_some_and(|by| by > SLOW);
+        let to_come = shrinks.map_or(0.0, |by| if by < 1.0 { -0.5 * forecast.ln() / by.ln() } else { f64::INFINITY });
         self.last = (taken && damping == 0.0).then_some(length);
         self.misses += usize::from(missed);
         self.slow += usize::from(slow);
@@ -103,7 +114,7 @@ impl SecondOrder {
             Some(_) => self.age as f64 >= part(STEPS_PER_UNKNOWN),
             None => {
                 self.misses as f64 >= part(MISSES_PER_UNKNOWN).max(MISSES as f64)
-                    || self.slow as f64 >= part(SLOW_STEPS_PER_UNKNOWN).max(SLOW_STEPS as f64)
+                    || (self.slow >= SLOW_STEPS && to_come > part(1.0))
             }
         };
         (missed || slow) && enough && !self.fresh && !self.retired && self.times < MOST_TIMES

@@ -396,7 +396,12 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
                 self.second_order.watch(forecast);
             }
             let renew = self.subproblem.is_confined()
-                && self.second_order.judge(forecast, taken, (trial.length, trial.damping), x.len());
+                && self.second_order.judge(
+                    (forecast, taken),
+                    (trial.length, trial.damping),
+                    trial.predicted / self.settings.cost_tolerance,
+                    x.len(),
+                );
             if renew {
                 let within = |x: &DVector<f64>| self.subproblem.admits(x);
                 self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
