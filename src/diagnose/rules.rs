@@ -112,7 +112,8 @@ pub struct SelectionRules {
     /// Probability from which on there are as many hypotheses as an explanation has: what the loop adds. What is more probable than not: of
     /// one model alone that predicts best [Barbieri and Berger 2004]. What is named as found is for `stated`.
     pub sure: f64,
-    /// The same of an explanation whose functions without a law are stated as structure that is left.
+    /// Probability from which on functions without a law are stated as structure that is left: that there are as many hypotheses as in their
+    /// explanation, or that some function is at work at the part of one of them.
     pub located: f64,
     /// Probability of a law from which on an effect is named as found; below it is a place with a law such as this one.
     pub stated: f64,

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::covariate::Covariate;
 use super::data::Data;
-use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part, best_form};
+use super::evidence::{Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part, best_form, odds_against};
 use super::fitted::Fitted;
 use super::residual_tests::Findings;
 use crate::identify::ErrorSummary;
@@ -67,23 +67,27 @@ pub struct PartialResidual {
     pub lever: f64,
 }
 
-/// What is known of structure that has no law, the surest first, with the correction of the first: of the functions of the best explanation
-/// those that are at work as surely as `located` says, or all where there are as many hypotheses as surely.
+/// What is known of structure that has no law, the surest first, with the correction of the first.
+///
+/// All functions of the best explanation are stated where there are as many hypotheses as surely as `located` says, whichever they are.
+/// Otherwise those are at whose part some function is at work as surely, one of a part.
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
     (evidence, best): (&Evidence, &Explanation),
 ) -> Vec<Unexplained> {
     let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
+    let are_all_sure = evidence.as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
-        if evidence.as_many(best).max(claims.law.1) < data.rules.located {
+        let is_known = all.iter().any(|(known, _)| known.part == hypothesis.part);
+        if !are_all_sure && (claims.law.1 < data.rules.located || is_known) {
             continue;
         }
         let found = Unexplained {
             part: Some(hypothesis.part),
             depends_on: hypothesis.depends_on.clone(),
-            p_value: evidence.chance(best),
+            p_value: evidence.chance(best).min(odds_against(claims.law.1)),
             claims: Some(claims),
             correction: None,
         };

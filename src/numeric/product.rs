@@ -14,7 +14,7 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product_of(a, b, |_| a.ncols())
 }
 
-/// A B of an upper triangle B.
+/// A B of a square upper triangle B.
 pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     product_of(a, b, |columns| columns)
 }

@@ -6,7 +6,7 @@ use super::candidate::{Candidate, even};
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, Law};
 use super::marginal::Coefficients;
-use super::products::{Products, Target};
+use super::products::Products;
 use super::search::{Weighted, left_by};
 use crate::diagnose::rules::SelectionRules;
 use crate::problem::{Effect, Problem};
@@ -26,11 +26,11 @@ const BETTER: f64 = 0.5;
 pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
-    (blocks, target): (&[Block], &Target),
+    products: &Products,
     blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
-    (problem, rules): (&Problem, &SelectionRules),
+    problem: &Problem,
 ) -> Vec<Candidate> {
-    let products = Products::new((blocks, target), rules);
+    let Products { blocks, target, rules, .. } = *products;
     let mut found: Vec<Candidate> = Vec::new();
     for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK).take(MOST) {
         for &member in &set.members {
@@ -45,7 +45,7 @@ pub(super) fn finer(
             let mut rests: Vec<Vec<usize>> = vec![without_own, without_alike];
             rests.dedup();
             for rest in &rests {
-                let Some(left) = left_by(rest, &products) else { continue };
+                let Some(left) = left_by(rest, products) else { continue };
                 let mut best: Option<Candidate> = None;
                 let mut least = left.gain(member).0 + products.ln_prior(&blocks[member], rest) + BETTER;
                 for farthest in FARTHEST {

@@ -110,9 +110,9 @@ impl Normal {
     fn taken(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
-            Self::Dense { product, .. } => {
+            Self::Dense { gram, product } => {
                 // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
-                let lower = lower_factor(self.precision(size)?)?;
+                let lower = lower_factor(with_prior(gram, precision))?;
                 let mut taken = product.clone();
                 if !lower.solve_lower_triangular_mut(&mut taken) {
                     return None;
@@ -138,16 +138,15 @@ impl Normal {
             }
         }
     }
+}
 
-    /// 1/c² + G; `None` where G is not kept whole.
-    fn precision(&self, size: f64) -> Option<DMatrix<f64>> {
-        let Self::Dense { gram, .. } = self else { return None };
-        let mut inner = gram.clone();
-        for j in 0..inner.nrows() {
-            inner[(j, j)] += (size * size).recip();
-        }
-        Some(inner)
+/// 1/c² + G, for a precision 1/c².
+fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
+    let mut inner = gram.clone();
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += precision;
     }
+    inner
 }
 
 /// ln Π c dⱼ, a few factors at a time before their product runs out of range.
@@ -221,10 +220,11 @@ fn of_columns(
         let Some((determinant, taken)) = normal.taken(size) else { return f64::NEG_INFINITY };
         let left = (squares - taken).max(0.0);
         let signs = match normal {
-            Normal::Dense { product, .. } if never_negative.contains(&true) => normal
-                .precision(size)
-                .and_then(DMatrix::cholesky)
-                .map(|factor| signs(&factor.inverse(), product, (left / freedom).sqrt().max(1.0), never_negative)),
+            Normal::Dense { gram, product } if never_negative.contains(&true) => {
+                with_prior(gram, (size * size).recip())
+                    .cholesky()
+                    .map(|factor| signs(&factor.inverse(), product, (left / freedom).sqrt().max(1.0), never_negative))
+            }
             _ => None,
         };
         signs.unwrap_or(0.0) - determinant + over_noise(left, grid)

@@ -40,6 +40,7 @@ pub use explanation::Explanation;
 pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
 pub use hypothesis::{Hypothesis, Law, Part};
+pub(super) use posterior::odds_against;
 pub use posterior::{Claims, Evidence};
 use products::{Known, Products};
 use search::{Weighted, search};
@@ -156,7 +157,9 @@ fn weighed_without<'a>(
         hypotheses.all.extend(unlisted);
         (weighted, known) = again(known, &blocks);
     }
-    let finer = finer::finer(&hypotheses, &weighted, (&blocks, &target), blocks_of, (&fitted.problem, data.rules));
+    let products = Products::knowing(known, (&blocks, &target), data.rules);
+    let finer = finer::finer(&hypotheses, &weighted, &products, blocks_of, &fitted.problem);
+    known = products.into_known();
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
         hypotheses.all.extend(finer);

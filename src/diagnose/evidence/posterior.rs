@@ -29,6 +29,11 @@ pub struct Claims {
     pub law: (Hypothesis, f64),
 }
 
+/// The odds against what is so probable, no more than even: the chance of [`Evidence::chance`].
+pub(in crate::diagnose) fn odds_against(probability: f64) -> f64 {
+    ((1.0 - probability).max(NEGLIGIBLE) / probability.max(NEGLIGIBLE)).min(1.0)
+}
+
 impl Evidence {
     /// The most probable explanation.
     pub fn best(&self) -> &[Hypothesis] {
@@ -58,7 +63,7 @@ impl Evidence {
     pub fn chance(&self, best: &Explanation) -> f64 {
         let is_fewer = |known: &&Explanation| known.hypotheses.len() < best.hypotheses.len();
         let fewer: f64 = self.explanations.iter().filter(is_fewer).map(|known| known.probability).sum();
-        (fewer.max(NEGLIGIBLE) / (1.0 - fewer).max(NEGLIGIBLE)).min(1.0)
+        odds_against(1.0 - fewer)
     }
 
     /// Explanations with an effect in the place of another hypothesis of `best`: the most probable ones, and those that do best in the place of

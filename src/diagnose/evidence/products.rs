@@ -44,25 +44,26 @@ pub(super) struct Products<'a> {
     known: Known,
 }
 
-/// What was worked out, and stays true when further hypotheses come.
+/// What was worked out of some hypotheses about one target by one set of rules, and stays true when further ones come behind them, as long as
+/// their own chances stay.
 #[derive(Default)]
 pub(super) struct Known {
     /// Products, by the number of the hypothesis.
     members: Vec<OnceLock<Member>>,
-    /// How many hypotheses there were each time that further ones came; 0 first.
+    /// How many hypotheses there were each time that further ones had come; 0 first.
     came: Vec<usize>,
     /// What some hypotheses gain beside a set.
     gains: Recalled<Beside, Vec<(f64, f64)>>,
     /// What settled sets come to.
-    settled: Recalled<Sized, (Vec<f64>, f64)>,
+    settled: Recalled<AtSizes, (Vec<f64>, f64)>,
 }
 
 /// A set: its members and their sizes, in the order in which they were taken.
-type Sized = Vec<(usize, u64)>;
+type AtSizes = Vec<(usize, u64)>;
 /// A set, and hypotheses that are tried beside it.
-type Beside = (Sized, Vec<usize>);
+type Beside = (AtSizes, Vec<usize>);
 
-fn sized(members: &[usize], sizes: &[f64]) -> Sized {
+fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
 }
 
@@ -77,11 +78,11 @@ impl<K, V> Default for Recalled<K, V> {
 
 impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
     /// What is known of `key`, or what `make` makes of it; that is kept where there is any.
-    fn recall(&self, key: &K, make: impl FnOnce(&K) -> Option<V>) -> Option<V> {
+    fn recall(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
         let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all().get(key).cloned();
         known.or_else(|| {
-            let new = make(key)?;
+            let new = make()?;
             all().insert(key.clone(), new.clone());
             Some(new)
         })
@@ -103,14 +104,17 @@ impl<'a> Products<'a> {
         Self::knowing(Known::default(), (blocks, target), rules)
     }
 
-    /// The same where products of the first of these hypotheses are known.
+    /// The same where much of the first of these hypotheses is known.
     pub fn knowing(mut known: Known, (blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
         let squares = target.fit.residual().norm_squared();
         for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
             member.products.resize_with(blocks.len(), OnceLock::new);
         }
-        known.came.push(known.members.len());
         known.members.resize_with(blocks.len(), OnceLock::new);
+        if known.came.is_empty() {
+            known.came.push(0);
+        }
+        known.came.push(blocks.len());
         Self { blocks, target, rules, squares, grid: target.noise.grid(), known }
     }
 
@@ -152,16 +156,17 @@ impl<'a> Products<'a> {
     pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
         let left = OnceCell::new();
         let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
-        // What is multiplied together does not depend on what other threads know: so that rounding is the same for any number of them.
-        for came in self.known.came.iter().zip(self.known.came.iter().skip(1).chain([&self.blocks.len()])) {
-            let own: Vec<usize> = (0..tried.len()).filter(|&k| (*came.0..*came.1).contains(&tried[k])).collect();
+        // Cut where hypotheses came, so that a list that was tried before is found again, and what is multiplied together, whose rounding
+        // it decides, does not depend on what other threads have found by now.
+        for came in self.known.came.windows(2) {
+            let own: Vec<usize> = (0..tried.len()).filter(|&k| (came[0]..came[1]).contains(&tried[k])).collect();
             if own.is_empty() {
                 continue;
             }
-            let key = (sized(members, sizes), own.iter().map(|&k| tried[k]).collect::<Vec<usize>>());
-            let gains = self.known.gains.recall(&key, |(_, some)| {
+            let key = (at_sizes(members, sizes), own.iter().map(|&k| tried[k]).collect::<Vec<usize>>());
+            let gains = self.known.gains.recall(&key, || {
                 let left = left.get_or_init(|| self.left(members, sizes)).as_ref()?;
-                Some(left.gains(some)).filter(|gains| gains.len() == some.len())
+                Some(left.gains(&key.1)).filter(|gains| gains.len() == own.len())
             });
             own.into_iter().zip(gains.unwrap_or_default()).for_each(|(k, gain)| all[k] = Some(gain));
         }
@@ -174,7 +179,7 @@ impl<'a> Products<'a> {
         (members, sizes): (&[usize], &[f64]),
         settle: impl FnOnce() -> Option<(Vec<f64>, f64)>,
     ) -> Option<(Vec<f64>, f64)> {
-        self.known.settled.recall(&sized(members, sizes), |_| settle())
+        self.known.settled.recall(&at_sizes(members, sizes), settle)
     }
 
     /// What a set leaves at some sizes.

@@ -390,8 +390,8 @@ fn found(rounds: &Rounds, fitted: &Fitted, best: Option<(&Evidence, &Explanation
         step.map_or(fitted.found.fitted.held_out, |step| step.held_out)
     };
     let one = |effect: Effect| {
-        let alternatives =
-            best.map_or_else(Vec::new, |(evidence, _)| alternatives(evidence, &effect, &parts, rounds.data.rules.beside));
+        let alternatives = best
+            .map_or_else(Vec::new, |(evidence, _)| alternatives(evidence, &effect, &parts, rounds.data.rules.beside));
         let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
         Found {
             stability: own.reduce(f64::min),

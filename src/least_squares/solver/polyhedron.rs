@@ -50,6 +50,12 @@ impl Faces {
         self.bounds.iter().all(Option::is_none) && !self.rows.contains(&true)
     }
 
+    /// How many faces are those of one alone.
+    pub(super) fn differences(&self, other: &Self) -> usize {
+        let rows = self.rows.iter().zip(&other.rows).filter(|(own, other)| own != other).count();
+        rows + self.bounds.iter().zip(&other.bounds).filter(|(own, other)| own != other).count()
+    }
+
     /// Takes over the last difference to others.
     pub(super) fn take_last_of(&mut self, other: &Self) {
         if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {

@@ -63,15 +63,17 @@ impl<'a> PolyhedronProblem<'a> {
 
     /// Solves on some faces and corrects the choice until the optimality conditions hold, within so many rounds.
     ///
-    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed: all of them `at_once`, which may run
-    /// in circles, then the last of them alone, which does not where the minimiser is unique [Murty 1974; Júdice & Pires 1994].
+    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed: all of them, as long as in so many
+    /// rounds `at_once` fewer become wrong, for that may run in circles; else the last of them alone, which does not, but for rounding, where
+    /// the problem is strictly convex and its faces independent [Murty 1974; Júdice & Pires 1994].
     fn polish(
         &self,
         mut faces: Faces,
         lambda: f64,
         (at_once, one_by_one): (usize, usize),
     ) -> Option<PolyhedronSolution> {
-        for round in 0..at_once + one_by_one {
+        let (mut fewest, mut tries) = (usize::MAX, at_once);
+        for _ in 0..at_once + one_by_one {
             let q = self.on_faces(&faces, lambda);
             let corrected = self.corrected(&faces, &q, lambda);
             if corrected == faces {
@@ -79,7 +81,16 @@ impl<'a> PolyhedronProblem<'a> {
                 let holds = (0..faces.rows.len()).all(|i| !self.polyhedron.leaves(i, &q));
                 return holds.then_some(PolyhedronSolution { q, faces });
             }
-            if round < at_once { faces = corrected } else { faces.take_last_of(&corrected) }
+            let wrong = faces.differences(&corrected);
+            if wrong < fewest {
+                (fewest, tries) = (wrong, at_once);
+            }
+            if tries > 0 {
+                faces = corrected;
+            } else {
+                faces.take_last_of(&corrected);
+            }
+            tries = tries.saturating_sub(1);
         }
         None
     }

@@ -14,7 +14,7 @@ const BENDING_MISSES: usize = 2;
 /// many linearisations as there are unknowns.
 const MISSES: usize = 15;
 const MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
-/// Slow steps after which S is formed, if as many steps as there are unknowns would follow without it.
+/// Slow steps in a row after which S is formed, if without it more steps would follow than it costs, or than are left; no fewer must be left.
 const SLOW_STEPS: usize = 3;
 /// Steps for each unknown after which S may be formed again.
 const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
@@ -37,9 +37,8 @@ const LEAST_DAMPING: f64 = 1e-10;
 #[derive(Debug, Clone, Default)]
 pub(super) struct SecondOrder {
     misses: usize,
-    slow: usize,
-    /// ‖D p‖ of the last step without damping.
-    last: Option<f64>,
+    /// ‖D p‖ of the last steps, in a row, without damping.
+    lengths: Vec<f64>,
     matrix: Option<DMatrix<f64>>,
     /// Whether S was formed at the present point, and how many steps ago.
     fresh: bool,
@@ -88,36 +87,47 @@ impl SecondOrder {
         self.misses += usize::from(!FORECAST.contains(&ratio));
     }
 
-    /// Takes in a step of length ‖D p‖, whose forecast was so many times the gain below which no step is worth it; whether S should be
-    /// formed at the point where the solver is now.
-    ///
-    /// Steps that shrink by a factor s gain s² times what the one before did: of those to come there are ln(forecast / least) / (2 ln 1/s).
+    /// Takes in a step of length ‖D p‖, `left` others being left; whether S should be formed at the point where the solver is now. The
+    /// forecast of its gain was `worth` times the gain below which no step is worth it.
     pub fn judge(
         &mut self,
         (ratio, taken): (f64, bool),
         (length, damping): (f64, f64),
-        forecast: f64,
+        (worth, left): (f64, u64),
         unknowns: usize,
     ) -> bool {
         let near = self.matrix.is_some() && damping == 0.0;
         let missed = !(if near { CLOSE_FORECAST } else { FORECAST }).contains(&ratio);
-        let shrinks = self.last.map(|last| length / last).filter(|_| taken && damping == 0.0);
-        let slow = shrinks.is_some_and(|by| by > SLOW);
-        let to_come = shrinks.map_or(0.0, |by| if by < 1.0 { -0.5 * forecast.ln() / by.ln() } else { f64::INFINITY });
-        self.last = (taken && damping == 0.0).then_some(length);
+        if taken && damping == 0.0 {
+            self.lengths.push(length);
+        } else {
+            self.lengths.clear();
+        }
+        let slow = self.lengths.windows(2).last().is_some_and(|pair| pair[1] > SLOW * pair[0]);
         self.misses += usize::from(missed);
-        self.slow += usize::from(slow);
         self.fresh = self.fresh && !taken;
         self.age += 1;
         let part = |part: f64| part * unknowns as f64;
-        let enough = match self.matrix {
-            Some(_) => self.age as f64 >= part(STEPS_PER_UNKNOWN),
-            None => {
-                self.misses as f64 >= part(MISSES_PER_UNKNOWN).max(MISSES as f64)
-                    || (self.slow >= SLOW_STEPS && to_come > part(1.0))
-            }
+        let enough = if self.matrix.is_some() {
+            self.age as f64 >= part(STEPS_PER_UNKNOWN)
+        } else {
+            let misses = self.misses as f64 >= part(MISSES_PER_UNKNOWN).max(MISSES as f64);
+            misses || (left > SLOW_STEPS as u64 && self.to_come(worth) > part(1.0).min(left as f64))
         };
         (missed || slow) && enough && !self.fresh && !self.retired && self.times < MOST_TIMES
+    }
+
+    /// Steps that follow slow ones: steps that shrink by a factor s gain s² times what the one before did, so that a gain of `worth` times the
+    /// least is followed by ln(worth) / (2 ln 1/s) others; 0 where the last ones were not slow.
+    fn to_come(&self, worth: f64) -> f64 {
+        let Some(last) = self.lengths.len().checked_sub(SLOW_STEPS + 1).map(|first| &self.lengths[first..]) else {
+            return 0.0;
+        };
+        if !last.windows(2).all(|pair| pair[1] > SLOW * pair[0]) {
+            return 0.0;
+        }
+        let shrinks = (last[SLOW_STEPS] / last[0]).powf(1.0 / SLOW_STEPS as f64);
+        if shrinks < 1.0 { -0.5 * worth.ln() / shrinks.ln() } else { f64::INFINITY }
     }
 
     /// Takes S at the present point.
@@ -172,5 +182,28 @@ impl SecondOrder {
         triangle.column_iter_mut().zip(scale.iter()).for_each(|(mut column, d)| column *= *d);
         let linearisation = Linearisation { cost: found.cost, triangle, projected };
         Some(Convex { linearisation, damping, walls })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether S is formed after undamped steps that shrink by a factor, so many being left after each, of so many unknowns.
+    fn forms(shrinks: f64, left: u64, unknowns: usize) -> bool {
+        let mut own = SecondOrder::default();
+        (0..8).any(|k| {
+            let length = shrinks.powi(k);
+            own.judge((1.0, true), (length, 0.0), (1e8 * length * length, left), unknowns)
+        })
+    }
+
+    #[test]
+    fn second_derivatives_are_formed_where_that_saves_steps() {
+        // By 0.6: 18 steps; by 0.9: 87 and more.
+        assert!(!forms(0.4, 100, 10) && !forms(0.6, 100, 30) && forms(0.6, 100, 10));
+        assert!(forms(0.9, 100, 30) && forms(1.0, 100, 30));
+        // For so many unknowns it costs more steps than would follow, unless those end the fit before.
+        assert!(!forms(0.9, 100, 500) && forms(0.9, 40, 500) && !forms(0.9, 2, 500));
     }
 }

@@ -399,7 +399,10 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
                 && self.second_order.judge(
                     (forecast, taken),
                     (trial.length, trial.damping),
-                    trial.predicted / self.settings.cost_tolerance,
+                    (
+                        trial.predicted / self.settings.cost_tolerance,
+                        state.get_max_iters().saturating_sub(state.get_iter()),
+                    ),
                     x.len(),
                 );
             if renew {

@@ -135,12 +135,7 @@ struct Rows<'a> {
 }
 
 /// The cause of an effect at the fit of `problem`, which declares it, and what that fit leaves of every row.
-pub fn of(
-    found: &Effect,
-    problem: &Problem,
-    (arm, left): (&Arm, &[Vector3<f64>]),
-    poses: &Poses,
-) -> Option<Cause> {
+pub fn of(found: &Effect, problem: &Problem, (arm, left): (&Arm, &[Vector3<f64>]), poses: &Poses) -> Option<Cause> {
     let parameters = found.parameters(problem);
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
