@@ -378,4 +378,19 @@ mod tests {
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
     }
+
+    #[test]
+    fn what_was_worked_out_before_further_hypotheses_came_changes_nothing() {
+        let rules = &SelectionRules::DEFAULT;
+        let (blocks, target) = three([2, 0, 1]);
+        let fewer = Products::new((&blocks[..2], &target), rules);
+        assert!(!search(&fewer, &[0]).is_empty());
+        let again = search(&Products::knowing(fewer.into_known(), (&blocks, &target), rules), &[0]);
+        let anew = search(&Products::new((&blocks, &target), rules), &[0]);
+        assert_eq!(again.len(), anew.len());
+        for (own, other) in again.iter().zip(&anew) {
+            assert_eq!(own.members, other.members);
+            assert!((own.probability - other.probability).abs() < 1e-9);
+        }
+    }
 }

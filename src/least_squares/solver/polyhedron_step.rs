@@ -200,4 +200,27 @@ mod tests {
             assert_eq!(solution.faces.rows.iter().filter(|on| **on).count(), 1, "{lambda}");
         }
     }
+
+    #[test]
+    fn faces_that_run_in_circles_are_corrected_one_by_one() {
+        let hessian = DMatrix::from_row_slice(3, 3, &[4.0, 5.0, -5.0, 5.0, 9.0, -5.0, -5.0, -5.0, 7.0]);
+        let lower = hessian.cholesky().unwrap().unpack();
+        let constant = lower.solve_lower_triangular(&DVector::from_vec(vec![2.0, 1.0, -3.0])).unwrap();
+        let factor = Factor::new(lower.transpose(), constant, 1e-13);
+        let bounds = Bounds::new(DVector::repeat(3, f64::NEG_INFINITY), DVector::zeros(3)).unwrap();
+        let polyhedron =
+            Polyhedron::around(&DVector::zeros(3), &bounds, &Inequalities::none(3), &DVector::repeat(3, 1.0));
+        let problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+        let begins = (0..8).map(|set| Faces {
+            bounds: (0..3).map(|j| (set >> j & 1 == 1).then_some(AtBound::Upper)).collect(),
+            rows: polyhedron.touched.rows.clone(),
+        });
+        let mut circles = 0;
+        for faces in begins {
+            circles += usize::from(problem.polish(faces.clone(), 0.0, (GUESSES, 0)).is_none());
+            let solution = problem.polish(faces, 0.0, (GUESSES, ONE_BY_ONE)).unwrap();
+            assert_eq!(problem.corrected(&solution.faces, &solution.q, 0.0), solution.faces);
+        }
+        assert!(circles > 0);
+    }
 }
