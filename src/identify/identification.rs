@@ -258,9 +258,7 @@ fn fit_rows(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let clock = Instant::now();
-    // What is told of rows that carry the residual comes from fits in passing that no other follows.
-    let others_follow = options.in_passing && !options.carriers;
-    let memory = if others_follow { Memory::in_passing() } else { Memory::default() };
+    let memory = if options.in_passing { Memory::in_passing() } else { Memory::default() };
     check_data(problem, measurements, split)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));

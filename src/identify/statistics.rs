@@ -22,7 +22,7 @@ pub(super) struct Statistics {
     pub errors: Vec<f64>,
     /// Whether data and priors decide each unknown: no bound, and no part in a combination that neither of them sees.
     pub known: Vec<bool>,
-    /// Part of each unknown that the data gave, 0…1; of a fit that others follow 1 where there is no prior.
+    /// Part of each unknown that the data gave, 0…1; in passing 1 where there is no prior.
     pub identified: Vec<f64>,
     /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 where one is held.
     pub covariance: DMatrix<f64>,
@@ -69,7 +69,7 @@ impl Statistics {
         }
         let freedom = freedom - left_out;
         let errors = uncertainty.standard_errors();
-        // Nobody asks a fit that others follow what data see.
+        // Nobody asks a fit in passing what data see.
         let visible = if priors.iter().all(Option::is_some) || stage.memory.is_in_passing() {
             vec![1.0; errors.len()]
         } else {
