@@ -119,7 +119,7 @@ pub(super) fn with_linear<T>(
     let n = model.parameters.len();
     let (rows, unknowns): (Vec<usize>, Vec<usize>) = ((0..poses.len()).collect(), (0..n).collect());
     let measured = placement.poses(poses, &rows, problem.data.position_sigma.unwrap_or(1.0));
-    let linearised = Linearised::new(problem, &model, measured, &unknowns, &DVector::zeros(n), (effects, &[]));
+    let linearised = Linearised::new((problem, None), &model, measured, &unknowns, &DVector::zeros(n), (effects, &[]));
     let columns = linearised.fitted();
     let mut priors: Vec<Option<f64>> = model.parameters.iter().map(|parameter| parameter.sigma).collect();
     priors.extend(linearised.relaxed());

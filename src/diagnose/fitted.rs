@@ -1,11 +1,11 @@
 //! A problem with its effects, fitted, and its linear neighbourhood.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::data::Data;
-use super::neighbourhood::{LinearNeighbourhood, Linearised, Unknowns};
+use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
 use crate::model::parameter::{BeamField, EffectParameter, Slot};
 use crate::model::{Model, Pose};
@@ -37,6 +37,8 @@ pub(super) struct Fitted {
     pub set_aside: Vec<usize>,
     /// The linear neighbourhood at the identification rows, once it was asked for.
     around: OnceLock<Arc<LinearNeighbourhood>>,
+    /// The derivatives there that were taken last.
+    derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
 
 impl Fitted {
@@ -68,11 +70,15 @@ impl Fitted {
             }
         };
         let outliers_of_fit: Vec<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
+        let (around, derivatives) = (OnceLock::new(), Arc::default());
         let mut fitted =
-            Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new(), around: OnceLock::new() };
+            Self { problem, model, found, unknowns, active, sigma, set_aside: Vec::new(), around, derivatives };
         // Rounds on many poses fit too often to look for them.
         let looks = fitted.problem.robust.is_none() && data.is_led();
         fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
+        if !fitted.set_aside.is_empty() {
+            fitted.derivatives = Arc::default();
+        }
         Ok(fitted)
     }
 
@@ -154,7 +160,14 @@ impl Fitted {
         let mut poses = self.poses(data, rows);
         let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
         aside.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
-        Linearised::new(&self.problem, &self.model, poses, &self.unknowns, &self.found.x, (effects, slots))
+        let (shared, asked) = (rows == data.rows(), (effects, slots));
+        let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = if shared { kept().clone() } else { None };
+        let found = Linearised::new((&self.problem, known), &self.model, poses, &self.unknowns, &self.found.x, asked);
+        if shared {
+            *kept() = Some(found.derivatives());
+        }
+        found
     }
 
     /// The fit in its linear neighbourhood.
@@ -173,7 +186,7 @@ impl Fitted {
 
     /// The same fit, in which every row counts.
     pub fn with_all_rows(&self) -> Self {
-        Self { set_aside: Vec::new(), around: OnceLock::new(), ..self.clone() }
+        Self { set_aside: Vec::new(), around: OnceLock::new(), derivatives: Arc::default(), ..self.clone() }
     }
 
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.

@@ -27,6 +27,8 @@ const SWEEP_STEPS: u64 = 2;
 
 /// Change of ν ln(squares), by which effects are judged, that a step of a fit in passing must be worth: thousandths of what decides.
 const PASSING: f64 = 0.01;
+/// Part of the cost that a step must be worth where the σ is judged next, which then is known to half that part.
+const JUDGED: f64 = 1e-3;
 
 /// What all fits of an identification share.
 pub(super) struct Fitting<'a> {
@@ -46,6 +48,8 @@ pub(super) struct Fitting<'a> {
     pub max_steps: Option<u64>,
     /// Whether another fit follows.
     pub in_passing: bool,
+    /// Whether the σ is judged before the fit goes on.
+    pub to_be_judged: bool,
     /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
     pub sigma: f64,
     /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
@@ -149,7 +153,8 @@ impl<'a> Fitting<'a> {
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
         let max_steps = self.max_steps.unwrap_or(stage.max_steps);
-        let cost_tolerance = if self.in_passing { PASSING / stage.count().max(1) as f64 } else { stage.cost_tolerance };
+        let passing = if self.in_passing { PASSING / stage.count().max(1) as f64 } else { stage.cost_tolerance };
+        let cost_tolerance = if self.to_be_judged { passing.max(JUDGED) } else { passing };
         Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 

@@ -238,7 +238,8 @@ pub fn identify_model(
     // A robust loss sets such rows aside by itself.
     if options.carriers && !options.in_passing && problem.robust.is_none() {
         let start = found.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
-        let passing = Options { progress: None, predecessor: None, in_passing: true, start, ..options.clone() };
+        let predecessor = Some(Arc::new(found.predecessor(true)));
+        let passing = Options { progress: None, predecessor, in_passing: true, start, ..options.clone() };
         let without = |rows: &[usize]| {
             let left_out: BTreeSet<usize> = rows.iter().copied().collect();
             let kept = split.identification.iter().copied().filter(|row| !left_out.contains(row)).collect();
@@ -279,6 +280,7 @@ fn fit_rows(
         stop: options.stop.as_ref(),
         max_steps: options.max_steps,
         in_passing: options.in_passing,
+        to_be_judged: false,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         noise_model: NoiseModel::DECLARED,

@@ -20,6 +20,8 @@ const SCALE_SETTLED: f64 = 0.01;
 /// Steps after which a declared σ is judged first, where everything is fitted at once: where it is contradicted, its optimum may
 /// be far away, and is not wanted.
 const FIRST_STEPS: u64 = 30;
+/// Unknowns from which on a declared σ is judged as soon as the cost is known roughly: steps are what costs.
+const MANY: usize = 100;
 /// Fits after which the search for σ stops.
 const MAX_NOISE_FITS: usize = 20;
 /// Both σ as declared.
@@ -49,8 +51,10 @@ pub(super) fn fitted(
         let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
         if first {
             fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
+            fitting.to_be_judged = fitting.whole().unknowns.len() >= MANY;
         }
         let end = fitting.run(&begin)?;
+        let judged_early = std::mem::take(&mut fitting.to_be_judged);
         fitting.max_steps = limit;
         let whole = fitting.whole();
         if noise_is_declared {
@@ -67,6 +71,7 @@ pub(super) fn fitted(
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
                 }
+                None if judged_early => begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() },
                 None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => begin = end.x,
                 None => {
                     let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;

@@ -8,8 +8,9 @@ use nalgebra::DVector;
 use super::chord::Base;
 use super::{Loss, Triangle};
 
-/// Linearisations that are kept: those of the last point and of the one before.
-const KEPT: usize = 2;
+/// Linearisations that are kept: those of the last point, of the one before, and of the first one of the same data, which is asked for at the
+/// end.
+const KEPT: usize = 3;
 
 /// The last linearisations of some data, to be asked for again: reducing many rows costs far more than all that is done with the factor.
 #[derive(Debug, Default)]
@@ -29,7 +30,7 @@ pub(super) struct Key {
 }
 
 impl Memory {
-    /// One for fits after which others follow: steps go by the derivatives of where they began, as long as these foresee what comes.
+    /// One for fits after which others follow, or of which little is asked: steps go by the derivatives of where they began, as long as these foresee what comes.
     #[must_use]
     pub fn in_passing() -> Self {
         Self { base: Some(Mutex::default()), ..Self::default() }
@@ -50,7 +51,10 @@ impl Memory {
         found.unwrap_or_else(|| {
             let triangle = reduce();
             let mut kept = locked(&self.kept);
-            kept.truncate(KEPT - 1);
+            if kept.len() == KEPT {
+                let other = kept.iter().rposition(|(own, ..)| own.data != key.data);
+                kept.remove(other.unwrap_or(KEPT - 2));
+            }
             kept.push_front((key.clone(), unit, triangle.clone()));
             triangle
         })

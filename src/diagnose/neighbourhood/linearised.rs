@@ -1,5 +1,7 @@
 //! Columns of every effect without a fit of it: the derivative at the place where it enters, times what it is multiplied by.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
@@ -13,26 +15,51 @@ use crate::problem::{Effect, Problem};
 const CHUNK: usize = 256;
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a one changes nothing else.
 const TRACE_OF_MASS: f64 = 1e-4;
+/// Unknowns from which on their derivatives are kept for others, and those of places taken by themselves.
+const MANY: usize = 100;
 
 /// A model linearised with every place where effects may enter.
 #[derive(Clone)]
 pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
     poses: Vec<Pose<'a>>,
-    places: Vec<(Slot, usize)>,
-    /// ∂r/∂(parameters, then places), shape = (3 N, …).
-    jacobian: DMatrix<f64>,
-    residual: DVector<f64>,
-    fitted: usize,
-    /// σ of the priors of what the problem holds equal and may differ here: the columns behind those of the fitted parameters.
+    derivatives: Arc<Derivatives>,
+}
+
+/// What a model linearised in some poses comes to.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Derivatives {
+    /// Columns of the fitted parameters, and of what is relaxed behind them, shape = (3 N, n).
+    fitted: Arc<DMatrix<f64>>,
+    residual: Arc<DVector<f64>>,
+    /// σ of the priors of what the problem holds equal and may differ here.
     relaxed: Vec<Option<f64>>,
+    /// Columns of places by their number, those of `fitted` counted first.
+    places: Vec<(Slot, usize)>,
+    others: Vec<Arc<DVector<f64>>>,
+}
+
+impl Derivatives {
+    fn column(&self, place: usize) -> DVectorView<'_, f64> {
+        match place.checked_sub(self.fitted.ncols()) {
+            Some(other) => self.others[other].as_view(),
+            None => self.fitted.column(place),
+        }
+    }
+
+    /// Further columns of places.
+    fn extend(&mut self, slots: &[(Slot, f64)], columns: DMatrixView<f64>) {
+        let first = self.fitted.ncols() + self.others.len();
+        self.places.extend(slots.iter().enumerate().map(|(k, &(slot, _))| (slot, first + k)));
+        self.others.extend(columns.column_iter().map(|column| Arc::new(column.into_owned())));
+    }
 }
 
 impl<'a> Linearised<'a> {
     /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for the effects and other places
-    /// given.
+    /// given; of many unknowns from what is `known` of the same in the same poses.
     pub fn new(
-        problem: &'a Problem,
+        (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,
         poses: Vec<Pose<'a>>,
         unknowns: &[usize],
@@ -53,53 +80,96 @@ impl<'a> Linearised<'a> {
             }
             _ => None,
         };
-        let shared: Vec<(Slot, Option<f64>)> = unknowns.iter().filter_map(shared).collect();
-        let relaxed: Vec<Option<f64>> = shared.iter().map(|&(_, sigma)| sigma).collect();
+        let (shared, relaxed): (Vec<(Slot, f64)>, Vec<Option<f64>>) =
+            unknowns.iter().filter_map(shared).map(|(slot, sigma)| ((slot, 0.0), sigma)).unzip();
         // A parameter that is fitted at a place has its column already.
         let fitted_at = |&(slot, _): &(Slot, f64)| {
             let is_it = |&k: &usize| model.parameters[k].slot == slot && model.parameters[k].driver.is_constant();
             unknowns.iter().position(is_it).map(|column| (slot, column))
         };
-        let known: Vec<(Slot, usize)> = slots.iter().filter_map(fitted_at).collect();
+        let at_fitted: Vec<(Slot, usize)> = slots.iter().filter_map(fitted_at).collect();
         slots.retain(|place| fitted_at(place).is_none());
-        slots.splice(0..0, shared.iter().map(|&(slot, _)| (slot, 0.0)));
         let first = model.parameters.len();
-        let probing = model.placing(effects).probing(&slots);
-        let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
-        for (index, (slot, _)) in slots.iter().enumerate() {
-            if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {
-                at[first + index] = TRACE_OF_MASS;
+        // Columns of parameters and of slots, and the residual.
+        let pass = |own: &[usize], slots: &[(Slot, f64)]| {
+            let probing = model.placing(effects).probing(slots);
+            let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
+            for (index, (slot, _)) in slots.iter().enumerate() {
+                if matches!(slot, Slot::Beam { field: BeamField::AddedMass, .. }) {
+                    at[first + index] = TRACE_OF_MASS;
+                }
+            }
+            let all: Vec<usize> = own.iter().copied().chain(first..first + slots.len()).collect();
+            let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
+            linearise(&residuals, &residuals.reduced(&at))
+        };
+        let new = |fitted: DMatrix<f64>, residual| Derivatives {
+            fitted: Arc::new(fitted),
+            residual: Arc::new(residual),
+            relaxed: relaxed.clone(),
+            places: shared.iter().enumerate().map(|(k, &(slot, _))| (slot, unknowns.len() + k)).collect(),
+            others: Vec::new(),
+        };
+        let mut derivatives = if unknowns.len() < MANY {
+            let all = [shared.as_slice(), &slots].concat();
+            let (jacobian, _) = pass(unknowns, &all);
+            let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
+            let (_, residual) = linearise(&plain, &DVector::zeros(0));
+            let fitted = unknowns.len() + shared.len();
+            let mut own = new(jacobian.columns(0, fitted).into_owned(), residual);
+            own.extend(&slots, jacobian.columns_range(fitted..));
+            own
+        } else {
+            let mut own = known.map_or_else(
+                || {
+                    let (fitted, residual) = pass(unknowns, &shared);
+                    new(fitted, residual)
+                },
+                Arc::unwrap_or_clone,
+            );
+            slots.retain(|(slot, _)| !own.places.iter().any(|(known, _)| known == slot));
+            if !slots.is_empty() {
+                own.extend(&slots, pass(&[], &slots).0.as_view());
+            }
+            own
+        };
+        for place in at_fitted {
+            if !derivatives.places.contains(&place) {
+                derivatives.places.push(place);
             }
         }
-        let all: Vec<usize> = unknowns.iter().copied().chain(first..first + slots.len()).collect();
-        let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
-        let (jacobian, _) = linearise(&residuals, &residuals.reduced(&at));
-        let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
-        let (_, residual) = linearise(&plain, &DVector::zeros(0));
-        let fitted = unknowns.len();
-        let probed = slots.iter().enumerate().map(|(index, &(slot, _))| (slot, fitted + index));
-        let places = known.into_iter().chain(probed).collect();
-        Self { problem, poses, places, jacobian, residual, fitted, relaxed }
+        Self { problem, poses, derivatives: Arc::new(derivatives) }
+    }
+
+    /// What it comes to, to be known where the same is asked for again.
+    pub fn derivatives(&self) -> Arc<Derivatives> {
+        Arc::clone(&self.derivatives)
     }
 
     /// The same with poses that say nothing.
     pub fn without(&self, poses: &[usize]) -> Self {
         let mut rest = self.clone();
+        if poses.is_empty() {
+            return rest;
+        }
+        let Derivatives { fitted, residual, others, .. } = Arc::make_mut(&mut rest.derivatives);
         for &pose in poses {
-            rest.jacobian.rows_mut(3 * pose, 3).fill(0.0);
-            rest.residual.rows_mut(3 * pose, 3).fill(0.0);
+            Arc::make_mut(fitted).rows_mut(3 * pose, 3).fill(0.0);
+            for column in others.iter_mut().chain([&mut *residual]) {
+                Arc::make_mut(column).rows_mut(3 * pose, 3).fill(0.0);
+            }
         }
         rest
     }
 
     /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
     pub fn fitted(&self) -> DMatrixView<'_, f64> {
-        self.jacobian.columns(0, self.fitted + self.relaxed.len())
+        self.derivatives.fitted.as_view()
     }
 
     /// σ of the priors of what is relaxed, in the order of its columns.
     pub fn relaxed(&self) -> &[Option<f64>] {
-        &self.relaxed
+        &self.derivatives.relaxed
     }
 
     /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N, parameters).
@@ -110,7 +180,7 @@ impl<'a> Linearised<'a> {
 
     /// Whitened residual, 3 N.
     pub fn residual(&self) -> &DVector<f64> {
-        &self.residual
+        &self.derivatives.residual
     }
 
     /// Rows that are 0 because their poses measure fewer numbers than three.
@@ -131,10 +201,10 @@ impl<'a> Linearised<'a> {
     /// The same of one of some effects.
     pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
         let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
-        let mut columns = DMatrix::zeros(self.jacobian.nrows(), terms.len());
+        let mut columns = DMatrix::zeros(self.derivatives.fitted.nrows(), terms.len());
         for (&(place, driver), mut out) in terms.iter().zip(columns.column_iter_mut()) {
             let Some(place) = place else { continue };
-            let (at_place, values) = (self.jacobian.column(place), &driven.values[driver]);
+            let (at_place, values) = (self.derivatives.column(place), &driven.values[driver]);
             for (row, (out, derivative)) in out.iter_mut().zip(at_place.iter()).enumerate() {
                 *out = derivative * values[row / 3];
             }
@@ -147,13 +217,13 @@ impl<'a> Linearised<'a> {
     pub fn along(&self, driven: &Driven, directions: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let (poses, width) = (self.poses.len(), directions.ncols());
         let of_place = |place: &usize| {
-            let at_place = self.jacobian.column(*place);
+            let at_place = self.derivatives.column(*place);
             let sum = |pose: usize, k: usize| {
                 at_place.fixed_rows::<3>(3 * pose).dot(&directions.fixed_view::<3, 1>(3 * pose, k))
             };
             DMatrix::from_fn(poses, width, sum)
         };
-        let places: Vec<usize> = self.places.iter().map(|(_, place)| *place).collect();
+        let places: Vec<usize> = self.derivatives.places.iter().map(|(_, place)| *place).collect();
         let sums: Vec<DMatrix<f64>> = places.par_iter().map(of_place).collect();
         let of_effect = |terms: &Vec<(Option<usize>, usize)>| {
             let mut along = DMatrix::zeros(terms.len(), width);
@@ -179,8 +249,8 @@ impl<'a> Linearised<'a> {
 
     /// Column of a place, 3 N; `None` where no effect enters there.
     pub fn place(&self, slot: Slot) -> Option<DVector<f64>> {
-        let &(_, place) = self.places.iter().find(|(known, _)| *known == slot)?;
-        Some(self.jacobian.column(place).into_owned())
+        let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == slot)?;
+        Some(self.derivatives.column(place).into_owned())
     }
 }
 
@@ -197,7 +267,7 @@ impl Driven {
     pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
         let mut drivers: Vec<Driver> = Vec::new();
         let mut term = |Term { slot, driver, .. }: Term| {
-            let place = linearised.places.iter().find(|(known, _)| *known == slot).map(|(_, place)| *place);
+            let place = linearised.derivatives.places.iter().find(|(known, _)| *known == slot).map(|(_, place)| *place);
             let number = drivers.iter().position(|known| *known == driver).unwrap_or(drivers.len());
             if number == drivers.len() {
                 drivers.push(driver);

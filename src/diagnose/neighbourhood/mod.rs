@@ -16,5 +16,6 @@ mod score;
 pub(super) use left_out::PartSquares;
 pub(super) use linear::LEAST_DECIDED;
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
+pub(super) use linearised::Derivatives;
 pub(crate) use linearised::Linearised;
 pub(crate) use scan::{Scan, Tried, tries};

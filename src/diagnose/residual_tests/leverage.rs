@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::diagnose::neighbourhood::LEAST_DECIDED;
-use crate::numeric::{gram, product, product_with_upper, transposed};
+use crate::numeric::{gram, lower_factor, product, product_with_upper, transposed};
 
 /// Degrees of freedom below which nothing is tested.
 const LEAST_FREEDOM: f64 = 4.0;
@@ -14,6 +14,10 @@ const LEAST_FREEDOM: f64 = 4.0;
 const LEAST_LEFT: f64 = 1e-4;
 /// Directions that priors decide by less than this part count as decided by the data.
 const LEAST_PRIOR: f64 = 1e-6;
+/// What keeps a root of rounding real.
+const ROUNDING: f64 = 1e-10;
+/// Directions from which on their eigenvectors take longer than draws in all of them.
+const MANY: usize = 100;
 
 /// The projection I − H with H = Q Qᵀ, and the studentising of each pose.
 #[derive(Debug, Clone)]
@@ -24,8 +28,6 @@ pub(super) struct Leverage {
     pub transposed: DMatrix<f64>,
     /// QᵀQ.
     gram: DMatrix<f64>,
-    /// A root of I − QᵀQ, shape = (p, k): what priors add to the residuals, k directions.
-    pub prior: DMatrix<f64>,
     /// Degrees of freedom ν = tr(I − H).
     pub freedom: f64,
     /// tr (I − H)², ν without priors.
@@ -42,14 +44,12 @@ impl Leverage {
     /// # Errors
     /// The fit leaves too few degrees of freedom.
     pub fn of(fitted: &DMatrix<f64>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
-        let p = fitted.ncols();
         let (transposed, gram) = (transposed(fitted), gram(fitted));
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
         if freedom < LEAST_FREEDOM {
             return Err(Untestable::NoFreedom);
         }
         let squared_freedom = freedom - gram.trace() + gram.norm_squared();
-        let prior = prior_root(DMatrix::identity(p, p) - &gram);
         let whiteners = (0..fitted.nrows() / 3).into_par_iter().map(|pose| {
             let rows = transposed.columns(3 * pose, 3);
             let taken = Matrix3::from_fn(|i, j| rows.column(i).dot(&rows.column(j)));
@@ -57,7 +57,6 @@ impl Leverage {
         });
         Ok(Self {
             fitted: fitted.clone(),
-            prior,
             freedom,
             squared_freedom,
             whiteners: whiteners.collect(),
@@ -65,6 +64,18 @@ impl Leverage {
             gram,
             coordinates,
         })
+    }
+
+    /// A root of I − QᵀQ, shape = (p, k): what priors add to the residuals, k directions.
+    pub fn prior_root(&self) -> DMatrix<f64> {
+        let p = self.gram.nrows();
+        let mut left = DMatrix::identity(p, p) - &self.gram;
+        if p < MANY || left.trace() <= LEAST_PRIOR {
+            return root_of_priors(left);
+        }
+        // Any root does; this one has a column for every direction, those that data alone decide with next to nothing.
+        (0..p).for_each(|k| left[(k, k)] += ROUNDING);
+        lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
     }
 
     /// (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals with unit covariance, if the noise has it [Cook and Weisberg 1982].
@@ -77,10 +88,10 @@ impl Leverage {
 }
 
 /// A root of I − QᵀQ, a column for each direction that priors help to decide.
-fn prior_root(left: DMatrix<f64>) -> DMatrix<f64> {
+fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     let p = left.nrows();
-    if p == 0 {
-        return left;
+    if left.trace() <= LEAST_PRIOR {
+        return DMatrix::zeros(p, 0);
     }
     let eigen = left.symmetric_eigen();
     let by_priors: Vec<usize> = (0..p).filter(|&k| eigen.eigenvalues[k] > LEAST_PRIOR).collect();

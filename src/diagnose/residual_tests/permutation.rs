@@ -43,11 +43,12 @@ pub(super) fn chances(
     let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
     let affordable = WORK / (leverage.fitted.len() as u64).max(1);
     let draws = usize::try_from(affordable).unwrap_or(DRAWS).clamp(FEWEST, DRAWS);
+    let prior = leverage.prior_root();
     let starts: Vec<usize> = (0..draws).step_by(together).collect();
     let drawn: Vec<Vec<f64>> = starts
         .into_par_iter()
         .flat_map_iter(|start| {
-            let residuals = draw(leverage, studentised, start..(start + together).min(draws), seed);
+            let residuals = draw((leverage, &prior), studentised, start..(start + together).min(draws), seed);
             let values = |residual: &[f64]| -> Vec<f64> {
                 let sample = Sample::of(leverage.studentise(residual));
                 statistics.iter().map(|statistic| statistic.of(&sample)).collect()
@@ -60,9 +61,14 @@ pub(super) fn chances(
 }
 
 /// Residuals r* of some draws as columns, shape = (3 N, draws).
-fn draw(leverage: &Leverage, studentised: &[Vector3<f64>], draws: std::ops::Range<usize>, seed: u64) -> DMatrix<f64> {
+fn draw(
+    (leverage, prior): (&Leverage, &DMatrix<f64>),
+    studentised: &[Vector3<f64>],
+    draws: std::ops::Range<usize>,
+    seed: u64,
+) -> DMatrix<f64> {
     let mut residuals = DMatrix::zeros(3 * studentised.len(), draws.len());
-    let mut by_priors = DMatrix::zeros(leverage.prior.ncols(), draws.len());
+    let mut by_priors = DMatrix::zeros(prior.ncols(), draws.len());
     let normal = Normal::standard();
     for (column, draw) in draws.enumerate() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -78,8 +84,8 @@ fn draw(leverage: &Leverage, studentised: &[Vector3<f64>], draws: std::ops::Rang
         }
     }
     let mut taken = &leverage.transposed * &residuals;
-    if leverage.prior.ncols() > 0 {
-        taken += &leverage.prior * by_priors;
+    if prior.ncols() > 0 {
+        taken += prior * by_priors;
     }
     residuals.gemm(-1.0, &leverage.fitted, &taken, 1.0);
     residuals

@@ -8,8 +8,10 @@ use crate::least_squares::Linearisation;
 const FORECAST: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// The same of an undamped step with S, which near an optimum knows all there is.
 const CLOSE_FORECAST: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Misses after which steps are bent.
+/// Misses after which steps are bent, until one without damping is bent by no more than a part of its length: the way is straight then, up to
+/// the next miss.
 const BENDING_MISSES: usize = 2;
+const STRAIGHT: f64 = 0.01;
 /// Misses of linearised residuals after which S is formed; for many unknowns, such a part of their number, since forming S costs about as
 /// many linearisations as there are unknowns.
 const MISSES: usize = 15;
@@ -37,6 +39,8 @@ const LEAST_DAMPING: f64 = 1e-10;
 #[derive(Debug, Clone, Default)]
 pub(super) struct SecondOrder {
     misses: usize,
+    /// Whether the last step that was bent went straight on.
+    straight: bool,
     /// ‖D p‖ of the last steps, in a row, without damping.
     lengths: Vec<f64>,
     matrix: Option<DMatrix<f64>>,
@@ -70,21 +74,29 @@ impl Convex {
 impl SecondOrder {
     /// Whether steps are bent.
     pub fn bends(&self) -> bool {
-        self.misses >= BENDING_MISSES && !self.retired
+        self.misses >= BENDING_MISSES && !self.straight && !self.retired
     }
 
-    /// Ends it where steps gain nothing more, and says whether it was at work: what is left is better seen by linearised residuals,
+    /// Takes in by which part of its length a step was bent.
+    pub fn bent(&mut self, share: f64, damping: f64) {
+        self.straight = damping == 0.0 && share <= STRAIGHT;
+    }
+
+    /// Ends it where steps gain nothing more, and says whether S was at work: what is left is better seen by linearised residuals,
     /// whose condition is not squared.
     pub fn retire(&mut self) -> bool {
-        let worked = self.bends() || self.matrix.is_some();
-        self.matrix = None;
         self.retired = true;
-        worked
+        self.matrix.take().is_some()
     }
 
     /// Takes in what a step gained over its forecast, where S is not wanted.
     pub fn watch(&mut self, ratio: f64) {
-        self.misses += usize::from(!FORECAST.contains(&ratio));
+        self.count(!FORECAST.contains(&ratio));
+    }
+
+    fn count(&mut self, missed: bool) {
+        self.misses += usize::from(missed);
+        self.straight &= !missed;
     }
 
     /// Takes in a step of length ‖D p‖, `left` others being left; whether S should be formed at the point where the solver is now. The
@@ -104,7 +116,7 @@ impl SecondOrder {
             self.lengths.clear();
         }
         let slow = self.lengths.windows(2).last().is_some_and(|pair| pair[1] > SLOW * pair[0]);
-        self.misses += usize::from(missed);
+        self.count(missed);
         self.fresh = self.fresh && !taken;
         self.age += 1;
         let part = |part: f64| part * unknowns as f64;

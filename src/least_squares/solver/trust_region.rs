@@ -19,6 +19,8 @@ const WELL_BENT: f64 = 0.03;
 const BENDINGS: usize = 6;
 /// The radius grows when ρ reaches this.
 const GOOD: f64 = 0.75;
+/// A relative gain up to this is rounding of the cost.
+const ROUNDING: f64 = 1e3 * f64::EPSILON;
 
 /// A step within the radius, as the linearised problem sees it.
 #[derive(Debug, Clone)]
@@ -221,6 +223,7 @@ impl<S: Subproblem> TrustRegion<S> {
                 return Ok((step, None));
             }
             if share <= BENT {
+                self.second_order.bent(share, step.damping);
                 step.point = point;
                 return Ok((step, Some(share)));
             }
@@ -255,9 +258,8 @@ impl<S: Subproblem> TrustRegion<S> {
             // Held back by the radius only, which is about to grow: a short step says nothing yet.
             return None;
         }
-        let settled = |tolerance: f64| {
-            trial.actual.abs() <= tolerance && trial.predicted <= tolerance && 0.5 * trial.ratio <= 1.0
-        };
+        let foreseen = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;
+        let settled = |tolerance: f64| trial.actual.abs() <= tolerance && trial.predicted <= tolerance && foreseen;
         if settled(settings.cost_tolerance) {
             return Some(Termination::Cost);
         }
