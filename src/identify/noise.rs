@@ -9,7 +9,7 @@ use super::outcome::Noise;
 use super::stage::{Stage, StageError};
 use super::statistics::Statistics;
 use crate::least_squares::solver::Termination;
-use crate::least_squares::{Fit, Loss, Objective as _, VarianceLikelihood, residual_vector};
+use crate::least_squares::{Fit, Loss, MANY_UNKNOWNS, Objective as _, VarianceLikelihood, residual_vector};
 use crate::model::Pose;
 use crate::problem::Observation;
 
@@ -20,8 +20,6 @@ const SCALE_SETTLED: f64 = 0.01;
 /// Steps after which a declared σ is judged first, where everything is fitted at once: where it is contradicted, its optimum may
 /// be far away, and is not wanted.
 const FIRST_STEPS: u64 = 30;
-/// Unknowns from which on a declared σ is judged as soon as the cost is known roughly: steps are what costs.
-const MANY: usize = 100;
 /// Fits after which the search for σ stops.
 const MAX_NOISE_FITS: usize = 20;
 /// Both σ as declared.
@@ -51,7 +49,7 @@ pub(super) fn fitted(
         let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
         if first {
             fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
-            fitting.to_be_judged = fitting.whole().unknowns.len() >= MANY;
+            fitting.to_be_judged = fitting.whole().unknowns.len() >= MANY_UNKNOWNS;
         }
         let end = fitting.run(&begin)?;
         let judged_early = std::mem::take(&mut fitting.to_be_judged);
@@ -67,11 +65,17 @@ pub(super) fn fitted(
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
+                    if judged_early && !is_beyond_doubt(&fitting.whole()) {
+                        // What is still to be gained may decide.
+                        (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                    }
                     // What was held stays where it began, and what ran off under a σ too small begins anew.
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 { end.x } else { start.clone() };
                 }
-                None if judged_early => begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() },
+                None if judged_early && end.termination.converged() => {
+                    begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() }
+                }
                 None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => begin = end.x,
                 None => {
                     let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;

@@ -30,7 +30,8 @@ pub(super) struct Key {
 }
 
 impl Memory {
-    /// One for fits after which others follow, or of which little is asked: steps go by the derivatives of where they began, as long as these foresee what comes.
+    /// One for fits after which others follow, or of which little is asked: steps go by the derivatives of where they began, as long as these
+    /// foresee what comes.
     #[must_use]
     pub fn in_passing() -> Self {
         Self { base: Some(Mutex::default()), ..Self::default() }

@@ -35,6 +35,9 @@ pub use uncertainty::Uncertainty;
 pub use variance::VarianceLikelihood;
 pub use weak::{Steadied, WEAK_BELOW, Weak};
 
+/// Unknowns from which on taking derivatives and reducing them is nearly all of the work of a fit.
+pub(crate) const MANY_UNKNOWNS: usize = 100;
+
 /// Residuals of many small items, and their derivatives.
 pub trait LeastSquares: Sync {
     /// Number of unknowns n.

@@ -10,7 +10,7 @@ use super::chord::{Base, Chunk};
 use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
-use super::{Block, LeastSquares, Linearisation, Loss, Memory, Objective, Triangle, slopes};
+use super::{Block, LeastSquares, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective, Triangle, slopes};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
@@ -25,8 +25,7 @@ const ROWS_PER_UNKNOWN: usize = 4;
 /// Chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Unknowns from which on derivatives of all data are kept in passing, and how many numbers at most: 128 MB.
-const MANY: usize = 100;
+/// Numbers up to which derivatives of all data are kept in passing, where unknowns are many: 128 MB.
 const MOST_KEPT: usize = 1 << 24;
 
 /// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
@@ -242,7 +241,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// than memory has room for.
     fn keeps_derivatives(&self) -> bool {
         let (n, rows) = (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
-        self.loss == Loss::Squares && n >= MANY && rows * n <= MOST_KEPT
+        self.loss == Loss::Squares && n >= MANY_UNKNOWNS && rows * n <= MOST_KEPT
     }
 
     /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².

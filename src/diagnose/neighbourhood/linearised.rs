@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
-use crate::least_squares::{Block, LeastSquares};
+use crate::least_squares::{Block, LeastSquares, MANY_UNKNOWNS};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, Slot};
 use crate::model::{Model, Pose, PoseResiduals};
@@ -15,8 +15,6 @@ use crate::problem::{Effect, Problem};
 const CHUNK: usize = 256;
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a one changes nothing else.
 const TRACE_OF_MASS: f64 = 1e-4;
-/// Unknowns from which on their derivatives are kept for others, and those of places taken by themselves.
-const MANY: usize = 100;
 
 /// A model linearised with every place where effects may enter.
 #[derive(Clone)]
@@ -110,7 +108,7 @@ impl<'a> Linearised<'a> {
             places: shared.iter().enumerate().map(|(k, &(slot, _))| (slot, unknowns.len() + k)).collect(),
             others: Vec::new(),
         };
-        let mut derivatives = if unknowns.len() < MANY {
+        let mut derivatives = if unknowns.len() < MANY_UNKNOWNS {
             let all = [shared.as_slice(), &slots].concat();
             let (jacobian, _) = pass(unknowns, &all);
             let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());

@@ -185,3 +185,27 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
     });
     others.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of data of an orthonormal factor of 60 poses and p unknowns, with or without a prior on each second one.
+    fn leverage(p: usize, has_priors: bool) -> Leverage {
+        let entry = |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
+        let prior = |i: usize, j: usize| if has_priors && i == j && j.is_multiple_of(2) { 3.0 } else { 0.0 };
+        let stacked = DMatrix::from_fn(180 + p, p, |i, j| if i < 180 { entry(i, j) } else { prior(i - 180, j) });
+        Leverage::of(&stacked.qr().q().rows(0, 180).into_owned(), vec![3; 60]).unwrap()
+    }
+
+    #[test]
+    fn what_priors_add_is_a_root_of_what_the_data_leave_open() {
+        for p in [9, 110] {
+            let own = leverage(p, true);
+            let root = own.prior_root();
+            let left = DMatrix::identity(p, p) - &own.gram;
+            assert!(left.trace() > 1.0 && (&root * root.transpose() - left).amax() < 1e-6, "{p}");
+            assert_eq!(leverage(p, false).prior_root().shape(), (p, 0));
+        }
+    }
+}

@@ -3,11 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Factor, Settings, Step, Subproblem, TrustRegion};
-use crate::least_squares::Linearisation;
-
-/// Unknowns from which on steps are bent in curved valleys: a bend takes derivatives that are not reduced, and reducing them is then nearly
-/// all of the work of a step.
-const MANY: usize = 100;
+use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 
 /// Levenberg–Marquardt in its trust-region form, for unknowns without bounds.
 ///
@@ -91,7 +87,8 @@ impl Subproblem for Unconstrained {
     }
 
     fn bends_freely(&self) -> bool {
-        self.model.as_ref().is_some_and(|model| model.scale.len() >= MANY)
+        // A bend takes derivatives that are not reduced.
+        self.model.as_ref().is_some_and(|model| model.scale.len() >= MANY_UNKNOWNS)
     }
 
     fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {

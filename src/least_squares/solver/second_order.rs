@@ -211,6 +211,28 @@ mod tests {
     }
 
     #[test]
+    fn steps_are_bent_where_the_way_is_curved() {
+        let mut own = SecondOrder::default();
+        own.watch(-2.0);
+        assert!(!own.bends());
+        own.watch(0.1);
+        assert!(own.bends());
+        // A short step is hardly bent wherever it goes.
+        own.bent(0.001, 0.5);
+        own.watch(1.0);
+        assert!(own.bends());
+        own.bent(0.001, 0.0);
+        own.watch(1.0);
+        assert!(!own.bends());
+        own.watch(0.1);
+        assert!(own.bends());
+        // Without S there is nothing to go on with.
+        assert!(!own.retire() && !own.bends());
+        own.renew(Some(DMatrix::identity(2, 2)));
+        assert!(own.retire() && !own.retire());
+    }
+
+    #[test]
     fn second_derivatives_are_formed_where_that_saves_steps() {
         // By 0.6: 18 steps; by 0.9: 87 and more.
         assert!(!forms(0.4, 100, 10) && !forms(0.6, 100, 30) && forms(0.6, 100, 10));
