@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::data::Data;
 use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
 use crate::identify::{Identification, IdentifyError, Noise, Options, Placement, identify};
+use crate::least_squares::MANY_UNKNOWNS;
 use crate::model::parameter::{BeamField, EffectParameter, Slot};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
@@ -140,8 +141,17 @@ impl Fitted {
     }
 
     /// The model about the fit at the identification rows, with every place where `effects` enter.
+    ///
+    /// Of many unknowns the derivatives are kept for who asks next; `data` are those that were fitted.
     pub fn linearised<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Linearised<'a> {
-        self.linearised_at(data, data.rows(), effects)
+        if self.unknowns.len() < MANY_UNKNOWNS {
+            return self.linearised_at(data, data.rows(), effects);
+        }
+        let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = kept().clone();
+        let found = self.linearised_knowing(known, (data, data.rows()), effects, &[]);
+        *kept() = Some(found.derivatives());
+        found
     }
 
     /// The same at other rows.
@@ -157,17 +167,20 @@ impl Fitted {
         effects: &[Effect],
         slots: &[Slot],
     ) -> Linearised<'a> {
+        self.linearised_knowing(None, (data, rows), effects, slots)
+    }
+
+    fn linearised_knowing<'a>(
+        &'a self,
+        known: Option<Arc<Derivatives>>,
+        (data, rows): (&Data<'a>, &[usize]),
+        effects: &[Effect],
+        slots: &[Slot],
+    ) -> Linearised<'a> {
         let mut poses = self.poses(data, rows);
         let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
         aside.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
-        let (shared, asked) = (rows == data.rows(), (effects, slots));
-        let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = if shared { kept().clone() } else { None };
-        let found = Linearised::new((&self.problem, known), &self.model, poses, &self.unknowns, &self.found.x, asked);
-        if shared {
-            *kept() = Some(found.derivatives());
-        }
-        found
+        Linearised::new((&self.problem, known), &self.model, poses, &self.unknowns, &self.found.x, (effects, slots))
     }
 
     /// The fit in its linear neighbourhood.

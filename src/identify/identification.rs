@@ -295,6 +295,9 @@ fn fit_rows(
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
+    let asked = !options.in_passing;
+    // Before fits of other rows: the first linearisation of this one is still known.
+    let sight = if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
@@ -307,13 +310,11 @@ fn fit_rows(
         whole: &whole,
         noise_is_declared,
     };
-    let asked = !options.in_passing;
     let quality_flag = if asked { judgement.flag(enough.flag, not_converged, enough.poses) } else { not_converged };
     let cautions = || judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
     let told = asked && noise != Noise::Unknown && end.termination.converged();
     let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
     let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
-    let sight = if asked { whole.data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     Ok(Identification {
         in_passing: options.in_passing,
         quality_flag,

@@ -40,6 +40,7 @@ pub(super) fn fitted(
 ) -> Result<(FitEnd, Statistics, Noise), StageError> {
     let mut fits = 0;
     let mut begin = start.clone();
+    let mut early = fitting.whole().unknowns.len() >= MANY_UNKNOWNS;
     let mut taken_over = (fitting.noise_model, fitting.turn_noise_model) != AS_DECLARED;
     loop {
         fits += 1;
@@ -49,7 +50,7 @@ pub(super) fn fitted(
         let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
         if first {
             fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
-            fitting.to_be_judged = fitting.whole().unknowns.len() >= MANY_UNKNOWNS;
+            fitting.to_be_judged = std::mem::take(&mut early);
         }
         let end = fitting.run(&begin)?;
         let judged_early = std::mem::take(&mut fitting.to_be_judged);
@@ -65,9 +66,12 @@ pub(super) fn fitted(
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
-                    if judged_early && !is_beyond_doubt(&fitting.whole()) {
-                        // What is still to be gained may decide.
-                        (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                    if judged_early {
+                        // What is still to be gained may decide, and is asked again as of what an earlier fit took.
+                        taken_over = is_beyond_doubt(&fitting.whole());
+                        if !taken_over {
+                            (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                        }
                     }
                     // What was held stays where it began, and what ran off under a σ too small begins anew.
                     let went_well = end.termination.converged() || end.termination == Termination::IterationLimit;

@@ -1,4 +1,4 @@
-//! What a fit leaves to the next one, of the same problem with other effects to the same data.
+//! What a fit leaves to the next one, of the same problem with other effects to the same data, or to most of their rows.
 
 use nalgebra::DVector;
 

@@ -91,12 +91,12 @@ impl SecondOrder {
 
     /// Takes in what a step gained over its forecast, where S is not wanted.
     pub fn watch(&mut self, ratio: f64) {
-        self.count(!FORECAST.contains(&ratio));
+        self.misses += usize::from(!FORECAST.contains(&ratio));
     }
 
-    fn count(&mut self, missed: bool) {
-        self.misses += usize::from(missed);
-        self.straight &= !missed;
+    /// Takes in what any step gained over its forecast: a miss shows that the way is not straight.
+    pub fn look(&mut self, ratio: f64) {
+        self.straight &= FORECAST.contains(&ratio);
     }
 
     /// Takes in a step of length ‖D p‖, `left` others being left; whether S should be formed at the point where the solver is now. The
@@ -116,7 +116,7 @@ impl SecondOrder {
             self.lengths.clear();
         }
         let slow = self.lengths.windows(2).last().is_some_and(|pair| pair[1] > SLOW * pair[0]);
-        self.count(missed);
+        self.misses += usize::from(missed);
         self.fresh = self.fresh && !taken;
         self.age += 1;
         let part = |part: f64| part * unknowns as f64;
@@ -219,12 +219,12 @@ mod tests {
         assert!(own.bends());
         // A short step is hardly bent wherever it goes.
         own.bent(0.001, 0.5);
-        own.watch(1.0);
+        own.look(1.0);
         assert!(own.bends());
         own.bent(0.001, 0.0);
-        own.watch(1.0);
+        own.look(1.0);
         assert!(!own.bends());
-        own.watch(0.1);
+        own.look(0.1);
         assert!(own.bends());
         // Without S there is nothing to go on with.
         assert!(!own.retire() && !own.bends());

@@ -13,13 +13,14 @@ use std::fmt;
 pub enum Termination {
     /// The residual is orthogonal to every column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ `gradient_tolerance`.
     Gradient,
-    /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤ `cost_tolerance`·½‖r‖² and ρ ≤ 2.
+    /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤ `cost_tolerance`·½‖r‖², and ρ ≤ 2 or |actual| ≤ 1000 ε·½‖r‖²,
+    /// which is rounding.
     Cost,
     /// The step is negligible: ‖D p‖ ≤ `step_tolerance` ‖D x‖.
     Step,
     /// The data are met exactly: ‖r‖ = 0.
     ZeroResidual,
-    /// Rounding hides any further reduction: |actual| and predicted ≤ ε·½‖r‖² and ρ ≤ 2.
+    /// Rounding hides any further reduction: |actual| and predicted ≤ ε·½‖r‖².
     CostPrecision,
     /// Rounding hides any smaller step: Δ ≤ ε ‖D x‖.
     StepPrecision,

@@ -394,6 +394,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
             let forecast = trial.forecast(self.settings.cost_tolerance);
+            self.second_order.look(forecast);
             if self.subproblem.bends_freely() {
                 self.second_order.watch(forecast);
             }
