@@ -349,10 +349,15 @@ fn linear_block(rows: &LinearRows, x: &DVector<f64>) -> Block {
     block
 }
 
-/// All residuals r(x) in one vector; for small problems and tests.
+/// All residuals r(x) in one vector.
 pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVector<f64> {
-    let mut residuals = DVector::zeros(problem.items() * problem.rows_per_item());
-    problem.residuals(x, 0..problem.items(), residuals.as_mut_slice());
+    let (items, rows) = (problem.items(), problem.rows_per_item());
+    let mut residuals = DVector::zeros(items * rows);
+    let chunks = residuals.as_mut_slice().par_chunks_mut((CHUNK_ITEMS * rows).max(1)).enumerate();
+    chunks.for_each(|(chunk, out)| {
+        let first = chunk * CHUNK_ITEMS;
+        problem.residuals(x, first..items.min(first + CHUNK_ITEMS), out);
+    });
     residuals
 }
 

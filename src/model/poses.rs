@@ -183,13 +183,16 @@ impl Model {
     /// Frames that carry the targets, in the arm's base frame, at the full parameter vector `x`; `None` without equilibrium.
     pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
         let arm = self.arm(|k| x[k]);
-        let mut commands = self.commands(x);
-        let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
-        let frame = |pose: &Pose| {
-            arm.equilibrate_at(&commands.apply(&pose.setup), self.carrier(pose.target), &mut ws, &mut rest).ok()?;
-            Some(rest.frame)
+        let some = |poses: &[Pose]| {
+            let mut commands = self.commands(x);
+            let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+            let mut frame = |pose: &Pose| {
+                arm.equilibrate_at(&commands.apply(&pose.setup), self.carrier(pose.target), &mut ws, &mut rest).ok()?;
+                Some(rest.frame)
+            };
+            poses.iter().map(&mut frame).collect::<Vec<_>>()
         };
-        poses.iter().map(frame).collect()
+        poses.par_chunks(CHUNK_ITEMS).flat_map_iter(some).collect()
     }
 
     /// Predicted orientations of the targets at the full parameter vector `x`, rotation vectors, measuring frame \[rad\]; NaN where a

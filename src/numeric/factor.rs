@@ -1,6 +1,6 @@
 //! Factors of symmetric matrices by products of parts, which are fast where columns one by one are not.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector};
 
 /// Rows up to which a triangle is solved with, or inverted, column by column.
 const FEW: usize = 24;
@@ -16,32 +16,43 @@ pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
         return matrix.cholesky().map(Cholesky::unpack);
     }
     for first in (0..n).step_by(PANEL) {
-        let (wide, behind) = (PANEL.min(n - first), (first + PANEL).min(n));
+        let wide = PANEL.min(n - first);
+        let behind = first + wide;
         let own = matrix.view((first, first), (wide, wide)).into_owned().cholesky()?.unpack();
-        let mut across = matrix.view((behind, first), (n - behind, wide)).transpose();
-        solve_lower(&own, &mut across);
-        let panel = across.transpose();
-        for next in (behind..n).step_by(PANEL) {
-            let (count, place) = (PANEL.min(n - next), next - behind);
-            let mut left = matrix.view_mut((next, next), (n - next, count));
-            left.gemm(-1.0, &panel.rows_range(place..), &across.columns(place, count), 1.0);
-        }
         matrix.view_mut((first, first), (wide, wide)).copy_from(&own);
-        matrix.view_mut((behind, first), panel.shape()).copy_from(&panel);
+        let (mut left, mut right) = matrix.columns_range_pair_mut(first..behind, behind..);
+        let mut panel = left.rows_mut(behind, n - behind);
+        solve_right(&own, &mut panel);
+        for next in (0..n - behind).step_by(PANEL) {
+            let count = PANEL.min(n - behind - next);
+            let across = panel.rows(next, count).transpose();
+            right.view_mut((behind + next, next), (n - behind - next, count)).gemm(
+                -1.0,
+                &panel.rows_range(next..),
+                &across,
+                1.0,
+            );
+        }
     }
     matrix.fill_upper_triangle(0.0, 1);
     Some(matrix)
 }
 
-/// Makes L⁻¹B of B, a few rows after the other: of those before them a product is taken off.
-fn solve_lower(lower: &DMatrix<f64>, right: &mut DMatrix<f64>) {
+/// Makes B L⁻ᵀ of B, a few columns after the other: of those before them a product is taken off.
+fn solve_right(lower: &DMatrix<f64>, right: &mut DMatrixViewMut<f64>) {
     let n = lower.nrows();
     for first in (0..n).step_by(FEW) {
         let count = FEW.min(n - first);
-        let (known, mut rest) = right.rows_range_pair_mut(..first, first..);
-        let mut own = rest.rows_mut(0, count);
-        own.gemm(-1.0, &lower.view((first, 0), (count, first)), &known, 1.0);
-        lower.view((first, first), (count, count)).solve_lower_triangular_mut(&mut own);
+        let (known, mut rest) = right.columns_range_pair_mut(..first, first..);
+        let mut own = rest.columns_mut(0, count);
+        own.gemm(-1.0, &known, &lower.view((first, 0), (count, first)).transpose(), 1.0);
+        for j in 0..count {
+            for k in 0..j {
+                let (known, mut column) = own.columns_range_pair_mut(k, j);
+                column.axpy(-lower[(first + j, first + k)], &known, 1.0);
+            }
+            own.column_mut(j).unscale_mut(lower[(first + j, first + j)]);
+        }
     }
 }
 

@@ -1,16 +1,23 @@
 //! Products of tall matrices on every core: each column of the result is one thread's, so that they are the same to the bit for any
 //! number of threads.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
 /// Columns of a result that one thread forms at a time: each time the other matrix is packed anew.
 const TOGETHER: usize = 96;
+/// Columns up to which a product is formed by axpys and dots: there is too little to do with what would be packed.
+const NARROW: usize = 5;
+/// Rows that one thread goes through at a time where the result is narrow.
+const SHORT: usize = 1024;
 /// Multiplications below which threads cost more than they save.
 const WORTH_THREADS: usize = 1 << 20;
 
 /// A B.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    if b.ncols() <= NARROW && a.len() * b.ncols() >= WORTH_THREADS {
+        return narrow_product(a, b);
+    }
     product_of(a, b, |_| a.ncols())
 }
 
@@ -25,15 +32,52 @@ fn product_of(a: &DMatrix<f64>, b: &DMatrix<f64>, filled: impl Fn(usize) -> usiz
     if rows * inner * columns < WORTH_THREADS || inner == 0 {
         return a * b;
     }
-    let mut out = DMatrix::zeros(rows, columns);
+    let mut out = zeros(rows, columns);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * TOGETHER, own.len() / rows);
         let filled = filled(first + count);
-        let mut own = nalgebra::DMatrixViewMut::from_slice(own, rows, count);
+        let mut own = DMatrixViewMut::from_slice(own, rows, count);
         own.gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
     };
     out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().for_each(form);
     out
+}
+
+/// A B of a narrow B: some rows after others, each gone through once.
+fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let rows = a.nrows();
+    let of_rows = |part: usize| a.rows(part * SHORT, SHORT.min(rows - part * SHORT)) * b;
+    let parts: Vec<DMatrix<f64>> = (0..rows.div_ceil(SHORT)).into_par_iter().map(of_rows).collect();
+    let mut out = zeros(rows, b.ncols());
+    for (part, own) in parts.iter().enumerate() {
+        out.rows_mut(part * SHORT, own.nrows()).copy_from(own);
+    }
+    out
+}
+
+/// AᵀB of a tall A and a B with few columns.
+pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, n) = a.shape();
+    if a.len() * b.ncols() < WORTH_THREADS {
+        return a.tr_mul(b);
+    }
+    // The narrow side is transposed: this is the product that is fast.
+    let turned = transposed_view(b);
+    let mut out = zeros(b.ncols(), n);
+    let form = |(part, own): (usize, &mut [f64])| {
+        let (first, count) = (part * TOGETHER, own.len() / turned.nrows());
+        let (mut own, a) = (DMatrixViewMut::from_slice(own, turned.nrows(), count), a.columns(first, count));
+        if turned.nrows().min(count) <= NARROW {
+            for (mut out, column) in own.column_iter_mut().zip(a.column_iter()) {
+                out.iter_mut().zip(b.column_iter()).for_each(|(out, b)| *out = b.dot(&column));
+            }
+        } else {
+            own.gemm(1.0, &turned, &a, 0.0);
+        }
+    };
+    debug_assert_eq!(rows, b.nrows());
+    out.as_mut_slice().par_chunks_mut(b.ncols() * TOGETHER).enumerate().for_each(form);
+    out.transpose()
 }
 
 /// AᵀA: its upper triangle, mirrored.
@@ -42,31 +86,45 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     if rows * n * n < WORTH_THREADS {
         return a.transpose() * a;
     }
-    // The narrow side is transposed: this is the product that is fast.
-    let transposed = transposed(a);
-    let mut out = DMatrix::zeros(n, n);
+    let transposed = transposed_view(a);
+    let mut out = zeros(n, n);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * TOGETHER, own.len() / n);
-        let mut own = nalgebra::DMatrixViewMut::from_slice(own, n, count);
+        let mut own = DMatrixViewMut::from_slice(own, n, count);
         let above = first + count;
-        own.rows_mut(0, above).gemm(1.0, &transposed.rows(0, above), &a.columns(first, count), 0.0);
+        if count <= NARROW {
+            own.rows_mut(0, above).gemm_tr(1.0, &a.columns(0, above), &a.columns(first, count), 0.0);
+        } else {
+            own.rows_mut(0, above).gemm(1.0, &transposed.rows(0, above), &a.columns(first, count), 0.0);
+        }
     };
     out.as_mut_slice().par_chunks_mut(n * TOGETHER).enumerate().for_each(form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }
 
+/// Aᵀ, of which nothing is copied.
+fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
+    let (rows, n) = a.shape();
+    DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
+}
+
 /// Aᵀ of a tall matrix.
 pub(crate) fn transposed(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    let mut out = DMatrix::zeros(n, rows);
+    let mut out = zeros(n, rows);
     let form = |(part, own): (usize, &mut [f64])| {
         let count = own.len() / n;
-        let mut own = nalgebra::DMatrixViewMut::from_slice(own, n, count);
+        let mut own = DMatrixViewMut::from_slice(own, n, count);
         a.rows(part * TOGETHER, count).transpose_to(&mut own);
     };
     out.as_mut_slice().par_chunks_mut((n * TOGETHER).max(1)).enumerate().for_each(form);
     out
+}
+
+/// Zeros, which cost nothing before they are written to.
+pub(crate) fn zeros(rows: usize, columns: usize) -> DMatrix<f64> {
+    DMatrix::from_vec(rows, columns, vec![0.0; rows * columns])
 }
 
 #[cfg(test)]
@@ -76,7 +134,9 @@ mod tests {
     #[test]
     fn products_are_those_of_one_thread() {
         let entry = |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
-        for (rows, inner, columns) in [(3, 2, 4), (700, 70, 41), (301, 250, 250), (5, 0, 3)] {
+        for (rows, inner, columns) in
+            [(3, 2, 4), (700, 70, 41), (301, 250, 250), (5, 0, 3), (3001, 202, 4), (3001, 97, 7)]
+        {
             let (a, b) = (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
             let scale = 1e-15 * rows as f64;
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
@@ -84,6 +144,8 @@ mod tests {
             assert!((product_with_upper(&a, &upper) - &a * &upper).amax() <= scale);
             let own = gram(&a);
             assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
+            let tall = DMatrix::from_fn(rows, columns, |i, j| entry(i, j + inner));
+            assert!((product_along(&a, &tall) - a.transpose() * &tall).amax() <= scale * 10.0);
         }
     }
 }

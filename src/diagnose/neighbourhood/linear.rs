@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
-use crate::numeric::{inverse_factor, product};
+use crate::numeric::{inverse_factor, product, product_along, zeros};
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
 /// the others say nothing of it.
@@ -77,7 +77,7 @@ impl LinearNeighbourhood {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut columns = DMatrix::zeros(rows + known.len(), n);
+        let mut columns = zeros(rows + known.len(), n);
         let long_columns = columns.as_mut_slice().par_chunks_mut((rows + known.len()).max(1)).enumerate();
         long_columns.for_each(|(j, long)| long[..rows].copy_from_slice(jacobian.column(j).as_slice()));
         let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
@@ -124,16 +124,14 @@ impl LinearNeighbourhood {
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
 
-    /// Takes further columns of the data into the fit, shape = (3 N, k), with unknowns of their own behind the others; gives
-    /// the new orthonormal directions.
-    pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
+    /// What columns of the data, shape = (3 N, k), have along the basis, the orthonormal directions that they add to it, and these in
+    /// terms of what the basis leaves of the columns.
+    fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
-        let mut along = DMatrix::zeros(first, k);
+        let mut along = DMatrix::zeros(self.basis.ncols(), columns.ncols());
         for _ in 0..2 {
-            // The narrow side is transposed: this is the product that is fast.
-            let more = product(&left.transpose(), &self.basis).transpose();
+            let more = product_along(&self.basis, &left);
             left -= product(&self.basis, &more);
             along += more;
             if most_is_left(&left, &lengths) {
@@ -141,6 +139,14 @@ impl LinearNeighbourhood {
             }
         }
         let (new, within) = orthonormal(left, Some(&lengths));
+        (along, new, within)
+    }
+
+    /// Takes further columns of the data into the fit, shape = (3 N, k), with unknowns of their own behind the others; gives
+    /// the new orthonormal directions.
+    pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
+        let (along, new, within) = self.directions(columns);
         let rank = new.ncols();
         self.basis = std::mem::take(&mut self.basis).resize_horizontally(first + rank, 0.0);
         self.basis.columns_range_mut(first..).copy_from(&new);
@@ -293,7 +299,7 @@ impl LinearNeighbourhood {
 
     /// Largest principal angle \[rad\] between what two sets of columns add to the fit; `None` where one of them adds nothing.
     pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
-        let (a, b) = (self.clone().add(one), self.clone().add(other));
+        let (a, b) = (self.directions(one).1, self.directions(other).1);
         if a.is_empty() || b.is_empty() {
             return None;
         }

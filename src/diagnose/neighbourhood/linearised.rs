@@ -9,6 +9,7 @@ use crate::least_squares::{Block, LeastSquares, MANY_UNKNOWNS};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, Slot};
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::numeric::zeros;
 use crate::problem::{Effect, Problem};
 
 /// Poses linearised together.
@@ -282,7 +283,7 @@ impl Driven {
 /// Jacobian and residual of all items, in parallel, the same for any number of threads.
 fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let (poses, n) = (residuals.items(), residuals.parameters());
-    let mut jacobian = DMatrix::zeros(3 * poses, n);
+    let mut jacobian = zeros(3 * poses, n);
     let mut residual = DVector::zeros(3 * poses);
     let blocks: Vec<Block> = (0..poses.div_ceil(CHUNK))
         .into_par_iter()
