@@ -29,7 +29,7 @@ pub(crate) use identifiability::Blind;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub use loss::Loss;
 pub use memory::Memory;
-pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, residual_vector};
+pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, jacobian_and_residual, residual_vector};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 pub use variance::VarianceLikelihood;

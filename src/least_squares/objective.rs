@@ -11,6 +11,7 @@ use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
 use super::{Block, LeastSquares, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective, Triangle, slopes};
+use crate::numeric::zeros;
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
@@ -361,12 +362,29 @@ pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVecto
     residuals
 }
 
-/// The whole Jacobian ∂r/∂x, m × n; for small problems and tests.
+/// The whole Jacobian ∂r/∂x, m × n, and all residuals; parts of the items on every core.
+pub fn jacobian_and_residual<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let (items, rows, n) = (problem.items(), problem.rows_per_item(), problem.parameters());
+    let of_chunk = |chunk: usize| {
+        let own = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(items);
+        let mut block = Block::zeros(rows * own.len(), n);
+        problem.linearise(x, own, &mut block);
+        block
+    };
+    let blocks: Vec<Block> = (0..items.div_ceil(CHUNK_ITEMS)).into_par_iter().map(of_chunk).collect();
+    let mut jacobian = zeros(rows * items, n);
+    let mut residual = DVector::zeros(rows * items);
+    let gather = |(j, column): (usize, &mut [f64])| {
+        column.chunks_mut(rows * CHUNK_ITEMS).zip(&blocks).for_each(|(out, own)| out.copy_from_slice(own.column(j)));
+    };
+    jacobian.as_mut_slice().par_chunks_mut((rows * items).max(1)).enumerate().for_each(gather);
+    gather((n, residual.as_mut_slice()));
+    (jacobian, residual)
+}
+
+/// The whole Jacobian ∂r/∂x, m × n.
 pub fn jacobian<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DMatrix<f64> {
-    let (m, n) = (problem.items() * problem.rows_per_item(), problem.parameters());
-    let mut block = Block::zeros(m, n);
-    problem.linearise(x, 0..problem.items(), &mut block);
-    DMatrix::from_column_slice(m, n, &block.values[..m * n])
+    jacobian_and_residual(problem, x).0
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal};
 use super::score::{Score, Sums};
-use crate::numeric::{inverse_factor, product, product_along, zeros};
+use crate::numeric::{gram, inverse_factor, product, product_along, zeros};
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left without the block: then
 /// the others say nothing of it.
@@ -317,7 +317,7 @@ impl LinearNeighbourhood {
         let left_out = |number: usize| {
             let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
             let (basis, residual) = (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
-            let inner = DMatrix::identity(n, n) - basis.transpose() * &basis;
+            let inner = DMatrix::identity(n, n) - gram(&basis);
             let step = decided(inner, &basis.tr_mul(&residual));
             (residual + basis * step).norm_squared()
         };

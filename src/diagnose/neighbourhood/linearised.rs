@@ -5,15 +5,12 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
-use crate::least_squares::{Block, LeastSquares, MANY_UNKNOWNS};
+use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, Slot};
 use crate::model::{Model, Pose, PoseResiduals};
-use crate::numeric::zeros;
 use crate::problem::{Effect, Problem};
 
-/// Poses linearised together.
-const CHUNK: usize = 256;
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a one changes nothing else.
 const TRACE_OF_MASS: f64 = 1e-4;
 
@@ -100,7 +97,7 @@ impl<'a> Linearised<'a> {
             }
             let all: Vec<usize> = own.iter().copied().chain(first..first + slots.len()).collect();
             let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
-            linearise(&residuals, &residuals.reduced(&at))
+            jacobian_and_residual(&residuals, &residuals.reduced(&at))
         };
         let new = |fitted: DMatrix<f64>, residual| Derivatives {
             fitted: Arc::new(fitted),
@@ -113,7 +110,7 @@ impl<'a> Linearised<'a> {
             let all = [shared.as_slice(), &slots].concat();
             let (jacobian, _) = pass(unknowns, &all);
             let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
-            let (_, residual) = linearise(&plain, &DVector::zeros(0));
+            let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
             let fitted = unknowns.len() + shared.len();
             let mut own = new(jacobian.columns(0, fitted).into_owned(), residual);
             own.extend(&slots, jacobian.columns_range(fitted..));
@@ -174,7 +171,7 @@ impl<'a> Linearised<'a> {
     /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N, parameters).
     pub fn of_parameters(&self, model: &Model, parameters: &[usize], x: &DVector<f64>) -> DMatrix<f64> {
         let residuals = PoseResiduals::new(model, self.poses.clone(), parameters.to_vec(), x.clone());
-        linearise(&residuals, &residuals.reduced(x)).0
+        jacobian_and_residual(&residuals, &residuals.reduced(x)).0
     }
 
     /// Whitened residual, 3 N.
@@ -278,26 +275,4 @@ impl Driven {
         let value = |driver: &Driver| driver.values(linearised.poses.iter().map(|pose| &pose.setup));
         Self { terms, values: drivers.par_iter().map(value).collect() }
     }
-}
-
-/// Jacobian and residual of all items, in parallel, the same for any number of threads.
-fn linearise(residuals: &PoseResiduals, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-    let (poses, n) = (residuals.items(), residuals.parameters());
-    let mut jacobian = zeros(3 * poses, n);
-    let mut residual = DVector::zeros(3 * poses);
-    let blocks: Vec<Block> = (0..poses.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let items = chunk * CHUNK..((chunk + 1) * CHUNK).min(poses);
-            let mut block = Block::zeros(3 * items.len(), n);
-            residuals.linearise(x, items, &mut block);
-            block
-        })
-        .collect();
-    let gather = |(j, column): (usize, &mut [f64])| {
-        column.chunks_mut(3 * CHUNK).zip(&blocks).for_each(|(out, block)| out.copy_from_slice(block.column(j)));
-    };
-    jacobian.as_mut_slice().par_chunks_mut((3 * poses).max(1)).enumerate().for_each(gather);
-    gather((n, residual.as_mut_slice()));
-    (jacobian, residual)
 }

@@ -231,7 +231,10 @@ impl Driver {
     }
 }
 
-/// The values of many drivers in one pose: a wave takes its sine and cosine from the one before it where their orders follow each other.
+/// Orders that a wave may be above the one before it to be had from it by steps: a sine and a cosine cost more than so many.
+const NEAR: u32 = 4;
+
+/// The values of many drivers in one pose: a wave takes its sine and cosine from the one before it where their orders are near.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Waves {
     /// Joint and order of the last wave, with its sine and cosine.
@@ -256,9 +259,13 @@ impl Waves {
         let q = setup.configuration[joint];
         let wave = match self.last {
             Some((own, last, wave)) if own == joint && last == order => return wave,
-            Some((own, last, (sin, cos))) if own == joint && last + 1 == order => {
+            Some((own, last, mut wave)) if own == joint && last < order && order - last <= NEAR => {
                 let (by_sin, by_cos) = *self.first.get_or_insert_with(|| q.sin_cos());
-                (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
+                for _ in last..order {
+                    let (sin, cos) = wave;
+                    wave = (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin);
+                }
+                wave
             }
             _ => {
                 let wave = (f64::from(order) * q).sin_cos();
@@ -341,7 +348,7 @@ mod tests {
     fn waves_that_follow_each_other_are_those_by_themselves() {
         let setup = PoseView::of(&[0.7, -2.3]);
         let mut waves = Waves::default();
-        let orders = (1..=60).chain([3, 4, 4, 9]);
+        let orders = (1..=60).chain([3, 4, 4, 6, 9, 13, 18]);
         for (order, joint) in orders.flat_map(|order| [(order, 1), (order, 1), (order, order as usize % 2)]) {
             for driver in [Driver::Sine(joint, order), Driver::Cosine(joint, order), Driver::Command(joint)] {
                 let (found, expected) = (waves.value(driver, &setup), driver.value(&setup));

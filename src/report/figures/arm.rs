@@ -65,14 +65,19 @@ impl<'a> Poses<'a> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// ∂p/∂(coordinate) of all rows [m/rad] or [m/m].
-    pub fn levers(&self, arm: &Arm, slot: Slot) -> Vec<Vector3<f64>> {
-        let model = arm.model.probing(&[(slot, 0.0)]);
-        let x = arm.x.clone().insert_row(arm.x.len(), 0.0);
+    /// ∂p/∂(coordinate) of all rows, of one coordinate after the other [m/rad] or [m/m].
+    pub fn levers(&self, arm: &Arm, slots: &[Slot]) -> Vec<Vec<Vector3<f64>>> {
+        let (first, count) = (arm.x.len(), slots.len());
+        let model = arm.model.probing(&slots.iter().map(|&slot| (slot, 0.0)).collect::<Vec<_>>());
+        let x = arm.x.clone().resize_vertically(first + count, 0.0);
         let poses = self.all(1.0);
         let sigmas: Vec<f64> = poses.iter().map(|pose| pose.sigma).collect();
-        let column = jacobian(&PoseResiduals::new(&model, poses, vec![arm.x.len()], x), &DVector::zeros(1));
-        let lever = |(k, sigma): (usize, &f64)| Vector3::from_fn(|axis, _| -column[(3 * k + axis, 0)] * sigma);
-        sigmas.iter().enumerate().map(lever).collect()
+        let residuals = PoseResiduals::new(&model, poses, (first..first + count).collect(), x);
+        let columns = jacobian(&residuals, &DVector::zeros(count));
+        let of_slot = |place: usize| {
+            let lever = |(k, sigma): (usize, &f64)| Vector3::from_fn(|axis, _| -columns[(3 * k + axis, place)] * sigma);
+            sigmas.iter().enumerate().map(lever).collect()
+        };
+        (0..count).map(of_slot).collect()
     }
 }

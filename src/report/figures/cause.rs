@@ -111,6 +111,23 @@ fn slides(problem: &Problem, joint: usize) -> bool {
     problem.joints[joint - 1].kind == JointKind::Prismatic
 }
 
+/// The fit of a model that declares the effects, in every row.
+#[derive(Clone, Copy)]
+pub struct Closed<'a> {
+    /// The arm as fitted.
+    pub arm: &'a Arm,
+    /// The residual that is left \[m\].
+    pub left: &'a [Vector3<f64>],
+    /// What the coordinate of each joint does \[m/rad\] or \[m/m\].
+    pub levers: &'a [Vec<Vector3<f64>>],
+}
+
+/// The coordinate of every joint.
+pub fn coordinates(problem: &Problem) -> Vec<Slot> {
+    let field = |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
+    (1..=problem.joints.len()).map(|joint| Slot::Joint { joint: joint - 1, field: field(joint) }).collect()
+}
+
 /// An effect over its cause, before it is known which poses say something.
 struct View<'a> {
     across: Quantity,
@@ -134,8 +151,8 @@ struct Rows<'a> {
     values: &'a [f64],
 }
 
-/// The cause of an effect at the fit of `problem`, which declares it, and what that fit leaves of every row.
-pub fn of(found: &Effect, problem: &Problem, (arm, left): (&Arm, &[Vector3<f64>]), poses: &Poses) -> Option<Cause> {
+/// The cause of an effect at the fit of `problem`, which declares it.
+pub fn of(found: &Effect, problem: &Problem, Closed { arm, left, levers }: Closed, poses: &Poses) -> Option<Cause> {
     let parameters = found.parameters(problem);
     let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
@@ -152,7 +169,7 @@ pub fn of(found: &Effect, problem: &Problem, (arm, left): (&Arm, &[Vector3<f64>]
         parameters: &parameters,
         values: &values,
     };
-    let view = at_joint(found, problem, &rows, arm, poses).unwrap_or_else(|| elsewhere(found, problem, &rows));
+    let view = at_joint(found, problem, &rows, levers, poses).unwrap_or_else(|| elsewhere(found, problem, &rows));
     let most = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
         x: view.x[k],
@@ -181,14 +198,17 @@ fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
 }
 
 /// An effect that changes the coordinate of a joint.
-fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm, poses: &Poses) -> Option<View<'a>> {
+fn at_joint<'a>(
+    found: &Effect,
+    problem: &'a Problem,
+    rows: &'a Rows,
+    levers: &[Vec<Vector3<f64>>],
+    poses: &Poses,
+) -> Option<View<'a>> {
     let first = rows.values.first().copied().unwrap_or_default();
     let each = |value: &dyn Fn(&PoseView) -> f64| -> Vec<f64> { rows.poses.iter().map(value).collect() };
     let command = |joint: usize| each(&|pose| pose.configuration[joint - 1]);
-    let lever = |joint: usize| {
-        let field = if slides(problem, joint) { JointField::D } else { JointField::Theta };
-        poses.levers(arm, Slot::Joint { joint: joint - 1, field })
-    };
+    let lever = |joint: usize| &levers[joint - 1];
     let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
     // Δθ = c M, c₃ M³: the moment follows from the law itself.
     let moments = |joint: usize, of: fn(f64) -> f64| -> Vec<f64> {
@@ -241,7 +261,7 @@ fn at_joint<'a>(found: &Effect, problem: &'a Problem, rows: &'a Rows, arm: &Arm,
     };
     let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
     let up = Box::new(move |_| Quantity::error(&format!("joint {joint}"), unit));
-    Some(View { across, up, x, levers: lever(joint), law, reading: COORDINATE })
+    Some(View { across, up, x, levers: lever(joint).clone(), law, reading: COORDINATE })
 }
 
 type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::arm::{Arm, Poses};
-use super::cause::{self, Cause};
+use super::cause::{self, Cause, Closed};
 use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted};
@@ -121,7 +121,9 @@ impl PlotData {
             stage(&poses, Stage::Closed, &after),
         ];
         let left = poses.errors(&after, &poses.rows());
-        let cause = |found: &Found| cause::of(&found.effect, &closure.closed, (&after, &left), &poses);
+        let coordinates = if closure.effects.is_empty() { Vec::new() } else { cause::coordinates(&closure.closed) };
+        let closed = Closed { arm: &after, left: &left, levers: &poses.levers(&after, &coordinates) };
+        let cause = |found: &Found| cause::of(&found.effect, &closure.closed, closed, &poses);
         let causes: Vec<Option<Cause>> = closure.effects.par_iter().map(cause).collect();
         Ok(Self {
             causes: causes.into_iter().flatten().collect(),
