@@ -18,6 +18,7 @@ mod triangle;
 mod uncertainty;
 mod variance;
 mod weak;
+mod whole;
 
 use std::ops::Range;
 
@@ -29,11 +30,12 @@ pub(crate) use identifiability::Blind;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub use loss::Loss;
 pub use memory::Memory;
-pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError, jacobian, jacobian_and_residual, residual_vector};
+pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 pub use variance::VarianceLikelihood;
 pub use weak::{Steadied, WEAK_BELOW, Weak};
+pub use whole::{jacobian, jacobian_and_residual, residual_vector};
 
 /// Unknowns from which on taking derivatives and reducing them is nearly all of the work of a fit.
 pub(crate) const MANY_UNKNOWNS: usize = 100;

@@ -1,11 +1,13 @@
-//! Products of tall matrices on every core: each column of the result is one thread's, so that they are the same to the bit for any
-//! number of threads.
+//! Products of tall matrices on every core: each part of the result is one thread's, and parts depend on sizes alone, so that they are
+//! the same to the bit for any number of threads.
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
 /// Columns of a result that one thread forms at a time: each time the other matrix is packed anew.
 const TOGETHER: usize = 96;
+/// The same of a narrow result, of which nothing is packed.
+const FEW: usize = 8;
 /// Columns up to which a product is formed by axpys and dots: there is too little to do with what would be packed.
 const NARROW: usize = 5;
 /// Rows that one thread goes through at a time where the result is narrow.
@@ -39,11 +41,12 @@ fn product_of(a: &DMatrix<f64>, b: &DMatrix<f64>, filled: impl Fn(usize) -> usiz
         let mut own = DMatrixViewMut::from_slice(own, rows, count);
         own.gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
     };
-    out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().for_each(form);
+    // Of a triangle what takes longest comes first.
+    out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().rev().for_each(form);
     out
 }
 
-/// A B of a narrow B: some rows after others, each gone through once.
+/// A B of a narrow B: some rows after others, which stay in the processor's cache from column to column.
 fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let of_rows = |part: usize| a.rows(part * SHORT, SHORT.min(rows - part * SHORT)) * b;
@@ -57,15 +60,16 @@ fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// AᵀB of a tall A and a B with few columns.
 pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let (rows, n) = a.shape();
+    let n = a.ncols();
     if a.len() * b.ncols() < WORTH_THREADS {
         return a.tr_mul(b);
     }
+    let together = if b.ncols() <= NARROW { FEW } else { TOGETHER };
     // The narrow side is transposed: this is the product that is fast.
     let turned = transposed_view(b);
     let mut out = zeros(b.ncols(), n);
     let form = |(part, own): (usize, &mut [f64])| {
-        let (first, count) = (part * TOGETHER, own.len() / turned.nrows());
+        let (first, count) = (part * together, own.len() / turned.nrows());
         let (mut own, a) = (DMatrixViewMut::from_slice(own, turned.nrows(), count), a.columns(first, count));
         if turned.nrows().min(count) <= NARROW {
             for (mut out, column) in own.column_iter_mut().zip(a.column_iter()) {
@@ -75,8 +79,7 @@ pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> 
             own.gemm(1.0, &turned, &a, 0.0);
         }
     };
-    debug_assert_eq!(rows, b.nrows());
-    out.as_mut_slice().par_chunks_mut(b.ncols() * TOGETHER).enumerate().for_each(form);
+    out.as_mut_slice().par_chunks_mut(b.ncols() * together).enumerate().for_each(form);
     out.transpose()
 }
 
@@ -98,7 +101,8 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
             own.rows_mut(0, above).gemm(1.0, &transposed.rows(0, above), &a.columns(first, count), 0.0);
         }
     };
-    out.as_mut_slice().par_chunks_mut(n * TOGETHER).enumerate().for_each(form);
+    // The longest columns first.
+    out.as_mut_slice().par_chunks_mut(n * TOGETHER).enumerate().rev().for_each(form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }

@@ -353,14 +353,20 @@ impl<'a, 'l> Columns<'a, 'l> {
         let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed) else { return };
         let slow = basis(&known.scaled, self.rules.slow_length);
         for order in 1..=self.rules.near_orders {
-            let k = slow.ncols();
-            let waves = DMatrix::from_fn(slow.nrows(), 2 * k, |row, j| {
-                let angle = f64::from(order) * known.values[row];
-                slow[(row, j % k)] * if j < k { angle.sin() } else { angle.cos() }
-            });
+            let waves = || {
+                let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
+                for (row, q) in known.values.iter().enumerate() {
+                    let (sin, cos) = (f64::from(order) * q).sin_cos();
+                    for j in 0..k {
+                        waves[(row, j)] = slow[(row, j)] * sin;
+                        waves[(row, j + k)] = slow[(row, j)] * cos;
+                    }
+                }
+                waves
+            };
             let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate.clone()]);
             let hypothesis = Hypothesis { law, part: Part::Joint(joint), slot: Some(slot), depends_on };
-            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || times(&[at], &waves));
+            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || times(&[at], &waves()));
         }
     }
 

@@ -68,6 +68,9 @@ impl<'a> Poses<'a> {
     /// ∂p/∂(coordinate) of all rows, of one coordinate after the other [m/rad] or [m/m].
     pub fn levers(&self, arm: &Arm, slots: &[Slot]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), slots.len());
+        if slots.is_empty() {
+            return Vec::new();
+        }
         let model = arm.model.probing(&slots.iter().map(|&slot| (slot, 0.0)).collect::<Vec<_>>());
         let x = arm.x.clone().resize_vertically(first + count, 0.0);
         let poses = self.all(1.0);
