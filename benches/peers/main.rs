@@ -128,9 +128,9 @@ fn serve(own: &Bounded) {
     let residuals = own.residuals();
     let fit = own.fit(&residuals);
     let solve = || minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
-    let found = solve();
+    let (found, pool) = (solve(), common::pool(1));
     let (fitted, linearised) =
-        common::pool(1).install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&found.x))));
+        pool.install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&found.x))));
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}\n{}\n{}", words(own.bounds.lower()), words(own.bounds.upper()), own.rows.len()).unwrap();
     for i in 0..own.rows.len() {
@@ -143,7 +143,7 @@ fn serve(own: &Bounded) {
     for line in std::io::stdin().lines() {
         let line = line.unwrap();
         let x = DVector::from_iterator(found.x.len(), line.split_whitespace().map(|word| word.parse().unwrap()));
-        let (data, slopes) = common::pool(1).install(|| (residual_vector(&residuals, &x), jacobian(&residuals, &x)));
+        let (data, slopes) = pool.install(|| (residual_vector(&residuals, &x), jacobian(&residuals, &x)));
         let own = &priors.matrix * &x;
         // Column after column of the transpose: row after row.
         let slopes = (slopes.transpose(), priors.matrix.transpose());

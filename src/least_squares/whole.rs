@@ -49,3 +49,61 @@ pub fn jacobian_and_residual<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> 
 pub fn jacobian<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DMatrix<f64> {
     jacobian_and_residual(problem, x).0
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::Range;
+
+    use super::*;
+
+    /// rᵢ = (i x₁², x₂ − i).
+    struct Rows(usize);
+
+    impl LeastSquares for Rows {
+        fn parameters(&self) -> usize {
+            2
+        }
+
+        fn items(&self) -> usize {
+            self.0
+        }
+
+        fn rows_per_item(&self) -> usize {
+            2
+        }
+
+        fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+            for (i, own) in items.zip(out.chunks_exact_mut(2)) {
+                own.copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
+            }
+        }
+
+        fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+            let first = items.start;
+            for i in items {
+                let row = 2 * (i - first);
+                block.column_mut(0)[row] = 2.0 * i as f64 * x[0];
+                block.column_mut(1)[row + 1] = 1.0;
+                block.column_mut(2)[row..row + 2].copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_many_parts_keep_their_places() {
+        let x = DVector::from_vec(vec![1.5, -2.0]);
+        for items in [0, 3, CHUNK_ITEMS, 2 * CHUNK_ITEMS + 7] {
+            let residual = DVector::from_fn(2 * items, |k, _| {
+                let i = (k / 2) as f64;
+                if k % 2 == 0 { i * 2.25 } else { -2.0 - i }
+            });
+            let slope = |k: usize, j: usize| match (k % 2, j) {
+                (0, 0) => 3.0 * (k / 2) as f64,
+                (1, 1) => 1.0,
+                _ => 0.0,
+            };
+            assert_eq!(residual_vector(&Rows(items), &x), residual);
+            assert_eq!(jacobian_and_residual(&Rows(items), &x), (DMatrix::from_fn(2 * items, 2, slope), residual));
+        }
+    }
+}
