@@ -246,6 +246,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         loss: Loss::Squares,
         counts_fixed: true,
         memory: &memory,
+        known: None,
         progress: None,
         stop: None,
     };

@@ -15,7 +15,7 @@ use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
-use crate::model::{Model, Pose};
+use crate::model::{KnownDerivatives, Model, Pose};
 use crate::problem::{Fixture, Observation};
 
 /// Sweeps after which a sequential strategy is given up.
@@ -60,6 +60,8 @@ pub(super) struct Fitting<'a> {
     pub turn_noise_model: NoiseModel,
     /// Linearisations that its fits share.
     pub memory: &'a Memory,
+    /// Derivatives that are known where it may begin.
+    pub known: Option<&'a KnownDerivatives>,
 }
 
 /// Where a fit ended.
@@ -137,6 +139,7 @@ impl<'a> Fitting<'a> {
             loss: Loss::Squares,
             counts_fixed: false,
             memory: self.memory,
+            known: self.known,
             progress: self.progress,
             stop: self.stop,
         }

@@ -286,6 +286,7 @@ fn fit_rows(
         noise_model: NoiseModel::DECLARED,
         turn_noise_model: NoiseModel::DECLARED,
         memory: &memory,
+        known: options.predecessor.as_ref().and_then(|predecessor| predecessor.derivatives.as_ref()),
     };
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) = prepared(&mut fitting, options.predecessor.as_deref(), noise_is_declared)?;

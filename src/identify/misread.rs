@@ -142,6 +142,7 @@ impl Misreading {
             held_out_only,
             turn_sigma: None,
             memory,
+            known: None,
             ..*fitting
         };
         let registered = fitting.registered().ok()?;

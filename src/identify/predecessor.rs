@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::noise_model::NoiseModel;
 use super::{Errors, Identification};
-use crate::model::Model;
+use crate::model::{KnownDerivatives, Model};
 
 /// What the next fit need not find anew.
 #[derive(Debug, Clone)]
@@ -15,9 +15,16 @@ pub(crate) struct Predecessor {
     pub(super) errors: Errors,
     /// What the fit made of the σ of positions, and of orientations; `None` where the next one begins with them as declared.
     pub(super) noise: Option<(NoiseModel, NoiseModel)>,
+    /// Derivatives where it ended, if somebody took them.
+    pub(super) derivatives: Option<KnownDerivatives>,
 }
 
 impl Predecessor {
+    /// The same with derivatives where it ended.
+    pub(crate) fn with_derivatives(self, derivatives: Option<KnownDerivatives>) -> Self {
+        Self { derivatives, ..self }
+    }
+
     /// The full parameter vector of the registered nominal arm in a model of its successor.
     pub(super) fn registered(&self, model: &Model) -> DVector<f64> {
         let deviation =
@@ -33,6 +40,6 @@ impl Identification {
         let names = self.estimates.iter().map(|estimate| estimate.name.clone());
         let placed = names.zip(self.registered_x.iter().copied()).filter(|(_, deviation)| *deviation != 0.0);
         let noise = alike.then_some(self.noise_models);
-        Predecessor { registered: placed.collect(), errors: self.registered, noise }
+        Predecessor { registered: placed.collect(), errors: self.registered, noise, derivatives: None }
     }
 }

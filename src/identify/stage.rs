@@ -18,7 +18,7 @@ use crate::least_squares::{
     UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of predicted positions, which are
@@ -68,6 +68,8 @@ pub(super) struct Stage<'a> {
     pub counts_fixed: bool,
     /// Linearisations that fits of the same data share.
     pub memory: &'a Memory,
+    /// Derivatives of the same poses that are known at some point.
+    pub known: Option<&'a KnownDerivatives>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
 }
@@ -114,7 +116,7 @@ impl<'a> Stage<'a> {
 
     /// The same of other poses.
     pub fn residuals_of(&self, poses: Vec<Pose<'a>>, at: &DVector<f64>) -> PoseResiduals<'a> {
-        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone())
+        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone()).knowing(self.known)
     }
 
     /// The whitened data linearised at `at`, each pose weighted by `loss`, priors left out.

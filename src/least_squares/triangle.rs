@@ -9,8 +9,11 @@ use super::{Block, Linearisation};
 
 /// Reflectors applied together as matrix products, where so many columns are left: a wide panel costs more itself, and fewer passes
 /// over what is behind it.
-const WIDE: [(usize, usize); 2] = [(WIDEST, 384), (32, 128)];
+const WIDE: [(usize, usize); 2] = [(WIDEST, 384), (NARROWER, WIDE_FROM)];
 const WIDEST: usize = 96;
+/// Those of the widest are taken so many at a time among themselves.
+const NARROWER: usize = 32;
+const WIDE_FROM: usize = 128;
 
 /// The triangular factor of all rows absorbed so far.
 ///
@@ -33,13 +36,20 @@ impl Triangle {
         Self { parameters, rows: vec![0.0; parameters * (parameters + 1)], squares: 0.0 }
     }
 
-    /// The triangular factor of a matrix.
+    /// The triangular factor of a matrix, of many columns in less time where its rows begin with zeros, as those of a factor do.
     pub(crate) fn of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let (m, n) = matrix.shape();
+        let mut order: Vec<usize> = (0..m).collect();
+        if n >= WIDE_FROM {
+            let first = |row: &usize| matrix.row(*row).iter().position(|value| *value != 0.0).unwrap_or(n);
+            order.sort_by_cached_key(first);
+        }
         let mut block = Block::zeros(m, n);
-        block.values[..m * n].copy_from_slice(matrix.as_slice());
+        for (out, column) in block.values.chunks_exact_mut(m.max(1)).zip(matrix.column_iter()) {
+            out.iter_mut().zip(&order).for_each(|(out, &row)| *out = column[row]);
+        }
         let mut triangle = Self::new(n);
-        triangle.absorb(&mut block);
+        triangle.absorb_rows(&mut block);
         triangle.into_linearisation().triangle
     }
 
@@ -89,7 +99,7 @@ impl Triangle {
     /// first reflectors.
     pub(super) fn absorb_rows(&mut self, block: &mut Block) {
         let n = block.parameters;
-        if WIDE.iter().all(|(_, least)| n < *least) {
+        if n < WIDE_FROM {
             return self.absorb(block);
         }
         let first = |row: usize| (0..n).find(|&j| block.values[j * block.rows + row] != 0.0).unwrap_or(n);
@@ -152,10 +162,14 @@ impl Triangle {
         while let Some(&(wide, _)) = WIDE.iter().find(|(_, least)| n - first >= *least) {
             let used = filled(first + wide).min(m);
             let mut factors = [0.0; WIDEST];
-            let factors = &mut factors[..wide];
-            self.reduce_columns(block, first..first + wide, first + wide, |_| used, factors);
-            self.apply(block, first, used, factors);
-            first += wide;
+            let end = first + wide;
+            for (part, own) in factors[..wide].chunks_mut(NARROWER).enumerate() {
+                let first = first + part * NARROWER;
+                self.reduce_columns(block, first..first + own.len(), first + own.len(), |_| used, own);
+                self.apply(block, (first, end), used, own);
+            }
+            self.apply(block, (first, n + 1), used, &factors[..wide]);
+            first = end;
         }
         self.reduce_columns(block, first..n, n + 1, filled, &mut []);
     }
@@ -193,15 +207,18 @@ impl Triangle {
         }
     }
 
-    /// Applies the reflectors of the wide panel at `first` to all columns behind it, as matrix products.
+    /// Applies the reflectors of the wide panel at `first` to the columns behind it up to `end`, as matrix products.
     ///
     /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R − W, C ← C − V W
     /// [Schreiber and Van Loan 1989]
-    fn apply(&mut self, block: &mut Block, first: usize, used: usize, factors: &[f64]) {
+    fn apply(&mut self, block: &mut Block, (first, end): (usize, usize), used: usize, factors: &[f64]) {
         let wide = factors.len();
+        if first + wide == end {
+            return;
+        }
         let (n, m) = (self.parameters, block.rows);
         let (panel, trailing) = block.values[first * m..].split_at_mut(wide * m);
-        let behind = n + 1 - first - wide;
+        let behind = end - first - wide;
         let vectors = DMatrixView::from_slice_with_strides(panel, used, wide, 1, m);
         let transposed = vectors.transpose();
         let mut columns = DMatrixViewMut::from_slice_with_strides_mut(trailing, used, behind, 1, m);

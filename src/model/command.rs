@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::Model;
+use super::driven::Driven;
 use crate::mechanics::Arm;
 use crate::model::parameter::{Driver, JointField, Parameter, Slot};
 use crate::problem::{Joint, JointKind, Problem};
@@ -17,7 +18,7 @@ impl Model {
         let parameters = commands(problem, &arm, Joint::commanded);
         Self {
             nominal: arm,
-            driven: self.commands(x.as_slice()).into_driven(),
+            driven: Driven::all(&self.driven, &self.parameters, x.as_slice()),
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),

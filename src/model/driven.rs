@@ -1,5 +1,6 @@
 //! What adds to the joints' commands and to the strains of beams, pose by pose.
 
+use super::series::Series;
 use crate::model::parameter::{BeamField, Driver, JointField, Parameter, Slot, Waves};
 use crate::problem::{Mimic, PoseView, Problem};
 
@@ -32,6 +33,13 @@ impl Driven {
         driven.collect()
     }
 
+    /// What is known to drive and the free parameters at the full parameter vector `x`.
+    pub fn all(known: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
+        let free = parameters.iter().zip(x);
+        let free = free.filter_map(|(parameter, &x)| Self::of(parameter.slot, parameter.driver, x));
+        known.iter().copied().chain(free).collect()
+    }
+
     /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate or a beam's strain.
     fn of(slot: Slot, driver: Driver, x: f64) -> Option<Self> {
         let place = match slot {
@@ -48,7 +56,9 @@ impl Driven {
 /// Poses with what drives them added, one at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Commands {
-    all: Vec<Driven>,
+    series: Vec<Series>,
+    /// What is in none of these.
+    others: Vec<Driven>,
     configuration: Vec<f64>,
     strains: Vec<f64>,
 }
@@ -56,30 +66,25 @@ pub(super) struct Commands {
 impl Commands {
     /// Of what is known to drive and the free parameters at the full parameter vector `x`.
     pub fn new(known: &[Driven], parameters: &[Parameter], x: &[f64]) -> Self {
-        let free = parameters.iter().zip(x);
-        let mut all = known.to_vec();
-        all.extend(free.filter_map(|(parameter, &x)| Driven::of(parameter.slot, parameter.driver, x)));
-        Self { all, ..Self::default() }
-    }
-
-    /// Everything that is added.
-    pub fn into_driven(self) -> Vec<Driven> {
-        self.all
+        let mut others = Driven::all(known, parameters, x);
+        let series = Series::take(&mut others);
+        Self { series, others, ..Self::default() }
     }
 
     /// The pose as the joints and beams take it.
     #[inline]
     pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
-        if self.all.is_empty() {
+        if self.others.is_empty() && self.series.is_empty() {
             return *setup;
         }
         self.configuration.clear();
         self.configuration.extend_from_slice(setup.configuration);
         self.strains.clear();
         let mut waves = Waves::default();
-        for driven in &self.all {
-            let added = driven.value * waves.value(driven.driver, setup);
-            match driven.place {
+        let others = self.others.iter().map(|own| (own.place, own.value * waves.value(own.driver, setup)));
+        let series = self.series.iter().map(|own| (own.place, own.value(setup.configuration)));
+        for (place, added) in others.chain(series) {
+            match place {
                 Place::Joint(joint) => self.configuration[joint] += added,
                 Place::Strain(number) => {
                     self.strains.resize(3 * self.configuration.len(), 0.0);

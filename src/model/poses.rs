@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::Model;
 use super::derivative::Linearised;
 use super::driven::Commands;
+use super::known::KnownDerivatives;
 use super::observation::between;
 use super::pose::Pose;
 use super::tilt::{Tilts, rigid_tilts};
@@ -34,6 +35,8 @@ pub struct PoseResiduals<'a> {
     rows: usize,
     /// Whether some poses measure tilts.
     tilted: bool,
+    /// Derivatives that are known at a point where these residuals may be linearised.
+    known: Option<&'a KnownDerivatives>,
 }
 
 /// What is seen of a pose.
@@ -48,7 +51,13 @@ impl<'a> PoseResiduals<'a> {
     pub fn new(model: &'a Model, poses: Vec<Pose<'a>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
         let rows = if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
         let tilted = poses.iter().any(|pose| pose.observation.is_angle());
-        Self { model, poses, unknowns, at, rows, tilted }
+        Self { model, poses, unknowns, at, rows, tilted, known: None }
+    }
+
+    /// The same with derivatives that are `known` at a point.
+    #[must_use]
+    pub(crate) fn knowing(self, known: Option<&'a KnownDerivatives>) -> Self {
+        Self { known, ..self }
     }
 
     /// The full parameter vector for unknowns `x`.
@@ -311,10 +320,21 @@ impl LeastSquares for PoseResiduals<'_> {
     }
 
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
-        let full = self.full(x);
-        let mut linearised = Linearised::new(self.model, &full, &self.unknowns, (self.rows == POSE, self.tilted));
-        for (k, pose) in self.poses[items].iter().enumerate() {
-            linearised.write(pose, block, self.rows * k);
-        }
+        let linearise = |unknowns: &[usize], block: &mut Block| {
+            let full = self.full(x);
+            let mut linearised = Linearised::new(self.model, &full, unknowns, (self.rows == POSE, self.tilted));
+            for (k, pose) in self.poses[items.clone()].iter().enumerate() {
+                linearised.write(pose, block, self.rows * k);
+            }
+        };
+        let others = self.known.filter(|_| self.rows == POSITION).and_then(|known| {
+            self.residuals(x, items.clone(), block.column_mut(self.unknowns.len()));
+            let names = self.unknowns.iter().map(|&k| self.model.parameters[k].name.as_str());
+            known.fill(block, (&self.poses, items.clone()), names)
+        });
+        let Some(others) = others else { return linearise(&self.unknowns, block) };
+        let mut new = Block::zeros(block.rows(), others.len());
+        linearise(&others.iter().map(|&j| self.unknowns[j]).collect::<Vec<_>>(), &mut new);
+        others.iter().enumerate().for_each(|(own, &j)| block.column_mut(j).copy_from_slice(new.column(own)));
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, Slot};
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a one changes nothing else.
@@ -28,6 +28,8 @@ pub(in crate::diagnose) struct Derivatives {
     /// Columns of the fitted parameters, and of what is relaxed behind them, shape = (3 N, n).
     fitted: Arc<DMatrix<f64>>,
     residual: Arc<DVector<f64>>,
+    /// 1 σ of each pose \[m\].
+    sigma: Vec<f64>,
     /// σ of the priors of what the problem holds equal and may differ here.
     relaxed: Vec<Option<f64>>,
     /// Columns of places by their number, those of `fitted` counted first.
@@ -36,6 +38,12 @@ pub(in crate::diagnose) struct Derivatives {
 }
 
 impl Derivatives {
+    /// Those of the fitted parameters, of these `names`, as a fit that begins there takes them.
+    pub fn known<'n>(&self, names: impl Iterator<Item = &'n str>) -> KnownDerivatives {
+        let (jacobian, residual) = (Arc::clone(&self.fitted), Arc::clone(&self.residual));
+        KnownDerivatives::new(names, self.sigma.clone(), (jacobian, residual))
+    }
+
     fn column(&self, place: usize) -> DVectorView<'_, f64> {
         match place.checked_sub(self.fitted.ncols()) {
             Some(other) => self.others[other].as_view(),
@@ -102,6 +110,7 @@ impl<'a> Linearised<'a> {
         let new = |fitted: DMatrix<f64>, residual| Derivatives {
             fitted: Arc::new(fitted),
             residual: Arc::new(residual),
+            sigma: poses.iter().map(|pose| pose.sigma).collect(),
             relaxed: relaxed.clone(),
             places: shared.iter().enumerate().map(|(k, &(slot, _))| (slot, unknowns.len() + k)).collect(),
             others: Vec::new(),

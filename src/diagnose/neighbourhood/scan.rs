@@ -32,7 +32,7 @@ pub(crate) struct Scan<'a, 'l> {
 }
 
 /// Candidates that are projected together.
-const TOGETHER: usize = 16;
+const TOGETHER: usize = 48;
 
 /// A candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
