@@ -72,3 +72,65 @@ impl KnownDerivatives {
         Some(others)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::least_squares::jacobian_and_residual;
+    use crate::model::{Model, PoseResiduals};
+    use crate::problem::{Observation, PoseView, Problem};
+
+    fn model(effects: &str) -> Model {
+        let text = format!(
+            "name = 'arm'\n[[joint]]\na_m = 0.6\nalpha_deg = 90\n[[joint]]\na_m = 0.4\n{effects}\n[parameters]\n\
+             'joint*.a' = {{ free = true }}\n'joint*.theta' = {{ free = true }}\n"
+        );
+        let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+        Model::new(&problem, &["base".to_owned()], &["tool".to_owned()]).unwrap()
+    }
+
+    #[test]
+    fn known_columns_are_those_formed_anew() {
+        let configurations: Vec<[f64; 2]> =
+            (0..600).map(|k| [0.01 * f64::from(k), 2.0 * (0.03 * f64::from(k)).sin()]).collect();
+        let pose = |own, sigma| Pose {
+            setup: PoseView::of(own),
+            base: 0,
+            target: 0,
+            observation: Observation::Position,
+            measured: Vector3::new(0.1, 0.2, 0.3),
+            sigma,
+            orientation: None,
+        };
+        let poses = |sigma: f64| -> Vec<Pose> { configurations.iter().map(|own| pose(own, sigma)).collect() };
+        let (plain, more) = (model(""), model("[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"));
+        let names = |model: &Model| model.parameters.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
+        let x = DVector::from_fn(plain.parameters.len(), |j, _| 0.01 * (1.0 + j as f64));
+        let unknowns = |model: &Model| (0..model.parameters.len()).collect::<Vec<_>>();
+        let residuals = PoseResiduals::new(&plain, poses(1e-3), unknowns(&plain), x.clone());
+        let (mut columns, residual) = jacobian_and_residual(&residuals, &x);
+        // What is known is taken as it is: a mark shows that it was.
+        columns.column_mut(0)[5] += 1.0;
+        let all = names(&plain);
+        let known =
+            KnownDerivatives::new(all.iter().map(String::as_str), vec![1e-3; 600], (columns.into(), residual.into()));
+        let at = |name: &String| all.iter().position(|own| own == name).map_or(0.0, |j| x[j]);
+        let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
+        let fresh = PoseResiduals::new(&more, poses(2e-3), unknowns(&more), start.clone());
+        let begun = PoseResiduals::new(&more, poses(2e-3), unknowns(&more), start.clone()).knowing(Some(&known));
+        let ((expected, there), (found, own)) =
+            (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&begun, &start));
+        let mut difference = found - &expected;
+        let first = names(&more).iter().position(|name| *name == all[0]).unwrap();
+        assert!((difference[(5, first)] - 0.5).abs() < 1e-9);
+        difference[(5, first)] = 0.0;
+        assert!(difference.amax() < 1e-11 * expected.amax() && (own - there).amax() < 1e-12);
+        // Elsewhere nothing is known.
+        let moved = start.add_scalar(1e-4);
+        assert!(jacobian_and_residual(&begun, &moved) == jacobian_and_residual(&fresh, &moved));
+    }
+}
