@@ -189,7 +189,7 @@ impl Fitted {
 
     /// The fit in its linear neighbourhood.
     pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
-        self.neighbourhood_with(linearised, &[], None)
+        self.neighbourhood_without(linearised, &[])
     }
 
     /// The same at the identification rows, made once: all of a loop is of the same rows.
@@ -224,36 +224,21 @@ impl Fitted {
         }
     }
 
-    /// The same with some unknowns left out of the fit, and with `more` columns in it, whose coefficients have a prior σ.
-    pub fn neighbourhood_with(
-        &self,
-        linearised: &Linearised,
-        without: &[usize],
-        more: Option<(&DMatrix<f64>, f64)>,
-    ) -> LinearNeighbourhood {
+    /// The same with some unknowns left out of the fit.
+    pub fn neighbourhood_without(&self, linearised: &Linearised, without: &[usize]) -> LinearNeighbourhood {
         let (columns, n) = (linearised.fitted(), self.unknowns.len());
-        let kept: Vec<usize> = (0..n).filter(|j| !without.contains(j)).collect();
         let mut residual = linearised.residual().clone();
         // Of two parameters that are multiplied together one brings it down to nothing.
         let is_place = |slot: Slot| matches!(slot, Slot::Beam { field: BeamField::AddedAt, .. });
         for &j in without.iter().filter(|&&j| !is_place(self.model.parameters[self.unknowns[j]].slot)) {
             residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
         }
-        let mut unknowns = self.unknowns_without(linearised, without, 1.0);
-        let added = more.map_or(0, |(columns, _)| columns.ncols());
-        unknowns.x.extend(std::iter::repeat_n(0.0, added));
-        unknowns.priors.extend(std::iter::repeat_n(more.map(|(_, sigma)| sigma), added));
-        if without.is_empty() && added == 0 {
+        let unknowns = self.unknowns_without(linearised, without, 1.0);
+        if without.is_empty() {
             return LinearNeighbourhood::new(columns, &residual, &unknowns, linearised.empty());
         }
-        let fitted: Vec<usize> = kept.into_iter().chain(n..columns.ncols()).collect();
-        let mut columns = columns.select_columns(&fitted);
-        if let Some((more, _)) = more {
-            let first = columns.ncols();
-            columns = columns.resize_horizontally(first + added, 0.0);
-            columns.columns_mut(first, added).copy_from(more);
-        }
-        LinearNeighbourhood::new(&columns, &residual, &unknowns, linearised.empty())
+        let kept: Vec<usize> = (0..columns.ncols()).filter(|j| *j >= n || !without.contains(j)).collect();
+        LinearNeighbourhood::new(&columns.select_columns(&kept), &residual, &unknowns, linearised.empty())
     }
 
     /// 1 σ of the priors of an effect's parameters in a problem with other effects than this one; `None` where one of them is not free.

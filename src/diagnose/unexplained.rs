@@ -138,7 +138,7 @@ fn correction(fitted: &Fitted, data: &Data, best: &Explanation, hypothesis: &Hyp
     let fit = fitted.around(data);
     let first = 3 * here.len();
     let (own, beyond) = (own.rows(0, first).into_owned(), own.rows_range(first..));
-    let with = fitted.neighbourhood_with(&linearised, &[], Some((&own, sigma)));
+    let with = fit.with_priors(&own, sigma);
     let rms = |squares: f64| (3.0 * squares / fit.rows() as f64).sqrt() * fitted.sigma;
     let (without, corrected) = fit.cross_validate(&data.block).zip(with.cross_validate(&data.block))?;
     let cross_validated = (rms(without), rms(corrected));

@@ -25,23 +25,22 @@ pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVecto
 /// The whole Jacobian ∂r/∂x, m × n, and all residuals; parts of the items on every core.
 pub fn jacobian_and_residual<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let (items, rows, n) = (problem.items(), problem.rows_per_item(), problem.parameters());
-    let of_chunk = |chunk: usize| {
-        let own = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(items);
-        let mut block = Block::zeros(rows * own.len(), n);
-        problem.linearise(x, own, &mut block);
-        block
-    };
-    let blocks: Vec<Block> = (0..items.div_ceil(CHUNK_ITEMS)).into_par_iter().map(of_chunk).collect();
+    let (all, together) = ((rows * items).max(1), (rows * CHUNK_ITEMS).max(1));
     let mut jacobian = zeros(rows * items, n);
     let mut residual = DVector::zeros(rows * items);
-    let gather = |(j, column): (usize, &mut [f64])| {
-        column
-            .chunks_mut((rows * CHUNK_ITEMS).max(1))
-            .zip(&blocks)
-            .for_each(|(out, own)| out.copy_from_slice(own.column(j)));
+    // Of each chunk its part of every column.
+    let mut parts: Vec<Vec<&mut [f64]>> = Vec::new();
+    parts.resize_with(items.div_ceil(CHUNK_ITEMS), || Vec::with_capacity(n + 1));
+    for column in jacobian.as_mut_slice().chunks_mut(all).chain([residual.as_mut_slice()]) {
+        parts.iter_mut().zip(column.chunks_mut(together)).for_each(|(own, part)| own.push(part));
+    }
+    let write = |block: &mut Block, (chunk, part): (usize, Vec<&mut [f64]>)| {
+        let own = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(items);
+        block.reshape(rows * own.len());
+        problem.linearise(x, own, block);
+        part.into_iter().enumerate().for_each(|(j, out)| out.copy_from_slice(block.column(j)));
     };
-    jacobian.as_mut_slice().par_chunks_mut((rows * items).max(1)).enumerate().for_each(gather);
-    gather((n, residual.as_mut_slice()));
+    parts.into_par_iter().enumerate().for_each_init(|| Block::zeros(0, n), write);
     (jacobian, residual)
 }
 

@@ -20,21 +20,29 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if b.ncols() <= NARROW && a.len() * b.ncols() >= WORTH_THREADS {
         return narrow_product(a, b);
     }
-    product_of(a, b, |_| a.ncols())
+    let mut out = zeros(a.nrows(), b.ncols());
+    product_to(a, b, &mut out, |_| a.ncols());
+    out
 }
 
 /// A B of a square upper triangle B.
 pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    product_of(a, b, |columns| columns)
+    let mut out = zeros(a.nrows(), b.ncols());
+    product_with_upper_to(a, b, &mut out);
+    out
+}
+
+/// The same in a matrix of its shape: new memory costs about as much as the product.
+pub(crate) fn product_with_upper_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
+    product_to(a, b, out, |columns| columns);
 }
 
 /// A B, of which the first columns, so many, have nothing below so many rows of B.
-fn product_of(a: &DMatrix<f64>, b: &DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) -> DMatrix<f64> {
+fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < WORTH_THREADS || inner == 0 {
-        return a * b;
+        return a.mul_to(b, out);
     }
-    let mut out = zeros(rows, columns);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * TOGETHER, own.len() / rows);
         let filled = filled(first + count);
@@ -43,7 +51,6 @@ fn product_of(a: &DMatrix<f64>, b: &DMatrix<f64>, filled: impl Fn(usize) -> usiz
     };
     // Of a triangle what takes longest comes first.
     out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().rev().for_each(form);
-    out
 }
 
 /// A B of a narrow B: some rows after others, which stay in the processor's cache from column to column.

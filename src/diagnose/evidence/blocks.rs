@@ -23,7 +23,7 @@ pub(super) fn blocks(
     left_out: &[usize],
 ) -> Option<(Vec<Block>, Target)> {
     let linearised = hypotheses.linearised.without(left_out);
-    let neighbourhood = fitted.neighbourhood_with(&linearised, &hypotheses.unknowns, None);
+    let neighbourhood = fitted.neighbourhood_without(&linearised, &hypotheses.unknowns);
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }

@@ -77,9 +77,7 @@ impl LinearNeighbourhood {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut columns = zeros(rows + known.len(), n);
-        let long_columns = columns.as_mut_slice().par_chunks_mut((rows + known.len()).max(1)).enumerate();
-        long_columns.for_each(|(j, long)| long[..rows].copy_from_slice(jacobian.column(j).as_slice()));
+        let mut columns = lengthened(jacobian, known.len());
         let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
         for (row, &(j, sigma)) in known.iter().enumerate() {
             columns[(rows + row, j)] = sigma.recip();
@@ -164,6 +162,23 @@ impl LinearNeighbourhood {
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
         let mut with = self.clone();
         with.add(columns);
+        with
+    }
+
+    /// The same fit with further columns of the data, shape = (3 N, k), whose coefficients have a prior of 1 σ about 0.
+    pub fn with_priors(&self, columns: &DMatrix<f64>, sigma: f64) -> Self {
+        let (rows, k) = (self.basis.nrows(), columns.ncols());
+        let mut columns = columns.clone().resize_vertically(rows + k, 0.0);
+        columns.view_mut((rows, 0), (k, k)).fill_diagonal(sigma.recip());
+        let mut with = Self {
+            basis: lengthened(self.basis.as_view(), k),
+            residual: self.residual.clone().resize_vertically(rows + k, 0.0),
+            root: self.root.clone(),
+            optimum: self.optimum.clone(),
+            step: self.step.clone(),
+            ..*self
+        };
+        with.add(&columns);
         with
     }
 
@@ -327,6 +342,15 @@ impl LinearNeighbourhood {
     }
 }
 
+/// A tall matrix with so many rows of zeros below it.
+fn lengthened(matrix: DMatrixView<f64>, more: usize) -> DMatrix<f64> {
+    let (rows, n) = matrix.shape();
+    let mut long = zeros(rows + more, n);
+    let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();
+    columns.for_each(|(j, out)| out[..rows].copy_from_slice(matrix.column(j).as_slice()));
+    long
+}
+
 /// Whether so much is left of every column.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
     left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= MOSTLY * length)
@@ -378,6 +402,26 @@ mod tests {
         let with = rest.with(&columns.columns(3, 2).into_owned());
         assert!((with.sums().squares - whole.sums().squares).abs() < 1e-10);
         assert!((with.optimum.rows(0, 3) - whole.optimum.rows(0, 3)).norm() < 1e-10);
+    }
+
+    #[test]
+    fn further_columns_with_priors_are_fitted_as_if_they_had_been_there() {
+        let (columns, residual, mut unknowns) = fit(6);
+        (unknowns.x[5], unknowns.priors[5]) = (0.0, Some(0.3));
+        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let first = Unknowns {
+            x: unknowns.x[..5].to_vec(),
+            priors: unknowns.priors[..5].to_vec(),
+            active: DMatrix::zeros(0, 5),
+        };
+        let fit = LinearNeighbourhood::new(&columns.columns(0, 5).into_owned(), &residual, &first, 0);
+        let with = fit.with_priors(&columns.columns(5, 1).into_owned(), 0.3);
+        assert!((&with.optimum - &whole.optimum).norm() < 1e-12 && (&with.step - &whole.step).norm() < 1e-12);
+        assert!((with.sums().squares / whole.sums().squares - 1.0).abs() < 1e-12);
+        assert!((with.sums().data_freedom - whole.sums().data_freedom).abs() < 1e-12);
+        let blocks: Vec<usize> = (0..10).map(|pose| pose / 2).collect();
+        let [one, other] = [with, whole].map(|fit| fit.cross_validate(&blocks).unwrap());
+        assert!((one / other - 1.0).abs() < 1e-12);
     }
 
     #[test]

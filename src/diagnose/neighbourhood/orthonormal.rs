@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::{gram, inverse_factor, inverse_lower, product_with_upper};
+use crate::numeric::{gram, inverse_factor, inverse_lower, product_with_upper, product_with_upper_to};
 
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
@@ -26,12 +26,13 @@ pub(super) fn orthonormal(columns: DMatrix<f64>, lengths: Option<&[f64]>) -> (DM
     }
     // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
     let inverse = inverse_lower(&first).transpose();
-    basis = product_with_upper(&basis, &inverse);
+    let turned = product_with_upper(&basis, &inverse);
     within = product_with_upper(&within, &inverse);
     // Once more, for what rounding left.
-    let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
-    let Some(again) = again else { return (basis.columns(0, 0).into_owned(), DMatrix::zeros(n, 0)) };
-    (product_with_upper(&basis, &again), product_with_upper(&within, &again))
+    let again = inverse_factor(&gram(&turned)).map(|inverse| inverse.transpose());
+    let Some(again) = again else { return (DMatrix::zeros(basis.nrows(), 0), DMatrix::zeros(n, 0)) };
+    product_with_upper_to(&turned, &again, &mut basis);
+    (basis, product_with_upper(&within, &again))
 }
 
 /// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
