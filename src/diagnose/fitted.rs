@@ -98,11 +98,12 @@ impl Fitted {
         Options { start: values.collect(), carriers: false, ..options.clone() }
     }
 
-    /// The same, with what need not be found anew: the registered nominal arm, derivatives where this one ended, and of a fit that is `alike` the σ that this one took.
+    /// The same, with what need not be found anew: the registered nominal arm, derivatives where this one ended, and of a fit that is
+    /// `alike` the σ that this one took.
     pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
-        let names = || self.unknowns.iter().map(|&k| self.model.parameters[k].name.as_str());
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let known = derivatives.map(|derivatives| derivatives.known(names()));
+        let at = (self.model.parameters.as_slice(), &self.found.x);
+        let known = derivatives.map(|derivatives| derivatives.known(at, &self.unknowns));
         let predecessor = self.found.predecessor(alike).with_derivatives(known);
         Options { predecessor: Some(Arc::new(predecessor)), ..self.onwards(options) }
     }

@@ -68,7 +68,7 @@ pub(super) struct Stage<'a> {
     pub counts_fixed: bool,
     /// Linearisations that fits of the same data share.
     pub memory: &'a Memory,
-    /// Derivatives of the same poses that are known at some point.
+    /// Derivatives that are known at some point of a fit of the identification rows.
     pub known: Option<&'a KnownDerivatives>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,

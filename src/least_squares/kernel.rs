@@ -27,7 +27,7 @@ pub(super) fn norm(vector: &[f64]) -> f64 {
 }
 
 /// vᵀv, summed in the same order wherever it is formed.
-pub fn sum_of_squares(vector: &[f64]) -> f64 {
+pub(crate) fn sum_of_squares(vector: &[f64]) -> f64 {
     dot(vector, vector)
 }
 

@@ -348,14 +348,14 @@ mod tests {
 
     #[test]
     fn merging_equals_absorbing() {
-        for (n, rows) in [(11, 40), (170, 40), (170, 400)] {
+        for (n, rows) in [(11, 40), (170, 40), (170, 400), (400, 450)] {
             merges(n, rows);
         }
     }
 
     #[test]
     fn rows_of_priors_are_absorbed_as_any() {
-        for n in [5, 170] {
+        for n in [5, 170, 400] {
             // Unknowns 0, 2, 3, 5, … have a prior; every row reaches two columns on.
             let rows: Vec<usize> = (0..n).filter(|j| j % 3 != 1).collect();
             let mut priors = Block::zeros(rows.len(), n);
@@ -374,6 +374,23 @@ mod tests {
                 assert!((all.cost / few.cost - 1.0).abs() < 1e-14);
                 assert!((all.triangle - few.triangle).amax() < 1e-13 && (all.projected - few.projected).amax() < 1e-13);
             }
+        }
+    }
+
+    #[test]
+    fn a_factor_does_not_depend_on_the_order_of_the_rows() {
+        for n in [6, 130, 400] {
+            // Those of a factor with priors below it, a row of zeros, and one that begins first.
+            let entry = |i: usize, j: usize| match i {
+                i if i < n => f64::from(u8::from(i <= j)) * wave(i + 31 * j),
+                i if i < 2 * n => f64::from(u8::from(i - n == j)),
+                i => (i - 2 * n) as f64 * wave(j),
+            };
+            let matrix = DMatrix::from_fn(2 * n + 2, n, entry);
+            let triangle = Triangle::of(&matrix);
+            let gram = matrix.tr_mul(&matrix);
+            assert!((triangle.tr_mul(&triangle) - &gram).amax() < 1e-13 * gram.amax());
+            assert!(triangle.lower_triangle().iter().filter(|value| **value != 0.0).count() <= n);
         }
     }
 

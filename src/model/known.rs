@@ -9,17 +9,19 @@ use nalgebra::{DMatrix, DVector};
 use super::pose::Pose;
 use crate::least_squares::Block;
 use crate::least_squares::kernel::sum_of_squares;
+use crate::model::parameter::Parameter;
 
-/// Part of the residuals by which they may differ where derivatives are those that are known: rounding.
+/// Part of a number by which it may differ where it is the same but for rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Whitened residuals of some poses and their derivatives at a point, by parameter; three rows a pose.
 ///
-/// A model with further effects that do nothing there yet has the same ones, and columns of these effects beside them.
+/// A model of the same arm with further effects, which do nothing while their parameters are 0, has the same ones there, and columns of
+/// these effects beside them. A name stands for the same parameter in both.
 #[derive(Debug, Clone)]
 pub(crate) struct KnownDerivatives {
-    /// The column of each parameter.
-    columns: BTreeMap<String, usize>,
+    /// Of each parameter its deviation from nominal, and its column if it has one.
+    parameters: BTreeMap<String, (f64, Option<usize>)>,
     /// 1 σ of each pose \[m\].
     sigma: Vec<f64>,
     jacobian: Arc<DMatrix<f64>>,
@@ -27,49 +29,68 @@ pub(crate) struct KnownDerivatives {
 }
 
 impl KnownDerivatives {
-    /// Of poses of these 1 σ \[m\]; the first columns of the Jacobian are those of the parameters of these `names`.
-    pub fn new<'n>(
-        names: impl Iterator<Item = &'n str>,
+    /// At the full parameter vector `x` of a model with these `parameters`, of poses of these 1 σ \[m\]; the first columns of the Jacobian
+    /// are those of the `unknowns`.
+    pub fn new(
+        (parameters, x): (&[Parameter], &DVector<f64>),
+        unknowns: &[usize],
         sigma: Vec<f64>,
         (jacobian, residual): (Arc<DMatrix<f64>>, Arc<DVector<f64>>),
     ) -> Self {
-        let columns = names.enumerate().map(|(j, name)| (name.to_owned(), j)).collect();
-        Self { columns, sigma, jacobian, residual }
+        let column = |k: usize| unknowns.iter().position(|own| *own == k);
+        let own = parameters.iter().zip(x).enumerate();
+        let parameters = own.map(|(k, (own, x))| (own.name.clone(), (*x, column(k)))).collect();
+        Self { parameters, sigma, jacobian, residual }
     }
 
-    /// Where in some of the poses the residuals, which stand in the last column of `block`, are the known ones: fills the columns of the
-    /// parameters that are known there, and returns the others; `None` where they are not.
-    pub fn fill<'n>(
+    /// Which of the unknowns have no column; `None` where `x` is another point, or poses are not as many.
+    pub fn lacking(
+        &self,
+        poses: &[Pose],
+        (parameters, x): (&[Parameter], &DVector<f64>),
+        unknowns: &[usize],
+    ) -> Option<Vec<usize>> {
+        let is_there = |(own, x): (&Parameter, &f64)| {
+            let known = self.parameters.get(&own.name).map_or(0.0, |(known, _)| *known);
+            (x - known).abs() <= ROUNDING * (own.nominal.abs() + known.abs())
+        };
+        let is_it = poses.len() == self.sigma.len() && parameters.iter().zip(x).all(is_there);
+        let lacks = |&j: &usize| self.column(&parameters[unknowns[j]]).is_none();
+        is_it.then(|| (0..unknowns.len()).filter(lacks).collect())
+    }
+
+    fn column(&self, parameter: &Parameter) -> Option<usize> {
+        self.parameters.get(&parameter.name)?.1
+    }
+
+    /// Fills the block of some poses from what is known and from the columns of `new`, those `lacking`, and its residual; not where that
+    /// residual is not the known one.
+    pub fn fill(
         &self,
         block: &mut Block,
         (poses, items): (&[Pose], Range<usize>),
-        names: impl Iterator<Item = &'n str>,
-    ) -> Option<Vec<usize>> {
-        let n = block.parameters();
-        let rows = 3 * items.start..3 * items.end;
-        if poses.len() != self.sigma.len() || block.rows() != rows.len() {
-            return None;
-        }
+        (parameters, unknowns): (&[Parameter], &[usize]),
+        (new, lacking): (&Block, &[usize]),
+    ) -> bool {
+        let first = 3 * items.start;
         let units: Vec<f64> = items.map(|pose| self.sigma[pose] / poses[pose].sigma).collect();
-        let known = |column: &[f64], row: usize| column[rows.start + row] * units[row / 3];
+        let known = |column: &[f64], row: usize| column[first + row] * units[row / 3];
+        let residual = new.column(new.parameters());
         let missed = |(row, here): (usize, &f64)| here - known(self.residual.as_slice(), row);
-        let missed: Vec<f64> = block.column(n).iter().enumerate().map(missed).collect();
-        let most = ROUNDING * ROUNDING * sum_of_squares(block.column(n));
-        let missed = sum_of_squares(&missed);
-        if missed > most || missed.is_nan() {
-            return None;
+        let missed = sum_of_squares(&residual.iter().enumerate().map(missed).collect::<Vec<f64>>());
+        if !missed.is_finite() || missed > ROUNDING * ROUNDING * sum_of_squares(residual) {
+            return false;
         }
-        let mut others = Vec::new();
-        for (j, name) in names.enumerate() {
-            let Some(&column) = self.columns.get(name) else {
-                others.push(j);
-                continue;
-            };
-            let column = self.jacobian.column(column);
-            let column = column.as_slice();
-            block.column_mut(j).iter_mut().enumerate().for_each(|(row, out)| *out = known(column, row));
+        for (j, &k) in unknowns.iter().enumerate() {
+            if let Some(column) = self.column(&parameters[k]) {
+                let column = self.jacobian.column(column);
+                let column = column.as_slice();
+                block.column_mut(j).iter_mut().enumerate().for_each(|(row, out)| *out = known(column, row));
+            }
         }
-        Some(others)
+        let places = lacking.iter().copied().chain([unknowns.len()]).enumerate();
+        places.for_each(|(own, j)| block.column_mut(j).copy_from_slice(new.column(own)));
+        true
     }
 }
 
@@ -116,8 +137,12 @@ mod tests {
         // What is known is taken as it is: a mark shows that it was.
         columns.column_mut(0)[5] += 1.0;
         let all = names(&plain);
-        let known =
-            KnownDerivatives::new(all.iter().map(String::as_str), vec![1e-3; 600], (columns.into(), residual.into()));
+        let known = KnownDerivatives::new(
+            (&plain.parameters, &x),
+            &unknowns(&plain),
+            vec![1e-3; 600],
+            (columns.into(), residual.into()),
+        );
         let at = |name: &String| all.iter().position(|own| own == name).map_or(0.0, |j| x[j]);
         let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
         let fresh = PoseResiduals::new(&more, poses(2e-3), unknowns(&more), start.clone());

@@ -327,14 +327,17 @@ impl LeastSquares for PoseResiduals<'_> {
                 linearised.write(pose, block, self.rows * k);
             }
         };
-        let others = self.known.filter(|_| self.rows == POSITION).and_then(|known| {
-            self.residuals(x, items.clone(), block.column_mut(self.unknowns.len()));
-            let names = self.unknowns.iter().map(|&k| self.model.parameters[k].name.as_str());
-            known.fill(block, (&self.poses, items.clone()), names)
-        });
-        let Some(others) = others else { return linearise(&self.unknowns, block) };
-        let mut new = Block::zeros(block.rows(), others.len());
-        linearise(&others.iter().map(|&j| self.unknowns[j]).collect::<Vec<_>>(), &mut new);
-        others.iter().enumerate().for_each(|(own, &j)| block.column_mut(j).copy_from_slice(new.column(own)));
+        let parameters = self.model.parameters.as_slice();
+        if let Some(known) = self.known.filter(|_| self.rows == POSITION)
+            && let Some(lacking) = known.lacking(&self.poses, (parameters, &self.full(x)), &self.unknowns)
+        {
+            let mut new = Block::zeros(block.rows(), lacking.len());
+            linearise(&lacking.iter().map(|&j| self.unknowns[j]).collect::<Vec<_>>(), &mut new);
+            let (of, own) = ((self.poses.as_slice(), items.clone()), (parameters, self.unknowns.as_slice()));
+            if known.fill(block, of, own, (&new, &lacking)) {
+                return;
+            }
+        }
+        linearise(&self.unknowns, block);
     }
 }

@@ -7,8 +7,9 @@ use crate::model::parameter::Driver;
 
 /// Orders that are summed side by side.
 const LANES: usize = 4;
-/// Waves from which on a sum is worth a pass, and so many of them are in it on average for each turn by [`LANES`] orders.
+/// Waves from which on a sum is worth a pass.
 const MANY: usize = 8;
+/// The least that a turn by [`LANES`] orders may have on average of its sines and cosines.
 const DENSE: usize = 2;
 /// Orders up to which there is a sum.
 const HIGHEST: u32 = 1024;

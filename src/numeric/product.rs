@@ -37,7 +37,7 @@ pub(crate) fn product_with_upper_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mu
     product_to(a, b, out, |columns| columns);
 }
 
-/// A B, of which the first columns, so many, have nothing below so many rows of B.
+/// A B in `out`, of which the first columns, so many, have nothing below so many rows of B.
 fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < WORTH_THREADS || inner == 0 {

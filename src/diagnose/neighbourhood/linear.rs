@@ -122,7 +122,7 @@ impl LinearNeighbourhood {
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
 
-    /// What columns of the data, shape = (3 N, k), have along the basis, the orthonormal directions that they add to it, and these in
+    /// What columns of the data, shape = (3 N, k) or as long as the basis, have along it, the orthonormal directions that they add to it, and these in
     /// terms of what the basis leaves of the columns.
     fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
@@ -140,7 +140,7 @@ impl LinearNeighbourhood {
         (along, new, within)
     }
 
-    /// Takes further columns of the data into the fit, shape = (3 N, k), with unknowns of their own behind the others; gives
+    /// Takes further columns of the data into the fit, shape = (3 N, k) or as long as the basis, with unknowns of their own behind the others; gives
     /// the new orthonormal directions.
     pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());

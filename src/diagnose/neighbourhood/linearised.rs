@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
-use crate::model::parameter::{BeamField, Driver, Slot};
+use crate::model::parameter::{BeamField, Driver, Parameter, Slot};
 use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
@@ -38,10 +38,9 @@ pub(in crate::diagnose) struct Derivatives {
 }
 
 impl Derivatives {
-    /// Those of the fitted parameters, of these `names`, as a fit that begins there takes them.
-    pub fn known<'n>(&self, names: impl Iterator<Item = &'n str>) -> KnownDerivatives {
-        let (jacobian, residual) = (Arc::clone(&self.fitted), Arc::clone(&self.residual));
-        KnownDerivatives::new(names, self.sigma.clone(), (jacobian, residual))
+    /// Those of the fitted parameters, as a fit that begins at the full parameter vector `x` takes them.
+    pub fn known(&self, at: (&[Parameter], &DVector<f64>), unknowns: &[usize]) -> KnownDerivatives {
+        KnownDerivatives::new(at, unknowns, self.sigma.clone(), (Arc::clone(&self.fitted), Arc::clone(&self.residual)))
     }
 
     fn column(&self, place: usize) -> DVectorView<'_, f64> {

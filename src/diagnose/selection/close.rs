@@ -1,6 +1,7 @@
 //! The whole story: before, what was found, after, what remains.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use super::super::candidates::Candidates;
 use super::super::data::Data;
@@ -361,7 +362,8 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
         if let Some(better) = replacements.better_than(effect) {
             let gone = std::slice::from_ref(effect);
             let change = (gone, std::slice::from_ref(&better));
-            let staying = rounds.staying(fitted, change, replacements.unknowns(), || replacements.with(&better));
+            let staying =
+                rounds.staying(fitted, change, replacements.unknowns(), || Arc::new(replacements.with(&better)));
             if staying.as_ref().is_some_and(|effects| rounds.was_fitted(effects)) {
                 continue;
             }

@@ -1,5 +1,7 @@
 //! Rounds of the loop: pick, fit, test again.
 
+use std::sync::Arc;
+
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::super::candidates::{Candidates, joined};
@@ -92,7 +94,7 @@ impl<'a> Rounds<'a> {
                 let mut scan = Scan::new(&linearised, fit, candidates.testable, self.data.rules);
                 let picks = pick(&mut scan, self.data, self.affordable_fits(&fitted) > 1);
                 let picked: Vec<Effect> = picks.iter().map(|pick| pick.effect.clone()).collect();
-                let staying = self.staying(&fitted, (&[], &picked), own, || LinearNeighbourhood::clone(&scan.linear));
+                let staying = self.staying(&fitted, (&[], &picked), own, || Arc::clone(&scan.linear));
                 (picks, staying)
             };
             if staying.is_some_and(|effects| self.was_fitted(&effects)) {
@@ -197,7 +199,7 @@ impl<'a> Rounds<'a> {
         fitted: &Fitted,
         (gone, others): (&[Effect], &[Effect]),
         first: usize,
-        with: impl FnOnce() -> LinearNeighbourhood,
+        with: impl FnOnce() -> Arc<LinearNeighbourhood>,
     ) -> Option<Vec<Effect>> {
         if self.affordable_fits(fitted) > 1 || others.is_empty() {
             return None;
