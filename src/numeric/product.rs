@@ -53,6 +53,16 @@ fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled
     out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().rev().for_each(form);
 }
 
+/// L B of a square lower triangle L, on one thread.
+pub(crate) fn lower_product(lower: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(lower.nrows(), b.ncols());
+    for first in (0..lower.nrows()).step_by(TOGETHER) {
+        let end = lower.nrows().min(first + TOGETHER);
+        out.rows_range_mut(first..end).gemm(1.0, &lower.view((first, 0), (end - first, end)), &b.rows(0, end), 0.0);
+    }
+    out
+}
+
 /// A B of a narrow B: some rows after others, which stay in the processor's cache from column to column.
 fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
@@ -153,6 +163,8 @@ mod tests {
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
             let upper = DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
             assert!((product_with_upper(&a, &upper) - &a * &upper).amax() <= scale);
+            let (lower, wide) = (upper.transpose(), b.columns(0, columns.min(inner)).into_owned());
+            assert!((lower_product(&lower, &wide) - &lower * &wide).amax() <= scale);
             let own = gram(&a);
             assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
             let tall = DMatrix::from_fn(rows, columns, |i, j| entry(i, j + inner));

@@ -13,7 +13,7 @@ use super::marginal::{Noise, Normal, over_noise};
 use crate::diagnose::neighbourhood::LinearNeighbourhood;
 use crate::diagnose::rules::SelectionRules;
 use crate::identify::Stop;
-use crate::numeric::{inverse_factor, inverse_lower, lower_factor};
+use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 
 /// Hypotheses whose gains are worked out together: one product of many columns is fast.
 const TOGETHER: usize = 16;
@@ -300,7 +300,10 @@ impl Left<'_, '_> {
             let mut first = 0;
             for &member in &self.members {
                 let transposed = &self.products.member(member).transposed;
-                all.gemm(1.0, &self.within.columns(first, transposed.nrows()), transposed, 1.0);
+                // Of a lower triangle.
+                let below = self.within.nrows() - first;
+                let own = self.within.view((first, first), (below, transposed.nrows()));
+                all.rows_range_mut(first..).gemm(1.0, &own, transposed, 1.0);
                 first += transposed.nrows();
             }
             all
@@ -336,7 +339,7 @@ impl Left<'_, '_> {
             }
             first += count;
         }
-        self.gains_along(tried.iter().map(|&block| &blocks[block]), &(&self.within * all))
+        self.gains_along(tried.iter().map(|&block| &blocks[block]), &lower_product(&self.within, &all))
     }
 
     /// The gains of hypotheses that are none of the others, with their priors.
