@@ -6,7 +6,7 @@
 use nalgebra::{DVector, Vector3};
 
 use super::Model;
-use super::driven::Commands;
+use super::commands::Commands;
 use super::elastic::Elastic;
 use super::inputs::inputs;
 use super::instrument::{Instrument, strained};

@@ -96,8 +96,6 @@ impl KnownDerivatives {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use nalgebra::Vector3;
 
     use super::*;
@@ -110,7 +108,7 @@ mod tests {
             "name = 'arm'\n[[joint]]\na_m = 0.6\nalpha_deg = 90\n[[joint]]\na_m = 0.4\n{effects}\n[parameters]\n\
              'joint*.a' = {{ free = true }}\n'joint*.theta' = {{ free = true }}\n"
         );
-        let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+        let problem = Problem::parse(&text, "problem.toml".as_ref()).unwrap();
         Model::new(&problem, &["base".to_owned()], &["tool".to_owned()]).unwrap()
     }
 

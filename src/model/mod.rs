@@ -5,6 +5,7 @@ mod ablation;
 mod command;
 mod command_jacobian;
 mod command_residuals;
+mod commands;
 mod derivative;
 mod driven;
 pub mod effect;
@@ -40,7 +41,8 @@ use crate::model::parameter::{Driver, LinearConstraint, Parameter, Slot, constra
 use crate::problem::{BasePose, Effect, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
-use driven::{Commands, Driven};
+use commands::Commands;
+use driven::Driven;
 use instrument::Instrument;
 pub(crate) use observation::FixtureAt;
 

@@ -6,8 +6,8 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Model;
+use super::commands::Commands;
 use super::derivative::Linearised;
-use super::driven::Commands;
 use super::known::KnownDerivatives;
 use super::observation::between;
 use super::pose::Pose;
