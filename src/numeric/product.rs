@@ -32,7 +32,7 @@ pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<
     out
 }
 
-/// The same in a matrix of its shape: new memory costs about as much as the product.
+/// The same in a matrix of its shape: new memory takes a good part of the time of the product.
 pub(crate) fn product_with_upper_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     product_to(a, b, out, |columns| columns);
 }
