@@ -73,7 +73,7 @@ impl Ur10 {
     }
 
     fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
-        let poses = self.configurations.iter().zip(&self.measured).map(|(configuration, &measured)| Pose {
+        let poses = self.configurations.iter().zip(&self.measured).map(|(configuration, measured)| Pose {
             setup: PoseView::of(configuration),
             base: 0,
             target: 0,
@@ -82,7 +82,7 @@ impl Ur10 {
             sigma: NOISE,
             orientation: None,
         });
-        PoseResiduals::new(&self.model, poses.collect(), unknowns, at)
+        PoseResiduals::new(&self.model, poses.collect::<Vec<_>>(), unknowns, at)
     }
 
     /// Bounds on `unknowns`.

@@ -115,7 +115,7 @@ impl<'a> Site<'a> {
             let turn = self.problem.data.orientation_sigma.filter(|_| self.problem.data.fits_orientation);
             // In a unit of length, what counts are positions.
             let turn = turn.filter(|_| pose.observation.is_position());
-            pose.orientation = turn.filter(|_| unit.is_none()).map(|sigma| SeenOrientation { axes: None, sigma });
+            pose.orientation = turn.filter(|_| unit.is_none()).map(|sigma| SeenOrientation { measured: None, sigma });
         }
         Sensitivity::of(&self.model, &poses, at)
     }

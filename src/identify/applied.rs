@@ -1,5 +1,7 @@
 //! An estimate applied to rows of which it knows nothing, without another fit of the arm.
 
+use std::sync::Arc;
+
 use nalgebra::{DVector, Vector3};
 
 use super::errors::of_kind;
@@ -238,7 +240,7 @@ fn place(model: &Model, poses: &[Pose], missing: &[usize], mut x: DVector<f64>) 
         model,
         declared: own.iter().map(|pose| pose.sigma).collect(),
         declared_turn: own.iter().find_map(|pose| pose.orientation).map(|own| own.sigma),
-        poses: own,
+        poses: Arc::new(own),
         unknowns: missing.to_vec(),
         solver: SolverChoice::Auto.decide(model),
         max_steps: Settings::default().max_iterations,

@@ -8,7 +8,7 @@ use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
 use crate::model::{CommandResiduals, Model, Pose};
-use crate::problem::{JointKind, Mimic, Past, PoseView, Problem};
+use crate::problem::{JointKind, Mimic, PastOf, PoseView, Problem};
 use crate::spatial::Frame;
 
 use super::stage::StageError;
@@ -150,7 +150,7 @@ pub fn compensate(
     for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate() {
         pose.sigma = POSITION_WEIGHT;
         // Nobody knows what is measured or done before a target.
-        pose.setup.past = Past::default();
+        pose.setup.past = PastOf::default();
         let seed = targets.configuration(row);
         let n = moving.len();
         let carrier = model.carrier(pose.target);

@@ -1,5 +1,7 @@
 //! The fits of an identification: bases and targets first, then the strategy's stages, then held-out sessions.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use super::alternation::{Alternation, Anderson, contraction};
@@ -129,7 +131,7 @@ impl<'a> Fitting<'a> {
         }
         Stage {
             model: self.model,
-            poses,
+            poses: Arc::new(poses),
             declared,
             declared_turn: self.turn_sigma,
             unknowns,

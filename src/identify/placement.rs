@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DVector, UnitQuaternion, Vector3};
+use nalgebra::{DVector, Vector3};
 
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Slot;
@@ -62,7 +62,7 @@ impl Placement {
                 base: self.base_of_row[row],
                 target: self.target_of_row[row],
                 observation: measurements.observation(row),
-                measured: measurements.positions[row],
+                measured: &measurements.positions[row],
                 sigma: measurements.sigma_of(row).unwrap_or(sigma),
                 orientation: None,
             })
@@ -79,7 +79,7 @@ impl Placement {
         let mut poses = self.poses(measurements, rows, sigma);
         if let Some(sigma) = turn {
             for (pose, &row) in poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position()) {
-                let seen = |orientation| SeenOrientation { axes: Some(axes_of(&orientation)), sigma };
+                let seen = |orientation| SeenOrientation { measured: Some(orientation), sigma };
                 pose.orientation = measurements.orientation(row).map(seen);
             }
         }
@@ -132,11 +132,6 @@ impl Placement {
         };
         HeldOutOnly { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
     }
-}
-
-/// Axes of an orientation.
-pub(super) fn axes_of(orientation: &UnitQuaternion<f64>) -> [Vector3<f64>; 3] {
-    [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| orientation * axis)
 }
 
 /// Bases, targets and fixtures that appear in held-out rows only.

@@ -47,7 +47,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
             .collect();
         let of_base = |pose: &&Pose| pose.base == base;
         let pairs = poses.iter().zip(&points).filter(|(pose, _)| of_base(pose));
-        let points: Vec<_> = pairs.filter_map(|(pose, point)| Some(((*point)?, pose.measured))).collect();
+        let points: Vec<_> = pairs.filter_map(|(pose, point)| Some(((*point)?, *pose.measured))).collect();
         if columns.len() < 6 || points.is_empty() {
             continue;
         }
@@ -66,7 +66,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
 
 /// The axes of a measured orientation.
 fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
-    pose.orientation?.axes
+    pose.orientation?.axes()
 }
 
 /// Sets the orientations of the targets of which `turns` says so, from poses with the last frames of the arm in its base frame.

@@ -50,7 +50,7 @@ pub enum StageError {
 pub(super) struct Stage<'a> {
     pub model: &'a Model,
     /// With the σ that the fit takes.
-    pub poses: Vec<Pose<'a>>,
+    pub poses: Arc<Vec<Pose<'a>>>,
     /// 1 σ of a coordinate of each pose, as declared \[m\].
     pub declared: Vec<f64>,
     /// 1 σ of their orientations, as declared, where these are fitted \[rad\].
@@ -111,11 +111,11 @@ impl<'a> Stage<'a> {
 
     /// Residuals of the stage about the full parameter vector `at`.
     pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
-        self.residuals_of(self.poses.clone(), at)
+        self.residuals_of(Arc::clone(&self.poses), at)
     }
 
     /// The same of other poses.
-    pub fn residuals_of(&self, poses: Vec<Pose<'a>>, at: &DVector<f64>) -> PoseResiduals<'a> {
+    pub fn residuals_of(&self, poses: impl Into<Arc<Vec<Pose<'a>>>>, at: &DVector<f64>) -> PoseResiduals<'a> {
         PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone()).knowing(self.known)
     }
 
@@ -149,7 +149,7 @@ impl<'a> Stage<'a> {
         self.unknowns.hash(&mut digest);
         let mut put = |value: f64| digest.write_u64(value.to_bits());
         others.iter().copied().for_each(&mut put);
-        for pose in &self.poses {
+        for pose in self.poses.iter() {
             let PoseView {
                 configuration,
                 payload,
@@ -163,14 +163,14 @@ impl<'a> Stage<'a> {
                 strains: _,
             } = &pose.setup;
             let columns = configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
-            columns.chain(&pose.measured).copied().for_each(&mut put);
-            [*payload, *hoist, *temperature].map(|own| own.unwrap_or(f64::NAN)).into_iter().for_each(&mut put);
+            columns.chain(pose.measured).copied().for_each(&mut put);
+            [*payload, *hoist, *temperature].map(|own| own.copied().unwrap_or(f64::NAN)).into_iter().for_each(&mut put);
             [*time, *elapsed, pose.sigma / unit].into_iter().for_each(&mut put);
             put(pose.orientation.map_or(0.0, |own| own.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
             // What was before stands in the table, which is the same in all fits that share a memory.
-            put(past.times.len() as f64);
+            put(past.place().map_or(f64::NAN, f64::from));
         }
         self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
         digest.finish()

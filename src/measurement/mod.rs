@@ -42,7 +42,7 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
-use crate::problem::{Observation, Past, PoseConditions, PoseView, Problem};
+use crate::problem::{Observation, PastOf, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
@@ -197,8 +197,8 @@ impl Measurements {
     }
 
     /// The orientation of a row that has one, measuring frame.
-    pub fn orientation(&self, row: usize) -> Option<UnitQuaternion<f64>> {
-        self.orientations.as_ref().map(|all| all[row]).filter(|own| !own.w.is_nan())
+    pub fn orientation(&self, row: usize) -> Option<&UnitQuaternion<f64>> {
+        self.orientations.as_ref().map(|all| &all[row]).filter(|own| !own.w.is_nan())
     }
 
     /// 1 σ of a row that has one of its own \[m\].
@@ -230,7 +230,7 @@ impl Measurements {
     /// The same of every row, without what was before it, which the other rows say.
     pub fn all_conditions(&self) -> Vec<PoseConditions> {
         let first = self.first_time();
-        let alone = |row| PoseView { past: Past::default(), ..self.setup(row, first) }.to_owned();
+        let alone = |row| PoseView { past: PastOf::default(), ..self.setup(row, first) }.to_owned();
         (0..self.len()).map(alone).collect()
     }
 
@@ -241,18 +241,18 @@ impl Measurements {
 
     /// The same to read, where the time of the first pose \[s\] is known.
     pub(crate) fn setup(&self, row: usize, first: f64) -> PoseView<'_> {
-        let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+        let narrow = u32::try_from(row).unwrap_or(u32::MAX);
         PoseView {
             configuration: self.configuration(row),
-            payload: at(&self.payload),
-            hoist: at(&self.hoist),
-            temperature: at(&self.temperature),
+            payload: self.payload.as_ref().map(|all| &all[row]),
+            hoist: self.hoist.as_ref().map(|all| &all[row]),
+            temperature: self.temperature.as_ref().map(|all| &all[row]),
             time: self.time[row],
             elapsed: self.time[row] - first,
             approach: self.approach.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
-            past: self.past(row),
-            strains: &[],
+            past: PastOf::row(self, narrow),
+            strains: None,
         }
     }
 

@@ -244,7 +244,7 @@ impl Measurements {
         let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let mut row = self.select(&[0]);
         row.origin = vec![(narrow(place), narrow(distance.location.line.unwrap_or(0)))];
-        row.observations = vec![Observation::Between(distance.between[0], distance.between[1])];
+        row.observations = vec![Observation::Between(narrow(distance.between[0]), narrow(distance.between[1]))];
         row.positions = vec![distance.length * Vector3::x()];
         row.sigma = Some(vec![distance.sigma]);
         row.nests.clear();

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::Past;
+use crate::problem::{Past, PoseTable};
 
 /// The order of a table's rows, found when it is first asked for; a copy finds its own, for its rows may change.
 #[derive(Debug, Default)]
@@ -98,9 +98,11 @@ impl Measurements {
     fn found(&self) -> &Found {
         self.order.0.get_or_init(|| Found::of(self))
     }
+}
 
+impl PoseTable for Measurements {
     /// What was measured before a row, in its session.
-    pub(super) fn past(&self, row: usize) -> Past<&[f64]> {
+    fn past(&self, row: usize) -> Past<&[f64]> {
         let Found { places, sorted } = self.found();
         let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize)) else {
             return Past::default();

@@ -58,7 +58,7 @@ fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) ->
         (0..measurements.len()).any(|row| !held_out[row] && measurements.observation(row) == Observation::Point(point))
     };
     let known = |row: usize| match measurements.observation(row) {
-        Observation::Between(first, second) => Some((row, !(touched(first) && touched(second)))),
+        Observation::Between(first, second) => Some((row, !(touched(first as usize) && touched(second as usize)))),
         _ => None,
     };
     for (row, is_held_out) in (0..measurements.len()).filter_map(known).collect::<Vec<_>>() {

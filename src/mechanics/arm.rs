@@ -120,7 +120,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Payload of a pose \[kg\].
     pub(super) fn payload(&self, setup: &PoseView) -> S {
-        let declared = setup.payload.unwrap_or(self.payload_mass);
+        let declared = setup.payload.copied().unwrap_or(self.payload_mass);
         if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }
     }
 }

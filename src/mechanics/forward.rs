@@ -166,7 +166,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Force of a rope \[N\].
     fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
-        let tension = setup.hoist.unwrap_or(hoist.force);
+        let tension = setup.hoist.copied().unwrap_or(hoist.force);
         match &self.rope {
             None => (hoist.direction * tension).map(S::from),
             Some(rope) => rope.pull(&hoist.direction, tension, hook()),
@@ -272,7 +272,7 @@ impl<S: Scalar> Arm<S> {
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
-        let of_pose = walk.setup.strains.chunks_exact(3).nth(link).and_then(|own| own.try_into().ok());
+        let of_pose = walk.setup.strains.and_then(|all| all.get(link).copied());
         let strain = beam.strain.as_ref().map(|strain| strain.and(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {

@@ -12,7 +12,7 @@ pub(super) struct Commands {
     /// What is in none of these.
     others: Vec<Driven>,
     configuration: Vec<f64>,
-    strains: Vec<f64>,
+    strains: Vec<[f64; 3]>,
 }
 
 impl Commands {
@@ -38,12 +38,16 @@ impl Commands {
         for (place, added) in others.chain(series) {
             match place {
                 Place::Joint(joint) => self.configuration[joint] += added,
-                Place::Strain(number) => {
-                    self.strains.resize(3 * self.configuration.len(), 0.0);
-                    self.strains[number] += added;
+                Place::Strain { joint, which } => {
+                    self.strains.resize(self.configuration.len(), [0.0; 3]);
+                    self.strains[joint][which] += added;
                 }
             }
         }
-        PoseView { configuration: &self.configuration, strains: &self.strains, ..*setup }
+        PoseView {
+            configuration: &self.configuration,
+            strains: (!self.strains.is_empty()).then_some(&self.strains),
+            ..*setup
+        }
     }
 }

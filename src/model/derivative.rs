@@ -104,7 +104,7 @@ impl Linearised {
             block.column_mut(column)[row..row + 3].copy_from_slice((of * per_sigma).as_slice());
         };
         if let Observation::Between(first, second) = pose.observation {
-            let ((one, own), (other, others)) = (&self.fixtures[first], &self.fixtures[second]);
+            let ((one, own), (other, others)) = (&self.fixtures[first as usize], &self.fixtures[second as usize]);
             let Slopes { seen, by_target, by_fixture } = between(one, other);
             let by_first = own.iter().zip(by_fixture.column_iter());
             let by_second = others.iter().zip(by_target.column_iter());

@@ -8,8 +8,13 @@ use crate::problem::{Mimic, Problem};
 pub(super) enum Place {
     /// The coordinate of a joint.
     Joint(usize),
-    /// A number in the list of all beams' strains.
-    Strain(usize),
+    /// A strain of a joint's beam: elongation or one of its curvatures.
+    Strain {
+        /// The joint, counted from 0.
+        joint: usize,
+        /// 0, 1 or 2.
+        which: usize,
+    },
 }
 
 /// A known addition: value × driver.
@@ -44,7 +49,7 @@ impl Driven {
         let place = match slot {
             Slot::Joint { joint, field: JointField::Theta | JointField::D } => Place::Joint(joint),
             Slot::Beam { joint, field } => {
-                Place::Strain(3 * joint + BeamField::STRAINS.iter().position(|own| *own == field)?)
+                Place::Strain { joint, which: BeamField::STRAINS.iter().position(|own| *own == field)? }
             }
             _ => return None,
         };

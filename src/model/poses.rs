@@ -1,6 +1,7 @@
 //! Measured poses as a least-squares problem.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
@@ -27,7 +28,7 @@ const POSE: usize = 6;
 /// measuring frame, and 0 for poses without.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
-    poses: Vec<Pose<'a>>,
+    poses: Arc<Vec<Pose<'a>>>,
     /// Which parameters are unknown here.
     unknowns: Vec<usize>,
     /// Full parameter vector; the unknowns' entries are overwritten.
@@ -47,8 +48,9 @@ struct Seen {
 }
 
 impl<'a> PoseResiduals<'a> {
-    /// Residuals of `poses`; the parameters listed in `unknowns` vary, the others stay as in `at`.
-    pub fn new(model: &'a Model, poses: Vec<Pose<'a>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
+    /// Residuals of `poses`, which may be shared with others; the parameters listed in `unknowns` vary, the others stay as in `at`.
+    pub fn new(model: &'a Model, poses: impl Into<Arc<Vec<Pose<'a>>>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
+        let poses = poses.into();
         let rows = if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
         let tilted = poses.iter().any(|pose| pose.observation.is_angle());
         Self { model, poses, unknowns, at, rows, tilted, known: None }
@@ -129,7 +131,7 @@ impl<'a> PoseResiduals<'a> {
         let mut tilts = None;
         for pose in &self.poses[items] {
             if let Observation::Between(first, second) = pose.observation {
-                let seen = between(&fixtures[first], &fixtures[second]).seen;
+                let seen = between(&fixtures[first as usize], &fixtures[second as usize]).seen;
                 use_it(pose, Seen { position: seen, turn: None });
                 continue;
             }
@@ -151,7 +153,7 @@ impl<'a> PoseResiduals<'a> {
                     let position = base.point(&rest.frame.point(&targets[pose.target]));
                     let turn = pose.orientation.map(|own| {
                         let axes = turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
-                        own.axes.map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
+                        own.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
                     });
                     let seen = match pose.observation.fixture() {
                         Some(fixture) if pose.observation.is_point() => {
@@ -179,7 +181,7 @@ impl Model {
     /// Predicted positions of poses at the full parameter vector `x`, as measured, measuring frame \[m\]; NaN where a pose has no
     /// equilibrium.
     pub fn predict(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.measured).collect();
+        let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
         measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
     }
 
@@ -242,7 +244,9 @@ impl Model {
         let residual = |pose: &Pose| {
             let setup = commands.apply(&pose.setup);
             let seen = match pose.observation {
-                Observation::Between(first, second) => between(&fixtures[first], &fixtures[second]).seen,
+                Observation::Between(first, second) => {
+                    between(&fixtures[first as usize], &fixtures[second as usize]).seen
+                }
                 Observation::Tilt(frame) => rigid_tilts(&arm, &setup, frame),
                 of => {
                     let base = instrument.base(&bases[pose.base], &pose.setup);

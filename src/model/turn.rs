@@ -50,7 +50,7 @@ pub(super) fn write(
         }
     }
     let axes = target.axes.map(|axis| last.vector(&axis));
-    let error = orientation.axes.map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured));
+    let error = orientation.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured));
     let slope = logarithm_slope(&error) / -orientation.sigma;
     let mut put = |column: usize, turned: [Vector3<f64>; 3]| {
         let turn: Vector3<f64> = axes.iter().zip(&turned).map(|(axis, turned)| axis.cross(turned) * 0.5).sum();

@@ -77,7 +77,7 @@ impl Loads {
         let mut forces = Vec::new();
         let push = |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
         let (axes, origin) = split(&chain.before[n]);
-        let payload = setup.payload.unwrap_or(problem.tool.payload_mass);
+        let payload = setup.payload.copied().unwrap_or(problem.tool.payload_mass);
         push(&mut forces, origin + axes * problem.tool.payload_at, gravity * payload, false);
         let mut out = Self { links: vec![None; n], joints: vec![JointLoads::default(); n] };
         for (k, joint) in problem.joints.iter().enumerate().rev() {
@@ -115,7 +115,9 @@ impl Loads {
 fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &PoseView) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
     let masses = beam.masses.iter().map(|mass| (mass.position, gravity * mass.mass, false));
     let hoist = beam.hoist.iter();
-    masses.chain(hoist.map(|hoist| (hoist.at, hoist.direction * setup.hoist.unwrap_or(hoist.force), true))).collect()
+    masses
+        .chain(hoist.map(|hoist| (hoist.at, hoist.direction * setup.hoist.copied().unwrap_or(hoist.force), true)))
+        .collect()
 }
 
 /// A force at `at`, carried to the link's axis: what hangs beyond an end acts at that end, with its lever.

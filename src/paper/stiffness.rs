@@ -116,7 +116,7 @@ fn equations_of(
 /// Each pose less the mean of its configuration, for configurations that were measured under several loads; `None` where
 /// there is none.
 fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equations>> {
-    let load = |pose: &Measured| (pose.setup.payload, pose.setup.hoist);
+    let load = |pose: &Measured| (pose.setup.payload.copied(), pose.setup.hoist.copied());
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, pose) in poses.iter().enumerate() {
         let same = |group: &&mut Vec<usize>| poses[group[0]].setup.configuration == pose.setup.configuration;

@@ -1,15 +1,13 @@
 //! Under which conditions a pose is measured, and from which ranges poses are drawn.
 
-use super::past::Past;
+use super::past::{Past, PastOf};
 use super::{Effect, Problem};
 
 /// What the controller and the test bench set for one pose.
-///
-/// V holds one number per joint: a `Vec<f64>` where poses are made, a `&[f64]` where they are read ([`PoseView`]).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PoseConditions<V = Vec<f64>> {
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PoseConditions {
     /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
-    pub configuration: V,
+    pub configuration: Vec<f64>,
     /// Payload \[kg\]; `None`: as the problem declares.
     pub payload: Option<f64>,
     /// Hoist force \[N\]; `None`: as the problem declares.
@@ -21,17 +19,37 @@ pub struct PoseConditions<V = Vec<f64>> {
     /// Time since the first pose \[s\].
     pub elapsed: f64,
     /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
-    pub approach: Option<V>,
+    pub approach: Option<Vec<f64>>,
     /// Values of the problem's own covariates, in their order and units; empty: not known.
-    pub covariates: V,
+    pub covariates: Vec<f64>,
     /// What was before.
-    pub past: Past<V>,
-    /// Strain of each beam without load, shape = (joints, 3): elongation, then curvatures about y and z [1/m]; empty: none.
-    pub strains: V,
+    pub past: Past,
 }
 
-/// Conditions of a pose whose numbers are kept elsewhere.
-pub type PoseView<'a> = PoseConditions<&'a [f64]>;
+/// The same of a pose whose numbers are kept elsewhere, in a table for instance: fits hold one for each pose.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PoseView<'a> {
+    /// As [`PoseConditions::configuration`].
+    pub configuration: &'a [f64],
+    /// Payload \[kg\]; `None`: as the problem declares.
+    pub payload: Option<&'a f64>,
+    /// Hoist force \[N\]; `None`: as the problem declares.
+    pub hoist: Option<&'a f64>,
+    /// Temperature [°C]; `None`: the reference.
+    pub temperature: Option<&'a f64>,
+    /// Time \[s\].
+    pub time: f64,
+    /// Time since the first pose \[s\].
+    pub elapsed: f64,
+    /// As [`PoseConditions::approach`].
+    pub approach: Option<&'a [f64]>,
+    /// As [`PoseConditions::covariates`].
+    pub covariates: &'a [f64],
+    /// What was before.
+    pub past: PastOf<'a>,
+    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures about y and z [1/m]; `None`: none.
+    pub strains: Option<&'a Vec<[f64; 3]>>,
+}
 
 impl<'a> PoseView<'a> {
     /// A configuration, shape = (joints) \[rad\] or \[m\], of which nothing else is known.
@@ -41,19 +59,18 @@ impl<'a> PoseView<'a> {
 }
 
 impl PoseView<'_> {
-    /// The same with numbers of its own.
+    /// The same with numbers of its own, without strains.
     pub fn to_owned(&self) -> PoseConditions {
         PoseConditions {
             configuration: self.configuration.to_vec(),
-            payload: self.payload,
-            hoist: self.hoist,
-            temperature: self.temperature,
+            payload: self.payload.copied(),
+            hoist: self.hoist.copied(),
+            temperature: self.temperature.copied(),
             time: self.time,
             elapsed: self.elapsed,
             approach: self.approach.map(<[f64]>::to_vec),
             covariates: self.covariates.to_vec(),
-            past: self.past.to_owned(),
-            strains: self.strains.to_vec(),
+            past: self.past.read().to_owned(),
         }
     }
 }
@@ -71,15 +88,15 @@ impl PoseConditions {
     pub fn view(&self) -> PoseView<'_> {
         PoseView {
             configuration: &self.configuration,
-            payload: self.payload,
-            hoist: self.hoist,
-            temperature: self.temperature,
+            payload: self.payload.as_ref(),
+            hoist: self.hoist.as_ref(),
+            temperature: self.temperature.as_ref(),
             time: self.time,
             elapsed: self.elapsed,
             approach: self.approach.as_deref(),
             covariates: &self.covariates,
-            past: self.past.view(),
-            strains: &self.strains,
+            past: PastOf::row(&self.past, 0),
+            strains: None,
         }
     }
 }

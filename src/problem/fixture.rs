@@ -107,7 +107,7 @@ pub enum Observation {
     /// i.
     Tilt(usize),
     /// Distance between two points, without the arm: one number.
-    Between(usize, usize),
+    Between(u32, u32),
 }
 
 impl Observation {
@@ -147,7 +147,7 @@ impl Observation {
         match self {
             Self::Position | Self::Tilt(_) => [None; 2],
             Self::Point(fixture) | Self::Distance(fixture) | Self::Surface(fixture) => [Some(fixture), None],
-            Self::Between(first, second) => [Some(first), Some(second)],
+            Self::Between(first, second) => [Some(first as usize), Some(second as usize)],
         }
     }
 

@@ -1,5 +1,7 @@
 //! What was before a pose: effects with a memory know it.
 
+use std::fmt;
+
 /// The poses of a session that were measured before one, from the first to the last; empty where none were, or none are known.
 ///
 /// V holds one number per pose, or one per pose and joint: a `Vec<f64>` or a `&[f64]`.
@@ -36,6 +38,55 @@ impl Past {
             configurations: &self.configurations,
             approaches: &self.approaches,
         }
+    }
+}
+
+/// A table of poses that knows what was before each of its rows.
+pub(crate) trait PoseTable: Sync {
+    /// The past of a row.
+    fn past(&self, row: usize) -> Past<&[f64]>;
+}
+
+/// The past of one pose alone.
+impl PoseTable for Past {
+    fn past(&self, _row: usize) -> Past<&[f64]> {
+        self.view()
+    }
+}
+
+/// What was before a pose, looked up where it is needed: most poses are never asked.
+#[derive(Clone, Copy, Default)]
+pub struct PastOf<'a> {
+    table: Option<&'a dyn PoseTable>,
+    row: u32,
+}
+
+impl<'a> PastOf<'a> {
+    /// What was before a row of a table.
+    pub(crate) fn row(table: &'a dyn PoseTable, row: u32) -> Self {
+        Self { table: Some(table), row }
+    }
+
+    /// Where it stands in its table; `None`: nowhere.
+    pub(crate) fn place(self) -> Option<u32> {
+        self.table.map(|_| self.row)
+    }
+
+    /// The poses before.
+    pub fn read(self) -> Past<&'a [f64]> {
+        self.table.map(|table| table.past(self.row as usize)).unwrap_or_default()
+    }
+}
+
+impl PartialEq for PastOf<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.read() == other.read()
+    }
+}
+
+impl fmt::Debug for PastOf<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.read().fmt(f)
     }
 }
 

@@ -41,15 +41,15 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
         from + (to - from) * random.random::<f64>()
     };
     let configurations: Vec<Vec<f64>> = (0..count).map(|_| problem.joints.iter().map(&mut draw).collect()).collect();
+    let measured = Vector3::zeros();
     let mut poses = Vec::with_capacity(count);
     for configuration in &configurations {
-        let (setup, measured) = (PoseView::of(configuration), Vector3::zeros());
         poses.push(Pose {
-            setup,
+            setup: PoseView::of(configuration),
             base: 0,
             target: 0,
             observation: Observation::default(),
-            measured,
+            measured: &measured,
             sigma: 1.0,
             orientation: None,
         });

@@ -45,7 +45,8 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let mut targets = rows.clone();
     for row in 0..rows.len() {
         let set = &simulation.rows[row].conditions;
-        let setup = PoseView { payload: set.payload, hoist: set.hoist, ..PoseView::of(&set.configuration) };
+        let setup =
+            PoseView { payload: set.payload.as_ref(), hoist: set.hoist.as_ref(), ..PoseView::of(&set.configuration) };
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }

@@ -19,7 +19,7 @@ pub struct Row {
 
 impl Row {
     pub fn setup(&self) -> PoseView<'_> {
-        PoseView { payload: Some(self.payload), hoist: Some(self.hoist), ..PoseView::of(&self.q) }
+        PoseView { payload: Some(&self.payload), hoist: Some(&self.hoist), ..PoseView::of(&self.q) }
     }
 }
 
@@ -117,7 +117,7 @@ pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64>
         base: 0,
         target: 0,
         observation: Observation::default(),
-        measured: Vector3::zeros(),
+        measured: &Vector3::zeros(),
         sigma: 1.0,
         orientation: None,
     };

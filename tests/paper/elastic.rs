@@ -19,7 +19,7 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let parameters = Parameters::nominal(&problem);
     let (g, payload) = (9.80665, 0.7);
     let row = &rows("rigid.csv")[0];
-    let setup = flexcal::problem::PoseView { payload: Some(payload), ..row.setup() };
+    let setup = flexcal::problem::PoseView { payload: Some(&payload), ..row.setup() };
     let chain = Chain::new(&problem, &parameters.geometry, setup.configuration);
     let loads = Loads::new(&problem, &chain, &setup);
     let phi_3 = row.q[1] + row.q[2];
@@ -81,8 +81,8 @@ fn torsion_of_eq_8_to_11_with_the_arm_stretched_out() {
     let problem = problem();
     let parameters = Parameters::nominal(&problem);
     let setup = flexcal::problem::PoseView {
-        payload: Some(0.0),
-        hoist: Some(60.0),
+        payload: Some(&0.0),
+        hoist: Some(&60.0),
         ..flexcal::problem::PoseView::of(&[0.3, 0.0, 0.0, 0.0])
     };
     let chain = Chain::new(&problem, &parameters.geometry, setup.configuration);

@@ -17,7 +17,7 @@ fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
         base: 0,
         target: 0,
         observation: flexcal::problem::Observation::default(),
-        measured: row.values[1],
+        measured: &row.values[1],
         sigma: 1.0,
         orientation: None,
     };

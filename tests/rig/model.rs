@@ -64,7 +64,8 @@ payload_at_m = [0.1, 0.0, 0.3]
 fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
     let mut arm = Arm::nominal(problem);
     arm.beam_elements = 12;
-    let setup = PoseView { payload: set.payload, hoist: set.hoist, ..PoseView::of(&set.configuration) };
+    let setup =
+        PoseView { payload: set.payload.as_ref(), hoist: set.hoist.as_ref(), ..PoseView::of(&set.configuration) };
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)

@@ -15,7 +15,7 @@ struct Row {
 
 impl Row {
     fn setup(&self) -> PoseView<'_> {
-        PoseView { payload: Some(self.payload), hoist: Some(self.hoist), ..PoseView::of(&self.q) }
+        PoseView { payload: Some(&self.payload), hoist: Some(&self.hoist), ..PoseView::of(&self.q) }
     }
 
     fn vector(&self, k: usize) -> Vector3<f64> {

@@ -201,9 +201,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
         for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
             let of = |pose: &Pose| match covariate {
-                Covariate::Temperature => pose.setup.temperature,
-                Covariate::Payload => pose.setup.payload,
-                _ => pose.setup.hoist,
+                Covariate::Temperature => pose.setup.temperature.copied(),
+                Covariate::Payload => pose.setup.payload.copied(),
+                _ => pose.setup.hoist.copied(),
             };
             all.extend(poses.iter().map(of).collect::<Option<Vec<f64>>>().map(|values| (covariate, values)));
         }

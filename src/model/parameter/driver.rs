@@ -115,10 +115,10 @@ impl Quantity {
     pub fn value(self, setup: &PoseView) -> f64 {
         match self {
             Self::Command(joint) => setup.configuration[joint],
-            Self::Temperature => setup.temperature.unwrap_or(0.0),
+            Self::Temperature => setup.temperature.copied().unwrap_or(0.0),
             Self::Elapsed => setup.elapsed,
-            Self::Payload => setup.payload.unwrap_or(0.0),
-            Self::Hoist => setup.hoist.unwrap_or(0.0),
+            Self::Payload => setup.payload.copied().unwrap_or(0.0),
+            Self::Hoist => setup.hoist.copied().unwrap_or(0.0),
             Self::Covariate(which) => setup.covariates.get(which).copied().unwrap_or(0.0),
         }
     }
@@ -131,7 +131,7 @@ impl Driver {
             return poses.map(|own| self.value(own)).collect();
         };
         let mut lag = Lag::new(time_constant);
-        let felt = |own: &PoseView| own.temperature.map(|now| lag.felt(&own.past, (own.time, now)) - reference);
+        let felt = |own: &PoseView| own.temperature.map(|&now| lag.felt(&own.past.read(), (own.time, now)) - reference);
         poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
     }
 
@@ -144,19 +144,19 @@ impl Driver {
             Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
             Self::Wave { joint, order, phase } => (order * setup.configuration[joint] + phase).sin(),
             Self::Warming { reference } => setup.temperature.map_or(0.0, |temperature| temperature - reference),
-            Self::Lagging { reference, time_constant } => setup
-                .temperature
-                .map_or(0.0, |temperature| setup.past.lagging((setup.time, temperature), time_constant) - reference),
+            Self::Lagging { reference, time_constant } => setup.temperature.map_or(0.0, |&temperature| {
+                setup.past.read().lagging((setup.time, temperature), time_constant) - reference
+            }),
             Self::Dragged { joint, distance } => {
                 let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                setup.past.dragged(joint, (setup.configuration[joint], side), distance)
+                setup.past.read().dragged(joint, (setup.configuration[joint], side), distance)
             }
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
             Self::Settling(time_constant) => -(-setup.elapsed / time_constant).exp_m1(),
             Self::LoadedSide { joint, declared } => {
                 let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                0.5 * setup.payload.unwrap_or(declared) * side
+                0.5 * setup.payload.copied().unwrap_or(declared) * side
             }
             Self::Covariate(which) => Quantity::Covariate(which).value(setup),
             Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => self.at(of.value(setup)),
@@ -195,7 +195,7 @@ impl Driver {
             }
             Self::Dragged { joint: own, distance } if own == joint => {
                 let side = setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                setup.past.drag_slope(joint, (setup.configuration[joint], side), distance)
+                setup.past.read().drag_slope(joint, (setup.configuration[joint], side), distance)
             }
             _ => 0.0,
         }
@@ -315,7 +315,7 @@ mod tests {
         let sides = [1.0, -1.0];
         let pose = PoseView { approach: Some(&sides), ..PoseView::of(&[0.0, 0.0]) };
         assert!((driver.value(&pose) + 1.5).abs() < 1e-15);
-        assert!((driver.value(&PoseView { payload: Some(2.0), ..pose }) + 1.0).abs() < 1e-15);
+        assert!((driver.value(&PoseView { payload: Some(&2.0), ..pose }) + 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -53,7 +53,7 @@ impl<'a> Poses<'a> {
     pub fn places(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
         let (others, places): (Vec<Pose>, Vec<usize>) =
             poses.iter().copied().zip(0..).filter(|(pose, _)| !pose.observation.is_position()).unzip();
-        let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.measured).collect();
+        let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
         for (place, target) in places.into_iter().zip(arm.model.target_places(&others, arm.x.as_slice())) {
             at[place] = target;
         }

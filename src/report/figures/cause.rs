@@ -225,7 +225,7 @@ fn at_joint<'a>(
         }
         Effect::JointCoupling { joint, from } => (joint, Quantity::command(problem, from), command(from), of_command),
         Effect::JointThermalDrift { joint } => {
-            let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(t), ..PoseView::of(&[]) }));
+            let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(&t), ..PoseView::of(&[]) }));
             (joint, Quantity::temperature(), rows.temperatures(), law)
         }
         Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
@@ -279,7 +279,7 @@ impl Rows<'_> {
     }
 
     fn temperatures(&self) -> Vec<f64> {
-        self.poses.iter().map(|pose| pose.temperature.unwrap_or_default()).collect()
+        self.poses.iter().map(|pose| pose.temperature.copied().unwrap_or_default()).collect()
     }
 
     /// The effect's displacement over its size in each row; none where that is 0.
@@ -339,7 +339,7 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
         Effect::PayloadMass => View {
             across: Quantity::new("payload [kg]", 1.0),
             up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
-            x: rows.poses.iter().map(|pose| pose.payload.unwrap_or_default()).collect(),
+            x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
             levers: rows.over(std::iter::repeat(sum)),
             law: Box::new(move |_| sum),
             reading: SIZE,
