@@ -309,7 +309,7 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 /// 1 + A (AᵀA)⁻¹ Aᵀ of one beside it, over the median of all.
 fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
-    let (mut columns, mut here) = (whole.into_owned(), residual.clone());
+    let (mut columns, mut here) = (whole.clone(), residual.clone());
     for &pose in aside {
         columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
         here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);

@@ -63,7 +63,7 @@ pub(super) fn telling_pose(
 ) -> Option<TellingPose> {
     let moved = |effect: &Effect| {
         let fit = fit.with(&here.columns(effect));
-        beside(there.fitted().into_owned(), &there.columns(effect)) * fit.step()
+        beside(there.fitted().clone(), &there.columns(effect)) * fit.step()
     };
     let difference: DVector<f64> = moved(one) - moved(other);
     let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;

@@ -8,7 +8,8 @@ pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
 pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
-    gram, lower_product, product, product_along, product_with_upper, product_with_upper_to, transposed, zeros,
+    gram, lower_product, multiply_by_upper, product, product_along, product_with_upper, product_with_upper_above,
+    transposed, zeros,
 };
 
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.

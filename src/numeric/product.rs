@@ -27,30 +27,50 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// A B of a square upper triangle B.
 pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = zeros(a.nrows(), b.ncols());
-    product_with_upper_to(a, b, &mut out);
+    product_with_upper_above(a, b, 0)
+}
+
+/// A B of a square upper triangle B, with so many rows of zeros below.
+pub(crate) fn product_with_upper_above(a: &DMatrix<f64>, b: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
+    let mut out = zeros(a.nrows() + more, b.ncols());
+    product_to(a, b, &mut out, |columns| columns);
     out
 }
 
-/// The same in a matrix of its shape: new memory takes a good part of the time of the product.
-pub(crate) fn product_with_upper_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-    product_to(a, b, out, |columns| columns);
+/// A B of a square upper triangle B in the place of A: some rows after others, since new memory takes a good part of the time of the product.
+pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
+    fn multiply(mut a: DMatrixViewMut<f64>, b: &DMatrix<f64>) {
+        let (rows, n) = a.shape();
+        if rows > SHORT {
+            let (upper, lower) = a.rows_range_pair_mut(..rows / 2, rows / 2..);
+            rayon::join(|| multiply(upper, b), || multiply(lower, b));
+            return;
+        }
+        let own = a.clone_owned();
+        for first in (0..n).step_by(TOGETHER) {
+            let end = n.min(first + TOGETHER);
+            let part = b.view((0, first), (end, end - first));
+            a.columns_range_mut(first..end).gemm(1.0, &own.columns(0, end), &part, 0.0);
+        }
+    }
+    multiply(a.as_view_mut(), b);
 }
 
-/// A B in `out`, of which the first columns, so many, have nothing below so many rows of B.
+/// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many rows of B.
 fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < WORTH_THREADS || inner == 0 {
-        return a.mul_to(b, out);
+        return a.mul_to(b, &mut out.rows_mut(0, rows));
     }
+    let long = out.nrows();
     let form = |(part, own): (usize, &mut [f64])| {
-        let (first, count) = (part * TOGETHER, own.len() / rows);
+        let (first, count) = (part * TOGETHER, own.len() / long);
         let filled = filled(first + count);
-        let mut own = DMatrixViewMut::from_slice(own, rows, count);
-        own.gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
+        let mut own = DMatrixViewMut::from_slice(own, long, count);
+        own.rows_mut(0, rows).gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
     };
     // Of a triangle what takes longest comes first.
-    out.as_mut_slice().par_chunks_mut(rows * TOGETHER).enumerate().rev().for_each(form);
+    out.as_mut_slice().par_chunks_mut(long * TOGETHER).enumerate().rev().for_each(form);
 }
 
 /// L B of a square lower triangle L, on one thread.
@@ -162,7 +182,12 @@ mod tests {
             let scale = 1e-15 * rows as f64;
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
             let upper = DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
-            assert!((product_with_upper(&a, &upper) - &a * &upper).amax() <= scale);
+            let (expected, mut in_place) = (&a * &upper, a.clone());
+            let above = product_with_upper_above(&a, &upper, 2);
+            assert!((product_with_upper(&a, &upper) - &expected).amax() <= scale);
+            assert!(above == product_with_upper(&a, &upper).resize_vertically(rows + 2, 0.0));
+            multiply_by_upper(&mut in_place, &upper);
+            assert!((in_place - expected).amax() <= scale);
             let (lower, wide) = (upper.transpose(), b.columns(0, columns.min(inner)).into_owned());
             assert!((lower_product(&lower, &wide) - &lower * &wide).amax() <= scale);
             let own = gram(&a);

@@ -1,11 +1,11 @@
 //! A fit in its linear neighbourhood: what its residual can still give to columns that were not fitted, and what each
 //! fitted parameter gives it.
 
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::estimated::Estimated;
-use super::orthonormal::{open, orthonormal};
+use super::orthonormal::{open, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
 use crate::numeric::{gram, inverse_factor, product, product_along, zeros};
 
@@ -35,7 +35,7 @@ pub(crate) struct Unknowns {
 /// All is kept in an orthonormal basis Q = A T of what was fitted, T of shape (unknowns, rank): the covariance of the
 /// unknowns is T Tᵀ, the step to their common optimum − T Qᵀr. Unknowns that columns before them take up wholly have no part
 /// in T and stay where they are.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct LinearNeighbourhood {
     /// Whitened residual at the optimum, priors below.
     residual: DVector<f64>,
@@ -55,6 +55,20 @@ pub(crate) struct LinearNeighbourhood {
     sums: Sums,
 }
 
+/// On every core: most of its time is that of new memory.
+impl Clone for LinearNeighbourhood {
+    fn clone(&self) -> Self {
+        Self {
+            residual: self.residual.clone(),
+            basis: lengthened(&self.basis, 0),
+            root: self.root.clone(),
+            optimum: self.optimum.clone(),
+            step: self.step.clone(),
+            ..*self
+        }
+    }
+}
+
 /// What some unknowns alone give a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Share {
@@ -67,33 +81,17 @@ pub(crate) struct Share {
 impl LinearNeighbourhood {
     /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given; so many rows are
     /// `empty`: 0, since poses measure fewer numbers than three.
-    pub fn new<'m>(
-        jacobian: impl Into<DMatrixView<'m, f64>>,
-        residual: &DVector<f64>,
-        unknowns: &Unknowns,
-        empty: usize,
-    ) -> Self {
-        let jacobian: DMatrixView<f64> = jacobian.into();
+    pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut columns = lengthened(jacobian, known.len());
         let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
-        for (row, &(j, sigma)) in known.iter().enumerate() {
-            columns[(rows + row, j)] = sigma.recip();
-            long[rows + row] = unknowns.x[j] / sigma;
-        }
-        let scale: Vec<f64> = columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-        let active = unknowns.active.clone().resize_horizontally(n, 0.0);
-        let (basis, root) = match open(&active, &scale) {
-            Some(open) => {
-                columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-                let (basis, within) = orthonormal(product(&columns, &open), None);
-                let mut root = open * within;
-                root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
-                (basis, root)
-            }
-            None => orthonormal(columns, None),
+        known.iter().enumerate().for_each(|(row, &(j, sigma))| long[rows + row] = unknowns.x[j] / sigma);
+        let below: Vec<(usize, f64)> = known.iter().map(|&(j, sigma)| (j, sigma.recip())).collect();
+        let (basis, root) = if unknowns.active.is_empty() {
+            orthonormal_above(jacobian, &below, None)
+        } else {
+            held(jacobian, &below, unknowns.active.clone().resize_horizontally(n, 0.0))
         };
         let mut fit = Self {
             residual: long,
@@ -113,7 +111,7 @@ impl LinearNeighbourhood {
     fn settle(&mut self, first: usize) {
         let new = self.basis.columns_range(first..);
         let along = new.tr_mul(&self.residual);
-        self.residual -= new * &along;
+        self.residual.gemv(-1.0, &new, &along, 1.0);
         let step = -(self.root.columns_range(first..) * along);
         self.optimum += &step;
         self.step += step;
@@ -136,7 +134,7 @@ impl LinearNeighbourhood {
                 break;
             }
         }
-        let (new, within) = orthonormal(left, Some(&lengths));
+        let (new, within) = orthonormal(&left, Some(&lengths));
         (along, new, within)
     }
 
@@ -171,7 +169,7 @@ impl LinearNeighbourhood {
         let mut columns = columns.clone().resize_vertically(rows + k, 0.0);
         columns.view_mut((rows, 0), (k, k)).fill_diagonal(sigma.recip());
         let mut with = Self {
-            basis: lengthened(self.basis.as_view(), k),
+            basis: lengthened(&self.basis, k),
             residual: self.residual.clone().resize_vertically(rows + k, 0.0),
             root: self.root.clone(),
             optimum: self.optimum.clone(),
@@ -239,7 +237,7 @@ impl LinearNeighbourhood {
     fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let own = self.root.select_rows(unknowns).transpose();
         // U = T_xᵀ W with W = S⁻¹.
-        let (turned, within) = orthonormal(own, None);
+        let (turned, within) = orthonormal(&own, None);
         let x = self.optimum.select_rows(unknowns);
         (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
     }
@@ -342,8 +340,22 @@ impl LinearNeighbourhood {
     }
 }
 
+/// Q and T of columns with rows `below` them of one entry each, within the directions that the constraints `active` leave open.
+fn held(jacobian: &DMatrix<f64>, below: &[(usize, f64)], active: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let rows = jacobian.nrows();
+    let mut columns = lengthened(jacobian, below.len());
+    below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
+    let scale: Vec<f64> = columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+    let Some(open) = open(&active, &scale) else { return orthonormal(&columns, None) };
+    columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
+    let (basis, within) = orthonormal(&product(&columns, &open), None);
+    let mut root = open * within;
+    root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
+    (basis, root)
+}
+
 /// A tall matrix with so many rows of zeros below it.
-fn lengthened(matrix: DMatrixView<f64>, more: usize) -> DMatrix<f64> {
+fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
     let (rows, n) = matrix.shape();
     let mut long = zeros(rows + more, n);
     let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();

@@ -167,8 +167,8 @@ impl<'a> Linearised<'a> {
     }
 
     /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
-    pub fn fitted(&self) -> DMatrixView<'_, f64> {
-        self.derivatives.fitted.as_view()
+    pub fn fitted(&self) -> &DMatrix<f64> {
+        &self.derivatives.fitted
     }
 
     /// σ of the priors of what is relaxed, in the order of its columns.

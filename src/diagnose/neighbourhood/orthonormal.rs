@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::numeric::{gram, inverse_factor, inverse_lower, product_with_upper, product_with_upper_to};
+use crate::numeric::{
+    gram, inverse_factor, inverse_lower, multiply_by_upper, product_with_upper, product_with_upper_above,
+};
 
 /// A column is a direction of its own where those before it leave more than this part of its length.
 ///
@@ -14,33 +16,49 @@ pub(crate) const RANK: f64 = 1e-6;
 /// them take up, have no part in it. `lengths` are those that a column had before others were projected out.
 ///
 /// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are directions of their own.
-pub(super) fn orthonormal(columns: DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
-    let n = columns.ncols();
-    let own: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
-    let (kept, first) = independent(&columns, &own, lengths.unwrap_or(&own));
-    let mut basis = if kept.len() == n { columns } else { columns.select_columns(&kept) };
-    let mut within = DMatrix::zeros(n, kept.len());
-    for (k, &j) in kept.iter().enumerate() {
-        basis.column_mut(k).unscale_mut(own[j]);
-        within[(j, k)] = own[j].recip();
-    }
-    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
-    let inverse = inverse_lower(&first).transpose();
-    let turned = product_with_upper(&basis, &inverse);
-    within = product_with_upper(&within, &inverse);
-    // Once more, for what rounding left.
-    let again = inverse_factor(&gram(&turned)).map(|inverse| inverse.transpose());
-    let Some(again) = again else { return (DMatrix::zeros(basis.nrows(), 0), DMatrix::zeros(n, 0)) };
-    product_with_upper_to(&turned, &again, &mut basis);
-    (basis, product_with_upper(&within, &again))
+pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
+    orthonormal_above(columns, &[], lengths)
 }
 
-/// Columns that are directions of their own, and the Cholesky factor of the Gram matrix of these, scaled to length one.
-fn independent(columns: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
-    let gram = gram(columns);
+/// The same of columns with rows `below` them of one entry each, its column and its value.
+pub(super) fn orthonormal_above(
+    columns: &DMatrix<f64>,
+    below: &[(usize, f64)],
+    lengths: Option<&[f64]>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (rows, n) = columns.shape();
+    let mut products = gram(columns);
+    below.iter().for_each(|&(j, value)| products[(j, j)] += value * value);
+    let own: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
+    let (kept, first) = independent(&products, &own, lengths.unwrap_or(&own));
+    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+    let mut turn = inverse_lower(&first).transpose();
+    turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(own[j]));
+    let mut basis = if kept.len() == n {
+        product_with_upper_above(columns, &turn, below.len())
+    } else {
+        product_with_upper_above(&columns.select_columns(&kept), &turn, below.len())
+    };
+    for (row, (j, value)) in below.iter().enumerate() {
+        if let Ok(k) = kept.binary_search(j) {
+            basis.row_mut(rows + row).copy_from(&(turn.row(k) * *value));
+        }
+    }
+    // Once more, for what rounding left.
+    let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
+    let Some(again) = again else { return (DMatrix::zeros(basis.nrows(), 0), DMatrix::zeros(n, 0)) };
+    multiply_by_upper(&mut basis, &again);
+    let turn = product_with_upper(&turn, &again);
+    let mut within = DMatrix::zeros(n, kept.len());
+    kept.iter().zip(turn.row_iter()).for_each(|(&j, row)| within.set_row(j, &row));
+    (basis, within)
+}
+
+/// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky factor of theirs, scaled to length one.
+fn independent(gram: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
-    for j in (0..columns.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {
+    for j in (0..gram.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {
         let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
         for (&k, known) in kept.iter().zip(&factor) {
             let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
@@ -96,7 +114,7 @@ mod tests {
     #[test]
     fn columns_that_nearly_depend_on_others_keep_a_basis() {
         let columns = DMatrix::from_fn(300, 60, |i, j| ((1.0 + 0.02 * j as f64) * i as f64 / 300.0).sin());
-        let (basis, within) = orthonormal(columns, None);
+        let (basis, within) = orthonormal(&columns, None);
         assert!(basis.ncols() > 3 && within.ncols() == basis.ncols(), "{}", basis.ncols());
         assert!((basis.transpose() * &basis - DMatrix::identity(basis.ncols(), basis.ncols())).amax() < 1e-10);
     }

@@ -149,7 +149,7 @@ fn with_prior(mut problem: Problem, prior: &HarmonicPrior) -> Problem {
 fn best_prior(fitted: &Fitted, data: &Data, first: HarmonicPrior) -> HarmonicPrior {
     let linearised = fitted.linearised(data, &[]);
     let parts = parts_of_ranges(&fitted.problem, data);
-    let squares = PartSquares::new(&linearised.fitted().into_owned(), linearised.residual(), &parts);
+    let squares = PartSquares::new(linearised.fitted(), linearised.residual(), &parts);
     let parameters = fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
     let all = parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
     // Weighed as fitted: where that took a σ larger than the declared one, priors counted for more.
