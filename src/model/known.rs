@@ -103,10 +103,14 @@ mod tests {
     use crate::model::{Model, PoseResiduals};
     use crate::problem::{Observation, PoseView, Problem};
 
-    fn model(effects: &str) -> Model {
+    const RIGID: &str = "[[joint]]\na_m = 0.6\nalpha_deg = 90\n[[joint]]\na_m = 0.4\n";
+    const ELASTIC: &str = "[[joint]]\na_m = 0.6\nalpha_deg = 90\nstiffness_N_m_per_rad = 2e4\n[[joint]]\na_m = 0.4\n\
+                           [joint.beam]\nname = 'A'\nmass_kg = 3\nEA_N = 1e6\nGJ_N_m2 = 700\nEIy_N_m2 = 900\nEIz_N_m2 = 900\n[tool]\ntarget_m = [0.1, 0, 0.2]\npayload_kg = 5\n";
+
+    fn model(arm: &str, effects: &str) -> Model {
         let text = format!(
-            "name = 'arm'\n[[joint]]\na_m = 0.6\nalpha_deg = 90\n[[joint]]\na_m = 0.4\n{effects}\n[parameters]\n\
-             'joint*.a' = {{ free = true }}\n'joint*.theta' = {{ free = true }}\n"
+            "name = 'arm'\n{arm}{effects}\n[parameters]\n'joint*.*' = {{ free = true }}\n'base.*' = {{ free = false }}\n\
+             'tool.*' = {{ free = false }}\n"
         );
         let problem = Problem::parse(&text, "problem.toml".as_ref()).unwrap();
         Model::new(&problem, &["base".to_owned()], &["tool".to_owned()]).unwrap()
@@ -114,6 +118,16 @@ mod tests {
 
     #[test]
     fn known_columns_are_those_formed_anew() {
+        are_those_formed_anew(RIGID, 1.0);
+    }
+
+    #[test]
+    fn known_columns_of_an_arm_that_bends_are_those_formed_anew_also_of_poses_that_were_set_aside() {
+        are_those_formed_anew(ELASTIC, 1e6);
+    }
+
+    /// With σ of some poses so many times as large where the derivatives were formed.
+    fn are_those_formed_anew(arm: &str, aside: f64) {
         let configurations: Vec<[f64; 2]> =
             (0..600).map(|k| [0.01 * f64::from(k), 2.0 * (0.03 * f64::from(k)).sin()]).collect();
         let seen = Vector3::new(0.1, 0.2, 0.3);
@@ -126,12 +140,17 @@ mod tests {
             sigma,
             orientation: None,
         };
-        let poses = |sigma: f64| -> Vec<Pose> { configurations.iter().map(|own| pose(own, sigma)).collect() };
-        let (plain, more) = (model(""), model("[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"));
+        let sigma = |k: usize, aside: f64| if k % 100 == 7 { 1e-3 * aside } else { 1e-3 };
+        let poses = |times: f64, aside: f64| -> Vec<Pose> {
+            let own = configurations.iter().enumerate();
+            own.map(|(k, own)| pose(own, times * sigma(k, aside))).collect()
+        };
+        let (plain, more) =
+            (model(arm, ""), model(arm, "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"));
         let names = |model: &Model| model.parameters.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
         let x = DVector::from_fn(plain.parameters.len(), |j, _| 0.01 * (1.0 + j as f64));
         let unknowns = |model: &Model| (0..model.parameters.len()).collect::<Vec<_>>();
-        let residuals = PoseResiduals::new(&plain, poses(1e-3), unknowns(&plain), x.clone());
+        let residuals = PoseResiduals::new(&plain, poses(1.0, aside), unknowns(&plain), x.clone());
         let (mut columns, residual) = jacobian_and_residual(&residuals, &x);
         // What is known is taken as it is: a mark shows that it was.
         columns.column_mut(0)[5] += 1.0;
@@ -139,13 +158,13 @@ mod tests {
         let known = KnownDerivatives::new(
             (&plain.parameters, &x),
             &unknowns(&plain),
-            vec![1e-3; 600],
+            (0..600).map(|k| sigma(k, aside)).collect(),
             (columns.into(), residual.into()),
         );
         let at = |name: &String| all.iter().position(|own| own == name).map_or(0.0, |j| x[j]);
         let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
-        let fresh = PoseResiduals::new(&more, poses(2e-3), unknowns(&more), start.clone());
-        let begun = PoseResiduals::new(&more, poses(2e-3), unknowns(&more), start.clone()).knowing(Some(&known));
+        let fresh = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone());
+        let begun = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone()).knowing(Some(&known));
         let ((expected, there), (found, own)) =
             (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&begun, &start));
         let mut difference = found - &expected;

@@ -91,7 +91,7 @@ impl LinearNeighbourhood {
         let (basis, root) = if unknowns.active.is_empty() {
             orthonormal_above(jacobian, &below, None)
         } else {
-            held(jacobian, &below, unknowns.active.clone().resize_horizontally(n, 0.0))
+            held(jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
         };
         let mut fit = Self {
             residual: long,
@@ -341,12 +341,12 @@ impl LinearNeighbourhood {
 }
 
 /// Q and T of columns with rows `below` them of one entry each, within the directions that the constraints `active` leave open.
-fn held(jacobian: &DMatrix<f64>, below: &[(usize, f64)], active: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+fn held(jacobian: &DMatrix<f64>, below: &[(usize, f64)], active: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let rows = jacobian.nrows();
     let mut columns = lengthened(jacobian, below.len());
     below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
     let scale: Vec<f64> = columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let Some(open) = open(&active, &scale) else { return orthonormal(&columns, None) };
+    let Some(open) = open(active, &scale) else { return orthonormal(&columns, None) };
     columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
     let (basis, within) = orthonormal(&product(&columns, &open), None);
     let mut root = open * within;

@@ -28,7 +28,9 @@ pub(super) fn orthonormal_above(
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (rows, n) = columns.shape();
     let mut products = gram(columns);
-    below.iter().for_each(|&(j, value)| products[(j, j)] += value * value);
+    for &(j, value) in below {
+        products[(j, j)] += value * value;
+    }
     let own: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
     let (kept, first) = independent(&products, &own, lengths.unwrap_or(&own));
     // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
