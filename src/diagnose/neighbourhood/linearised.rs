@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
+use crate::least_squares::kernel::dot;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Driver, Parameter, Slot};
@@ -233,8 +234,8 @@ impl<'a> Linearised<'a> {
             let mut along = DMatrix::zeros(terms.len(), width);
             for (&(place, driver), mut row) in terms.iter().zip(along.row_iter_mut()) {
                 let Some(known) = place.and_then(|place| places.iter().position(|own| *own == place)) else { continue };
-                let values = DVectorView::from_slice(&driven.values[driver], poses);
-                row.tr_copy_from(&sums[known].tr_mul(&values));
+                let values = &driven.values[driver];
+                row.iter_mut().zip(sums[known].column_iter()).for_each(|(out, own)| *out = dot(own.as_slice(), values));
             }
             along
         };

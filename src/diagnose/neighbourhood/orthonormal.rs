@@ -120,4 +120,22 @@ mod tests {
         assert!(basis.ncols() > 3 && within.ncols() == basis.ncols(), "{}", basis.ncols());
         assert!((basis.transpose() * &basis - DMatrix::identity(basis.ncols(), basis.ncols())).amax() < 1e-10);
     }
+
+    #[test]
+    fn rows_below_are_rows_of_the_columns() {
+        let mut columns = DMatrix::from_fn(200, 40, |i, j| ((1.0 + 0.3 * j as f64) * i as f64 / 20.0).sin());
+        // A column that the first two take up, one of zeros with a row of its own, and one that is no number.
+        let sum = columns.column(0) + columns.column(1);
+        columns.set_column(7, &sum);
+        columns.column_mut(9).fill(0.0);
+        columns.column_mut(11)[3] = f64::NAN;
+        let below = [(9, 2.0), (3, 5.0), (11, 1.0)];
+        let mut stacked = columns.clone().resize_vertically(203, 0.0);
+        below.iter().enumerate().for_each(|(row, &(j, value))| stacked[(200 + row, j)] = value);
+        let ((basis, within), (expected, turn)) =
+            (orthonormal_above(&columns, &below, None), orthonormal(&stacked, None));
+        assert_eq!((basis.shape(), within.shape()), ((203, 38), (40, 38)));
+        assert!((&basis - expected).amax() < 1e-10 && (&within - turn).amax() < 1e-10 * within.amax());
+        assert!((basis.transpose() * &basis - DMatrix::identity(38, 38)).amax() < 1e-13);
+    }
 }
