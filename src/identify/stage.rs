@@ -169,7 +169,7 @@ impl<'a> Stage<'a> {
             put(pose.orientation.map_or(0.0, |own| own.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
-            // What was before stands in the table, which is the same in all fits that share a memory.
+            // What was before stands in the table, which is the same in all fits that share a memory: the row tells it.
             put(past.place().map_or(f64::NAN, f64::from));
         }
         self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));

@@ -3,17 +3,26 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::kernel::{dot, norm};
-use crate::numeric::inverse_lower;
 
 /// R⁻¹, if no singular value of R is below `least` of the largest; nothing where that is not certain, or R no upper triangle.
 ///
 /// Columns of R are at most of length one, so that `σ₁ ≤ √n`; and `σₙ ≥ 1/‖R⁻¹‖`.
 pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
-    if !is_upper(triangle) || triangle.diagonal().iter().any(|own| *own == 0.0) {
+    let n = triangle.ncols();
+    if !is_upper(triangle) {
         return None;
     }
-    let inverse = inverse_lower(&triangle.transpose()).transpose();
-    let certain = norm(inverse.as_slice()) * (triangle.ncols() as f64).sqrt() * least <= 1.0;
+    let mut inverse = DMatrix::zeros(n, n);
+    for (j, column) in inverse.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
+        column[j] = 1.0;
+        for k in (0..=j).rev() {
+            let own = &triangle.as_slice()[k * n..=k * n + k];
+            let value = column[k] / own[k];
+            column[k] = value;
+            column[..k].iter_mut().zip(own).for_each(|(x, r)| *x -= value * r);
+        }
+    }
+    let certain = norm(inverse.as_slice()) * (n as f64).sqrt() * least <= 1.0;
     certain.then_some(inverse)
 }
 

@@ -131,6 +131,7 @@ impl PoseTable for Measurements {
 mod tests {
     use super::*;
     use crate::measurement::Labels;
+    use crate::problem::PoseView;
 
     #[test]
     fn what_was_before_goes_by_time_within_a_session() {
@@ -159,5 +160,11 @@ mod tests {
         let in_order = table.select(&[1, 4, 0, 3, 2]);
         assert_eq!(in_order.time_going_back(), None);
         assert_eq!((in_order.past(2).times, in_order.past(4).temperatures), (past.times, [23.0].as_slice()));
+        // A row's conditions read the same, and keep it by themselves.
+        let setup = table.setup(0, table.first_time());
+        assert_eq!((setup.past.read(), setup.past.place()), (past, Some(0)));
+        assert_eq!(setup.to_owned().view().past.read(), past);
+        let unknown = PoseView::of(setup.configuration).past;
+        assert!(unknown.read().times.is_empty() && unknown.place().is_none());
     }
 }

@@ -84,7 +84,7 @@ mod tests {
                 }
             }
             let found = commands.apply(&pose);
-            let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15);
+            let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14);
             assert!(
                 near(found.configuration, &joints)
                     && near(found.strains.unwrap().as_flattened(), strains.as_flattened())

@@ -12,6 +12,8 @@ const FEW: usize = 8;
 const NARROW: usize = 5;
 /// Rows that one thread goes through at a time where the result is narrow.
 const SHORT: usize = 1024;
+/// Numbers below which copies of rows cost more than new memory.
+const WORTH_PLACE: usize = 1 << 20;
 /// Multiplications below which threads cost more than they save.
 const WORTH_THREADS: usize = 1 << 20;
 
@@ -37,8 +39,9 @@ pub(crate) fn product_with_upper_above(a: &DMatrix<f64>, b: &DMatrix<f64>, more:
     out
 }
 
-/// A B of a square upper triangle B in the place of A: some rows after others, since new memory takes a good part of the time of the product.
+/// A B of a square upper triangle B, in the place of a large A: new memory takes a good part of the time of the product.
 pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
+    /// Some rows after others.
     fn multiply(mut a: DMatrixViewMut<f64>, b: &DMatrix<f64>) {
         let (rows, n) = a.shape();
         if rows > SHORT {
@@ -53,7 +56,11 @@ pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
             a.columns_range_mut(first..end).gemm(1.0, &own.columns(0, end), &part, 0.0);
         }
     }
-    multiply(a.as_view_mut(), b);
+    if a.len() < WORTH_PLACE {
+        *a = product_with_upper(a, b);
+    } else {
+        multiply(a.as_view_mut(), b);
+    }
 }
 
 /// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many rows of B.
@@ -176,7 +183,7 @@ mod tests {
     fn products_are_those_of_one_thread() {
         let entry = |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
         for (rows, inner, columns) in
-            [(3, 2, 4), (700, 70, 41), (301, 250, 250), (5, 0, 3), (3001, 202, 4), (3001, 97, 7)]
+            [(3, 2, 4), (700, 70, 41), (301, 250, 250), (5, 0, 3), (3001, 202, 4), (3001, 97, 7), (2600, 410, 3)]
         {
             let (a, b) = (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
             let scale = 1e-15 * rows as f64;

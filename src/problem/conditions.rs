@@ -48,6 +48,7 @@ pub struct PoseView<'a> {
     /// What was before.
     pub past: PastOf<'a>,
     /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures about y and z [1/m]; `None`: none.
+    /// Most poses have none: a thin reference keeps them small.
     pub strains: Option<&'a Vec<[f64; 3]>>,
 }
 
@@ -95,7 +96,7 @@ impl PoseConditions {
             elapsed: self.elapsed,
             approach: self.approach.as_deref(),
             covariates: &self.covariates,
-            past: PastOf::row(&self.past, 0),
+            past: PastOf::from(&self.past),
             strains: None,
         }
     }

@@ -67,7 +67,7 @@ impl<'a> PastOf<'a> {
         Self { table: Some(table), row }
     }
 
-    /// Where it stands in its table; `None`: nowhere.
+    /// Its row in its table, 0 where it is of one pose alone; `None`: there is none.
     pub(crate) fn place(self) -> Option<u32> {
         self.table.map(|_| self.row)
     }
@@ -75,6 +75,13 @@ impl<'a> PastOf<'a> {
     /// The poses before.
     pub fn read(self) -> Past<&'a [f64]> {
         self.table.map(|table| table.past(self.row as usize)).unwrap_or_default()
+    }
+}
+
+/// The past of a pose that has one of its own.
+impl<'a> From<&'a Past> for PastOf<'a> {
+    fn from(past: &'a Past) -> Self {
+        Self::row(past, 0)
     }
 }
 

@@ -437,6 +437,22 @@ mod tests {
     }
 
     #[test]
+    fn what_a_constraint_holds_together_is_one_unknown() {
+        let (columns, residual, mut unknowns) = fit(4);
+        unknowns.active = DMatrix::from_row_slice(1, 4, &[0.0, 0.0, 2.0, -1.0]);
+        let held = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        // x₂ = t, x₃ = 2 t.
+        let mut together = columns.columns(0, 3).into_owned();
+        together.set_column(2, &(columns.column(2) + columns.column(3) * 2.0));
+        let three =
+            Unknowns { x: unknowns.x[..3].to_vec(), priors: unknowns.priors[..3].to_vec(), ..Unknowns::default() };
+        let one = LinearNeighbourhood::new(&together, &residual, &three, 0);
+        assert!((held.sums().squares / one.sums().squares - 1.0).abs() < 1e-12);
+        let step = [one.step[0], one.step[1], one.step[2], 2.0 * one.step[2]];
+        assert!((&held.step - DVector::from_row_slice(&step)).norm() < 1e-12);
+    }
+
+    #[test]
     fn what_other_columns_take_up_or_what_is_not_finite_changes_nothing() {
         let (columns, residual, unknowns) = fit(5);
         let plain = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);

@@ -19,7 +19,7 @@ const TRACE_OF_MASS: f64 = 1e-4;
 #[derive(Clone)]
 pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
-    poses: Vec<Pose<'a>>,
+    poses: Arc<Vec<Pose<'a>>>,
     derivatives: Arc<Derivatives>,
 }
 
@@ -65,11 +65,12 @@ impl<'a> Linearised<'a> {
     pub fn new(
         (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,
-        poses: Vec<Pose<'a>>,
+        poses: impl Into<Arc<Vec<Pose<'a>>>>,
         unknowns: &[usize],
         x: &DVector<f64>,
         (effects, places): (&[Effect], &[Slot]),
     ) -> Self {
+        let poses = poses.into();
         let mut slots: Vec<(Slot, f64)> = places.iter().map(|&slot| (slot, 0.0)).collect();
         for Term { slot, nominal, .. } in effects.iter().flat_map(|effect| effect.terms(problem)) {
             if !slots.iter().any(|(known, _)| *known == slot) {
@@ -104,7 +105,7 @@ impl<'a> Linearised<'a> {
                 }
             }
             let all: Vec<usize> = own.iter().copied().chain(first..first + slots.len()).collect();
-            let residuals = PoseResiduals::new(&probing, poses.clone(), all, at.clone());
+            let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), all, at.clone());
             jacobian_and_residual(&residuals, &residuals.reduced(&at))
         };
         let new = |fitted: DMatrix<f64>, residual| Derivatives {
@@ -118,7 +119,7 @@ impl<'a> Linearised<'a> {
         let mut derivatives = if unknowns.len() < MANY_UNKNOWNS {
             let all = [shared.as_slice(), &slots].concat();
             let (jacobian, _) = pass(unknowns, &all);
-            let plain = PoseResiduals::new(model, poses.clone(), Vec::new(), x.clone());
+            let plain = PoseResiduals::new(model, Arc::clone(&poses), Vec::new(), x.clone());
             let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
             let fitted = unknowns.len() + shared.len();
             let mut own = new(jacobian.columns(0, fitted).into_owned(), residual);
@@ -179,7 +180,7 @@ impl<'a> Linearised<'a> {
 
     /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N, parameters).
     pub fn of_parameters(&self, model: &Model, parameters: &[usize], x: &DVector<f64>) -> DMatrix<f64> {
-        let residuals = PoseResiduals::new(model, self.poses.clone(), parameters.to_vec(), x.clone());
+        let residuals = PoseResiduals::new(model, Arc::clone(&self.poses), parameters.to_vec(), x.clone());
         jacobian_and_residual(&residuals, &residuals.reduced(x)).0
     }
 
@@ -235,6 +236,7 @@ impl<'a> Linearised<'a> {
             for (&(place, driver), mut row) in terms.iter().zip(along.row_iter_mut()) {
                 let Some(known) = place.and_then(|place| places.iter().position(|own| *own == place)) else { continue };
                 let values = &driven.values[driver];
+                debug_assert_eq!(values.len(), poses);
                 row.iter_mut().zip(sums[known].column_iter()).for_each(|(out, own)| *out = dot(own.as_slice(), values));
             }
             along
