@@ -208,9 +208,11 @@ impl Fitted {
     }
 
     /// The same weighed as the fit was: where that took a σ larger than the declared one, its priors counted for more.
-    pub fn neighbourhood_as_fitted(&self, linearised: &Linearised) -> LinearNeighbourhood {
-        let unknowns = self.unknowns_without(linearised, &[], self.found.noise_factor.max(1.0).sqrt());
-        LinearNeighbourhood::new(linearised.fitted(), linearised.residual(), &unknowns, linearised.empty())
+    pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
+        let unknowns = self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());
+        let empty = linearised.empty();
+        let (columns, residual) = linearised.into_fitted();
+        LinearNeighbourhood::in_place_of(columns, residual, &unknowns, empty)
     }
 
     /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is divided by `weight`.

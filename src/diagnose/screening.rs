@@ -168,11 +168,13 @@ pub fn examine(problem: &Problem, data: &Dataset, found: &Identification) -> Res
 /// Tests what a fit leaves.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let linearised = fitted.linearised(data, &[]);
-    let linear = fitted.neighbourhood_as_fitted(&linearised);
+    let coordinates: Vec<usize> = linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect();
+    // Of millions of rows there is room for one such matrix, not for several.
+    let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
     let fit = FitResidual {
-        residual: &linear.data_residual(),
-        fitted: &linear.fitted(),
-        coordinates: &linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect::<Vec<_>>(),
+        residual: &residual,
+        fitted: &columns,
+        coordinates: &coordinates,
         sigma_is_declared: fitted.found.noise == Noise::Declared,
         time: &data.time(),
         session: &data.session(),

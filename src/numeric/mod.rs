@@ -9,7 +9,7 @@ pub(crate) use bootstrap::mean_interval;
 pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
     gram, lower_product, multiply_by_upper, product, product_along, product_with_upper, product_with_upper_above,
-    transposed, zeros,
+    take_off_product, transposed_product, zeros,
 };
 
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.

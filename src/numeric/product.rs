@@ -14,6 +14,8 @@ const NARROW: usize = 5;
 const SHORT: usize = 1024;
 /// Numbers below which copies of rows cost more than new memory.
 const WORTH_PLACE: usize = 1 << 20;
+/// Columns of a tall matrix that one thread turns at a time.
+const BAND: usize = 24;
 /// Multiplications below which threads cost more than they save.
 const WORTH_THREADS: usize = 1 << 20;
 
@@ -41,26 +43,36 @@ pub(crate) fn product_with_upper_above(a: &DMatrix<f64>, b: &DMatrix<f64>, more:
 
 /// A B of a square upper triangle B, in the place of a large A: new memory takes a good part of the time of the product.
 pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
-    /// Some rows after others.
-    fn multiply(mut a: DMatrixViewMut<f64>, b: &DMatrix<f64>) {
-        let (rows, n) = a.shape();
-        if rows > SHORT {
-            let (upper, lower) = a.rows_range_pair_mut(..rows / 2, rows / 2..);
-            rayon::join(|| multiply(upper, b), || multiply(lower, b));
-            return;
-        }
-        let own = a.clone_owned();
-        for first in (0..n).step_by(TOGETHER) {
-            let end = n.min(first + TOGETHER);
-            let part = b.view((0, first), (end, end - first));
-            a.columns_range_mut(first..end).gemm(1.0, &own.columns(0, end), &part, 0.0);
-        }
-    }
     if a.len() < WORTH_PLACE {
         *a = product_with_upper(a, b);
-    } else {
-        multiply(a.as_view_mut(), b);
+        return;
     }
+    let n = b.ncols();
+    let form = |_, mut own: DMatrixViewMut<f64>| {
+        let before = own.clone_owned();
+        for first in (0..n).step_by(TOGETHER) {
+            let end = n.min(first + TOGETHER);
+            let upper = b.view((0, first), (end, end - first));
+            own.columns_range_mut(first..end).gemm(1.0, &before.columns(0, end), &upper, 0.0);
+        }
+    };
+    by_rows(a.as_view_mut(), 0, &form);
+}
+
+/// C − A B in the place of a tall C.
+pub(crate) fn take_off_product(c: DMatrixViewMut<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    let form = |first, mut own: DMatrixViewMut<f64>| own.gemm(-1.0, &a.rows(first, own.nrows()), b, 1.0);
+    by_rows(c, 0, &form);
+}
+
+/// Some rows after others of a tall matrix, on every core, each with the number of its first row.
+fn by_rows(mut all: DMatrixViewMut<f64>, first: usize, form: &(impl Fn(usize, DMatrixViewMut<f64>) + Sync)) {
+    let half = all.nrows() / 2;
+    if all.nrows() <= SHORT {
+        return form(first, all);
+    }
+    let (upper, lower) = all.rows_range_pair_mut(..half, half..);
+    rayon::join(|| by_rows(upper, first, form), || by_rows(lower, first + half, form));
 }
 
 /// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many rows of B.
@@ -157,16 +169,24 @@ fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> 
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
 }
 
-/// Aᵀ of a tall matrix.
-pub(crate) fn transposed(a: &DMatrix<f64>) -> DMatrix<f64> {
+/// AᵀB of a tall A and a B as tall: some columns of A after others, so that each sum is that of one thread.
+pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    let mut out = zeros(n, rows);
-    let form = |(part, own): (usize, &mut [f64])| {
-        let count = own.len() / n;
-        let mut own = DMatrixViewMut::from_slice(own, n, count);
-        a.rows(part * TOGETHER, count).transpose_to(&mut own);
+    // A narrow product goes by axpys, of which nalgebra has none that keep within columns with gaps between their numbers.
+    if a.len() * b.ncols() < WORTH_THREADS || rows.min(n).min(b.ncols()) <= NARROW {
+        return a.transpose() * b;
+    }
+    let turned = transposed_view(a);
+    let parts = n.div_ceil(BAND);
+    let of_columns = |part: usize| {
+        let (first, end) = (part * n / parts, (part + 1) * n / parts);
+        turned.rows(first, end - first) * b
     };
-    out.as_mut_slice().par_chunks_mut((n * TOGETHER).max(1)).enumerate().for_each(form);
+    let found: Vec<DMatrix<f64>> = (0..parts).into_par_iter().map(of_columns).collect();
+    let mut out = zeros(n, b.ncols());
+    for (part, own) in found.iter().enumerate() {
+        out.rows_mut(part * n / parts, own.nrows()).copy_from(own);
+    }
     out
 }
 
@@ -201,6 +221,10 @@ mod tests {
             assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
             let tall = DMatrix::from_fn(rows, columns, |i, j| entry(i, j + inner));
             assert!((product_along(&a, &tall) - a.transpose() * &tall).amax() <= scale * 10.0);
+            assert!((transposed_product(&a, tall.as_view()) - a.transpose() * &tall).amax() <= scale * 10.0);
+            let mut left = tall.clone();
+            take_off_product(left.as_view_mut(), &a, &b);
+            assert!((left - (&tall - &a * &b)).amax() <= scale);
         }
     }
 }

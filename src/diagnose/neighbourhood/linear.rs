@@ -1,6 +1,8 @@
 //! A fit in its linear neighbourhood: what its residual can still give to columns that were not fitted, and what each
 //! fitted parameter gives it.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -82,16 +84,25 @@ impl LinearNeighbourhood {
     /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the unknowns given; so many rows are
     /// `empty`: 0, since poses measure fewer numbers than three.
     pub fn new(jacobian: &DMatrix<f64>, residual: &DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
+        Self::of(Cow::Borrowed(jacobian), residual.clone(), unknowns, empty)
+    }
+
+    /// The same of a Jacobian that nobody else needs, in its place.
+    pub fn in_place_of(jacobian: DMatrix<f64>, residual: DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
+        Self::of(Cow::Owned(jacobian), residual, unknowns, empty)
+    }
+
+    fn of(jacobian: Cow<DMatrix<f64>>, residual: DVector<f64>, unknowns: &Unknowns, empty: usize) -> Self {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
         let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut long = residual.clone().resize_vertically(rows + known.len(), 0.0);
+        let mut long = residual.resize_vertically(rows + known.len(), 0.0);
         known.iter().enumerate().for_each(|(row, &(j, sigma))| long[rows + row] = unknowns.x[j] / sigma);
         let below: Vec<(usize, f64)> = known.iter().map(|&(j, sigma)| (j, sigma.recip())).collect();
         let (basis, root) = if unknowns.active.is_empty() {
             orthonormal_above(jacobian, &below, None)
         } else {
-            held(jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
+            held(&jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
         };
         let mut fit = Self {
             residual: long,
@@ -211,9 +222,9 @@ impl LinearNeighbourhood {
         self.basis.rows(0, self.rows).into_owned()
     }
 
-    /// Whitened residuals of the data.
-    pub fn data_residual(&self) -> DVector<f64> {
-        self.residual.rows(0, self.rows).into_owned()
+    /// The same and whitened residuals of the data, without a copy.
+    pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
+        (self.basis.resize_vertically(self.rows, 0.0), self.residual.resize_vertically(self.rows, 0.0))
     }
 
     /// From where the derivatives were taken to the optimum, all unknowns, those of added columns last.

@@ -122,8 +122,9 @@ impl<'a> Linearised<'a> {
             let plain = PoseResiduals::new(model, Arc::clone(&poses), Vec::new(), x.clone());
             let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
             let fitted = unknowns.len() + shared.len();
-            let mut own = new(jacobian.columns(0, fitted).into_owned(), residual);
-            own.extend(&slots, jacobian.columns_range(fitted..));
+            let beside = jacobian.columns_range(fitted..).into_owned();
+            let mut own = new(jacobian.resize_horizontally(fitted, 0.0), residual);
+            own.extend(&slots, beside.as_view());
             own
         } else {
             let mut own = known.map_or_else(
@@ -171,6 +172,12 @@ impl<'a> Linearised<'a> {
     /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
     pub fn fitted(&self) -> &DMatrix<f64> {
         &self.derivatives.fitted
+    }
+
+    /// The same and the whitened residual; copies only where others know them.
+    pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
+        let Derivatives { fitted, residual, .. } = Arc::unwrap_or_clone(self.derivatives);
+        (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
     }
 
     /// σ of the priors of what is relaxed, in the order of its columns.

@@ -1,5 +1,7 @@
 //! Orthonormal bases of columns, and the one rule that says how many directions they have.
 
+use std::borrow::Cow;
+
 use nalgebra::DMatrix;
 
 use crate::numeric::{
@@ -17,17 +19,17 @@ pub(crate) const RANK: f64 = 1e-6;
 ///
 /// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are directions of their own.
 pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (DMatrix<f64>, DMatrix<f64>) {
-    orthonormal_above(columns, &[], lengths)
+    orthonormal_above(Cow::Borrowed(columns), &[], lengths)
 }
 
-/// The same of columns with rows `below` them of one entry each, its column and its value.
+/// The same of columns with rows `below` them of one entry each, its column and its value; in the place of columns that nobody else needs.
 pub(super) fn orthonormal_above(
-    columns: &DMatrix<f64>,
+    columns: Cow<DMatrix<f64>>,
     below: &[(usize, f64)],
     lengths: Option<&[f64]>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (rows, n) = columns.shape();
-    let mut products = gram(columns);
+    let mut products = gram(&columns);
     for &(j, value) in below {
         products[(j, j)] += value * value;
     }
@@ -36,10 +38,13 @@ pub(super) fn orthonormal_above(
     // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
     let mut turn = inverse_lower(&first).transpose();
     turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(own[j]));
-    let mut basis = if kept.len() == n {
-        product_with_upper_above(columns, &turn, below.len())
-    } else {
-        product_with_upper_above(&columns.select_columns(&kept), &turn, below.len())
+    let own = if kept.len() == n { columns } else { Cow::Owned(columns.select_columns(&kept)) };
+    let mut basis = match own {
+        Cow::Borrowed(own) => product_with_upper_above(own, &turn, below.len()),
+        Cow::Owned(mut own) => {
+            multiply_by_upper(&mut own, &turn);
+            own.resize_vertically(rows + below.len(), 0.0)
+        }
     };
     for (row, (j, value)) in below.iter().enumerate() {
         if let Ok(k) = kept.binary_search(j) {
@@ -133,7 +138,9 @@ mod tests {
         let mut stacked = columns.clone().resize_vertically(203, 0.0);
         below.iter().enumerate().for_each(|(row, &(j, value))| stacked[(200 + row, j)] = value);
         let ((basis, within), (expected, turn)) =
-            (orthonormal_above(&columns, &below, None), orthonormal(&stacked, None));
+            (orthonormal_above(Cow::Borrowed(&columns), &below, None), orthonormal(&stacked, None));
+        let (same, _) = orthonormal_above(Cow::Owned(columns), &below, None);
+        assert!((same - &basis).amax() < 1e-13);
         assert_eq!((basis.shape(), within.shape()), ((203, 38), (40, 38)));
         assert!((&basis - expected).amax() < 1e-10 && (&within - turn).amax() < 1e-10 * within.amax());
         assert!((basis.transpose() * &basis - DMatrix::identity(38, 38)).amax() < 1e-13);

@@ -15,11 +15,11 @@ const ONE_A_ROUND_IN: usize = 100;
 const ONE_IN: usize = 5;
 
 /// What a search for outliers found.
-pub(super) struct Found {
+pub(super) struct Found<'a> {
     /// The test of the pose that is farthest off, with all poses present.
     pub tried: Tried,
     /// The poses without the outliers; `None` where there are none.
-    pub kept: Option<Kept>,
+    pub kept: Option<Kept<'a>>,
 }
 
 /// Leaves out poses that are too far off, the farthest first.
@@ -28,7 +28,7 @@ pub(super) struct Found {
 /// degrees of freedom: it has the F distribution with k and ν of them, whatever σ is (nearly so with priors). The pose is
 /// too far off where N P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. Where more than one pose in five is, the
 /// rest stays in: that is no outlier, but what the noise is like.
-pub(super) fn find(fit: &FitResidual, leverage: &Leverage, level: f64) -> Found {
+pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -> Found<'a> {
     let poses = fit.residual.len() / 3;
     let mut distances = distances(leverage, fit.residual);
     let mut kept: Option<Kept> = None;
@@ -40,13 +40,19 @@ pub(super) fn find(fit: &FitResidual, leverage: &Leverage, level: f64) -> Found 
             break;
         }
         let pose_of = |number: usize| kept.as_ref().map_or(number, |kept| kept.poses[number]);
+        let before = out.clone();
         for number in far {
             out[pose_of(number)] = true;
         }
         if out.iter().filter(|&&out| out).count() > (poses / ONE_IN).max(1) {
             break;
         }
-        let Some(rest) = Kept::without(fit, &out) else { break };
+        // These make room for the next, and are formed anew where there are none.
+        let had_some = kept.take().is_some();
+        let Some(rest) = Kept::without(fit, &out) else {
+            kept = had_some.then(|| Kept::without(fit, &before)).flatten();
+            break;
+        };
         distances = self::distances(&rest.leverage, &rest.residual);
         kept = Some(rest);
     }
@@ -61,7 +67,6 @@ struct Distance {
 
 /// Of each pose; `None` where the others leave no degrees of freedom.
 fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distance>> {
-    let studentised = leverage.studentise(residual.as_slice());
     let rounding = f64::EPSILON * residual.norm_squared();
     let distance = |((own, others), &numbers): ((Vector3<f64>, Others), &usize)| {
         let numbers = numbers as f64;
@@ -70,6 +75,7 @@ fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distanc
         let variance = others.squares.max(rounding) / others.freedom;
         Some(Distance { ratio: if own > 0.0 { own / numbers / variance } else { 0.0 }, distribution })
     };
+    let studentised = leverage.studentise(residual.as_slice());
     studentised.into_iter().zip(each_left_out(leverage, residual)).zip(&leverage.coordinates).map(distance).collect()
 }
 

@@ -1,6 +1,6 @@
 //! Residuals as chance would leave them: permuted, and fitted again.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -10,6 +10,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 use super::chance::{Chance, Drawn};
 use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
+use crate::numeric::{take_off_product, transposed_product};
 
 /// Number of draws. Fewer where a product of all of them with Q takes more multiplications than `WORK`: of a fit of hundreds of parameters
 /// to thousands of poses what is less probable than one in a hundred is then told by the fitted tail, instead of one in two hundred.
@@ -45,48 +46,63 @@ pub(super) fn chances(
     let draws = usize::try_from(affordable).unwrap_or(DRAWS).clamp(FEWEST, DRAWS);
     let prior = leverage.prior_root();
     let starts: Vec<usize> = (0..draws).step_by(together).collect();
-    let drawn: Vec<Vec<f64>> = starts
-        .into_par_iter()
-        .flat_map_iter(|start| {
-            let residuals = draw((leverage, &prior), studentised, start..(start + together).min(draws), seed);
-            let values = |residual: &[f64]| -> Vec<f64> {
-                let sample = Sample::of(leverage.studentise(residual));
-                statistics.iter().map(|statistic| statistic.of(&sample)).collect()
-            };
-            residuals.as_slice().chunks_exact(residuals.nrows()).map(values).collect::<Vec<_>>()
-        })
-        .collect();
+    let values = |space: &mut DMatrix<f64>, start: usize| {
+        draw((leverage, &prior), studentised, start..(start + together).min(draws), seed, space);
+        values(leverage, statistics, space)
+    };
+    let drawn: Vec<Vec<Vec<f64>>> = if together > FEWEST_TOGETHER {
+        starts.into_par_iter().map_init(DMatrix::default, values).collect()
+    } else {
+        // Of draws that take much memory all threads work on the same few.
+        let mut space = DMatrix::default();
+        starts.into_iter().map(|start| values(&mut space, start)).collect()
+    };
+    let drawn = drawn.concat();
     let of = |k: usize| Drawn::of(drawn.iter().map(|values| values[k]).collect()).map(Chance::Drawn);
     (0..statistics.len()).map(of).collect()
 }
 
-/// Residuals r* of some draws as columns, shape = (3 N, draws).
+/// Residuals r* of some draws as columns, shape = (3 N, draws), in the place of what `residuals` held.
 fn draw(
     (leverage, prior): (&Leverage, &DMatrix<f64>),
     studentised: &[Vector3<f64>],
     draws: std::ops::Range<usize>,
     seed: u64,
-) -> DMatrix<f64> {
-    let mut residuals = DMatrix::zeros(3 * studentised.len(), draws.len());
-    let mut by_priors = DMatrix::zeros(prior.ncols(), draws.len());
-    let normal = Normal::standard();
-    for (column, draw) in draws.enumerate() {
+    residuals: &mut DMatrix<f64>,
+) {
+    let (rows, normal) = (3 * studentised.len(), Normal::standard());
+    *residuals = std::mem::take(residuals).resize(rows, draws.len(), 0.0);
+    let permute = |(column, draw): (&mut [f64], usize)| -> DVector<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(draw as u64);
-        let mut permuted = studentised.to_vec();
-        permuted.shuffle(&mut random);
-        for (pose, value) in permuted.iter().enumerate() {
-            residuals.fixed_view_mut::<3, 1>(3 * pose, column).copy_from(value);
-        }
-        for value in by_priors.column_mut(column).iter_mut() {
+        let (poses, _) = column.as_chunks_mut::<3>();
+        // Numbers are smaller than what they stand for.
+        let mut numbers: Vec<u32> = (0..).take(poses.len()).collect();
+        numbers.shuffle(&mut random);
+        poses.iter_mut().zip(numbers).for_each(|(pose, number)| *pose = studentised[number as usize].into());
+        let by_prior = |_, _| {
             let uniform: f64 = random.random();
-            *value = normal.inverse_cdf(uniform.max(f64::EPSILON));
-        }
-    }
-    let mut taken = &leverage.transposed * &residuals;
+            normal.inverse_cdf(uniform.max(f64::EPSILON))
+        };
+        DVector::from_fn(prior.ncols(), by_prior)
+    };
+    let columns = residuals.as_mut_slice().par_chunks_mut(rows.max(1)).zip(draws);
+    let by_priors: Vec<DVector<f64>> = columns.map(permute).collect();
+    let mut taken = transposed_product(&leverage.fitted, residuals.as_view());
     if prior.ncols() > 0 {
-        taken += prior * by_priors;
+        taken += prior * DMatrix::from_columns(&by_priors);
     }
-    residuals.gemm(-1.0, &leverage.fitted, &taken, 1.0);
-    residuals
+    take_off_product(residuals.as_view_mut(), &leverage.fitted, &taken);
+}
+
+/// The statistics of each draw, from its residuals, which are studentised in their place.
+fn values(leverage: &Leverage, statistics: &[&Statistic], residuals: &mut DMatrix<f64>) -> Vec<Vec<f64>> {
+    let of_draw = |residual: &mut [f64]| {
+        let (poses, _) = residual.as_chunks_mut();
+        leverage.studentise_in_place(poses);
+        let sample = Sample::of(poses);
+        statistics.iter().map(|statistic| statistic.of(&sample)).collect()
+    };
+    let rows = residuals.nrows().max(1);
+    residuals.as_mut_slice().par_chunks_mut(rows).map(of_draw).collect()
 }

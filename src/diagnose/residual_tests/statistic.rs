@@ -12,28 +12,35 @@ const LEAST_POSES: usize = 5;
 /// Most lags of the autocorrelation, and poses of a session per lag [Hyndman and Athanasopoulos 2018, section 5.4].
 const MOST_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
+/// Poses from all over memory that are fetched together, before anything is done with them.
+const FETCHED: usize = 64;
 /// A range this small beside the values is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Studentised residuals, about their mean.
-#[derive(Debug, Clone)]
-pub(super) struct Sample {
+#[derive(Debug)]
+pub(super) struct Sample<'a> {
     /// y of each pose, with Σ y = 0.
-    pub centred: Vec<Vector3<f64>>,
+    centred: &'a [[f64; 3]],
     /// Σ y yᵀ.
-    pub squares: Matrix3<f64>,
+    squares: Matrix3<f64>,
 }
 
-impl Sample {
-    /// Of studentised residuals.
-    pub fn of(mut values: Vec<Vector3<f64>>) -> Self {
-        let mean = values.iter().sum::<Vector3<f64>>() / values.len().max(1) as f64;
+impl<'a> Sample<'a> {
+    /// Of studentised residuals, in their place.
+    pub fn of(values: &'a mut [[f64; 3]]) -> Self {
+        let mean = values.iter().copied().map(Vector3::from).sum::<Vector3<f64>>() / values.len().max(1) as f64;
         let mut squares = Matrix3::zeros();
-        for value in &mut values {
-            *value -= mean;
-            squares += *value * value.transpose();
+        for value in &mut *values {
+            let centred = Vector3::from(*value) - mean;
+            squares += centred * centred.transpose();
+            *value = centred.into();
         }
         Self { centred: values, squares }
+    }
+
+    fn at(&self, pose: usize) -> Vector3<f64> {
+        self.centred[pose].into()
     }
 }
 
@@ -101,13 +108,9 @@ impl Order {
     }
 
     /// Poses that are `lag` steps apart, earlier and later, of all sessions.
-    fn pairs<'a>(
-        &'a self,
-        sample: &'a Sample,
-        lag: usize,
-    ) -> impl Iterator<Item = (&'a Vector3<f64>, &'a Vector3<f64>)> {
+    fn pairs<'a>(&'a self, sample: &'a Sample, lag: usize) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> {
         let within = move |session: &'a Vec<usize>| session.iter().zip(session.iter().skip(lag));
-        self.sessions.iter().flat_map(within).map(|(&a, &b)| (&sample.centred[a], &sample.centred[b]))
+        self.sessions.iter().flat_map(within).map(|(&a, &b)| (sample.at(a), sample.at(b)))
     }
 
     /// Share of steps at which a coordinate keeps its sign: few runs, many kept signs [Wald and Wolfowitz 1940].
@@ -131,7 +134,7 @@ impl Order {
             let (mut pairs, mut sum) = (0.0, 0.0);
             for (a, b) in self.pairs(sample, lag) {
                 pairs += 1.0;
-                sum += a.dot(b);
+                sum += a.dot(&b);
             }
             (sum / variance).powi(2) / f64::max(pairs, 1.0)
         };
@@ -187,9 +190,13 @@ impl Cumulative {
     pub fn correlation(&self, sample: &Sample) -> f64 {
         let mut sum = Vector3::zeros();
         let mut total = 0.0;
-        for (&number, weight) in self.order.iter().zip(&self.weights) {
-            sum += sample.centred[number];
-            total += weight * sum.norm_squared();
+        let mut near = [Vector3::zeros(); FETCHED];
+        for (numbers, weights) in self.order.chunks(FETCHED).zip(self.weights.chunks(FETCHED)) {
+            near.iter_mut().zip(numbers).for_each(|(near, &number)| *near = sample.at(number));
+            for (own, weight) in near.iter().zip(weights) {
+                sum += own;
+                total += weight * sum.norm_squared();
+            }
         }
         let norm = sample.squares.norm();
         if norm > 0.0 { total / norm } else { 0.0 }
@@ -219,16 +226,15 @@ mod tests {
     #[test]
     fn both_forms_agree() {
         let x = [0.3, -1.2, 2.5, 0.3, 0.9, -0.4];
-        let y: Vec<Vector3<f64>> =
-            (0..6).map(f64::from).map(|k| Vector3::new((3.0 * k).sin(), k * k, 1.0 / (k + 1.0))).collect();
-        let sample = Sample::of(y);
+        let mut y: Vec<[f64; 3]> = (0..6).map(f64::from).map(|k| [(3.0 * k).sin(), k * k, 1.0 / (k + 1.0)]).collect();
+        let sample = Sample::of(&mut y);
         let distance = |i: usize, j: usize| -> f64 { f64::abs(x[i] - x[j]) };
         let mean = |i: usize| (0..6).map(|j| distance(i, j)).sum::<f64>() / 6.0;
         let all = (0..6).map(mean).sum::<f64>() / 6.0;
         let (mut sum, mut norm, mut gram) = (0.0, 0.0, 0.0);
         for i in 0..6 {
             for j in 0..6 {
-                let product = sample.centred[i].dot(&sample.centred[j]);
+                let product = sample.at(i).dot(&sample.at(j));
                 sum -= distance(i, j) * product;
                 norm += (distance(i, j) - mean(i) - mean(j) + all).powi(2);
                 gram += product * product;

@@ -1,5 +1,7 @@
 //! All residual tests of one fit.
 
+use std::borrow::Cow;
+
 use super::fit_residual::{CovariateValues, FitResidual};
 use super::judgement::{ALPHA, Trial, Tried, judge};
 use super::leverage::{Kept, Leverage};
@@ -19,7 +21,9 @@ pub fn test_residual(fit: &FitResidual, seed: u64) -> Findings {
     let poses = fit.residual.len() / 3;
     let leverage = match fit
         .testable()
-        .and_then(|()| Leverage::of(fit.fitted, (0..poses).map(|pose| fit.coordinates_of(pose)).collect()))
+        .and_then(|()| {
+            Leverage::of(Cow::Borrowed(fit.fitted), (0..poses).map(|pose| fit.coordinates_of(pose)).collect())
+        })
         .and_then(|all| fit.above_rounding().map(|()| all))
     {
         Ok(leverage) => leverage,
@@ -42,8 +46,9 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let statistics = statistics(fit, &kept.poses);
     let working: Vec<&Statistic> = statistics.iter().filter_map(|(_, statistic)| statistic.as_ref().ok()).collect();
     let studentised = kept.leverage.studentise(kept.residual.as_slice());
-    let sample = Sample::of(studentised.clone());
     let mut chances = permutation::chances(&kept.leverage, &studentised, &working, seed).into_iter();
+    let mut own: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
+    let sample = Sample::of(&mut own);
     let tried = statistics.iter().map(|(test, statistic)| {
         let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
             let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
