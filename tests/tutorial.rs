@@ -246,7 +246,9 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
     }
     assert!(found.contains("Explained: one effect was found") && found.contains("joint = 4"), "{found}");
     assert!(exported.contains("held-out poses: mean 0."), "{exported}");
-    assert!(folder.path().join("calibrated.urdf").is_file() && folder.path().join("out/closed/report.html").is_file());
+    assert!(
+        folder.path().join("calibrated.urdf").is_file() && folder.path().join("out/panda-closed/report.html").is_file()
+    );
 }
 
 #[test]

@@ -17,7 +17,7 @@ use super::outcome::Outcome;
 
 /// Arguments of `flexcal compensate`.
 #[derive(Debug, Args)]
-#[command(after_help = "The targets are a table like measurements: x_mm, y_mm, z_mm are where the arm should be, and \
+#[command(mut_arg("data", |data| data.help("Targets, tables like measurements")), after_help = "The targets are a table like measurements: x_mm, y_mm, z_mm are where the arm should be, and \
 q1_deg, … where to start from; of the configurations that reach a target the nearest to that is taken. Ranges of joints \
 are kept where the problem gives them (min_deg, max_deg of a joint). A column session says whose base to use. With the \
 columns rx_deg, ry_deg, rz_deg (or qx, qy, qz, qw) the orientation is kept too; without x_mm, y_mm, z_mm the arm is brought \

@@ -51,13 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
         common.read("identify", &["estimate.json", "residuals.csv", REPORT[0], REPORT[1]])?;
-    if problem.parameters.is_empty() && !common.quiet {
-        diagnostic::warn(
-            "nothing is free: the nominal arm is judged as it is; to identify it, write [parameters] with lines such as \
-             \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \"joint*.theta\" = { sigma_deg = 1.0 }, \
-             \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
-        );
-    }
+    common.say_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
     let options = Options::default()
         .with_strategy(arguments.strategy)

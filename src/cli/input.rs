@@ -10,6 +10,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::shell_word;
 
+use super::diagnostic;
 use super::flags::Flags;
 use super::output::{Results, WriteError};
 
@@ -86,6 +87,17 @@ impl Common {
         warnings.extend(measurements.time_going_back());
         self.warn(&warnings);
         Dataset::of(problem, measurements)
+    }
+
+    /// Says that no parameter is to be identified.
+    pub fn say_if_nothing_is_free(&self, problem: &Problem) {
+        if problem.parameters.is_empty() && !self.quiet {
+            diagnostic::warn(
+                "nothing is free: the nominal arm is judged as it is; to identify it, write [parameters] with lines such as \
+                 \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \"joint*.theta\" = { sigma_deg = 1.0 }, \
+                 \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
+            );
+        }
     }
 
     /// Says that the search for effects leaves orientations out, where the problem fits them.

@@ -41,6 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let names = ["loop.json", "problem.closed.toml", "residuals.csv", REPORT[0], REPORT[1]];
     let results = common.results("loop", &problem, &[], &names)?;
     let mut data = common.measurements(&problem)?;
+    common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
     let options = Options::default().with_carriers().with_stop(stop.clone());
@@ -73,6 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         let next = match report::look_at_carriers(&closure.before.fit, &common.problem_file()) {
             Some(look) => format!("Next: {look}\n"),
+            None if closure.interrupted => "Next: the same command again, to look to the end\n".to_owned(),
             None if closure.after.is_trusted() => {
                 let closed = shell_word(&results.path("problem.closed.toml"));
                 format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n")

@@ -26,6 +26,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, mut data, results } = common.read("trace", &["trace.json"])?;
+    common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let trace = Line::during(common.talks(), None, |sink| {
         diagnose::trace(&problem, &data, &Options::default().with_progress(sink))

@@ -117,7 +117,7 @@ fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 /// AᵀB of a tall A and a B with few columns.
 pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
-    if a.len() * b.ncols() < WORTH_THREADS {
+    if a.len() * b.ncols() < WORTH_THREADS || a.nrows() <= NARROW {
         return a.tr_mul(b);
     }
     let together = if b.ncols() <= NARROW { FEW } else { TOGETHER };
@@ -142,7 +142,7 @@ pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> 
 /// AᵀA: its upper triangle, mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    if rows * n * n < WORTH_THREADS {
+    if rows * n * n < WORTH_THREADS || rows <= NARROW {
         return a.transpose() * a;
     }
     let transposed = transposed_view(a);
@@ -163,7 +163,8 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Aᵀ, of which nothing is copied.
+/// Aᵀ, of which nothing is copied; not for products in which a size is `NARROW`: they go by axpys, and nalgebra's do not keep within
+/// columns with gaps between their numbers.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
@@ -172,7 +173,7 @@ fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> 
 /// AᵀB of a tall A and a B as tall: some columns of A after others, so that each sum is that of one thread.
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    // A narrow product goes by axpys, of which nalgebra has none that keep within columns with gaps between their numbers.
+    // See `transposed_view`.
     if a.len() * b.ncols() < WORTH_THREADS || rows.min(n).min(b.ncols()) <= NARROW {
         return a.transpose() * b;
     }
@@ -202,11 +203,18 @@ mod tests {
     #[test]
     fn products_are_those_of_one_thread() {
         let entry = |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
-        for (rows, inner, columns) in
-            [(3, 2, 4), (700, 70, 41), (301, 250, 250), (5, 0, 3), (3001, 202, 4), (3001, 97, 7), (2600, 410, 3)]
-        {
+        for (rows, inner, columns) in [
+            (3, 2, 4),
+            (700, 70, 41),
+            (301, 250, 250),
+            (5, 0, 3),
+            (3001, 202, 4),
+            (3001, 97, 7),
+            (2600, 410, 3),
+            (4, 600, 500),
+        ] {
             let (a, b) = (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
-            let scale = 1e-15 * rows as f64;
+            let scale = 1e-15 * rows.max(inner) as f64;
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
             let upper = DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
             let (expected, mut in_place) = (&a * &upper, a.clone());

@@ -36,7 +36,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
         (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
         (Noise::Declared, Some(chi2)) if contradicted(found) => {
             let declared = problem.data.position_sigma.filter(|_| of.kind == "position");
-            let declared = declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, 4)));
+            let declared =
+                declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, decimals(s * 1e3, 12).max(4))));
             let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
             // The σ of several kinds, which may have units of their own, are all multiplied by the same.
             let taken = if found.kinds.is_empty() {

@@ -30,6 +30,9 @@ pub fn interrupted(closure: &ClosedLoop) -> String {
 /// The outcome in a sentence or two, after a word that it is not the last one where the search ended early.
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
     let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
+    if closure.interrupted && closure.rounds.is_empty() && closure.effects.is_empty() {
+        return end + "What the residual holds was not weighed to the end: no cause is named, and none ruled out.";
+    }
     let carried = closure.before.fit.carriers.is_some() && closure.after.is_trusted();
     let first = if carried {
         "Look first at the rows that carry the misfit: wrong ones hide causes, and a cause that acts in them alone looks like wrong ones. "
