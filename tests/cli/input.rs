@@ -78,6 +78,21 @@ const DATA: &str = "a-none.csv";
 const PROBLEM: &str = "problem.toml";
 
 #[test]
+fn where_nothing_is_free_every_command_that_fits_says_so() {
+    let bench = Bench::new();
+    let problem = fs::read_to_string(bench.path("problem.toml")).unwrap();
+    let (arm, _) = problem.split_once("[parameters]").unwrap();
+    let data = "[data]\nfiles = [\"a-none.csv\"]\nposition_sigma_mm = 0.05\nheld_out = { column = \"split\" }\n";
+    fs::write(bench.path("problem.toml"), format!("{arm}{data}")).unwrap();
+    for command in ["identify", "trace", "loop"] {
+        let mut run = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        let assert = run.current_dir(bench.folder.path()).arg(command).assert();
+        let said = text(&assert.get_output().stderr);
+        assert!(said.contains("nothing is free: the nominal arm is judged as it is"), "{command}: {said}");
+    }
+}
+
+#[test]
 fn bad_input_is_named_and_leaves_nothing_behind() {
     let mistakes: &[Mistake] = &[
         ("empty file", |b| fs::write(b.path(DATA), "").unwrap(), &[DATA, "empty"]),
