@@ -163,8 +163,8 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Aᵀ, of which nothing is copied; not for products in which a size is `NARROW`: they go by axpys, and nalgebra's do not keep within
-/// columns with gaps between their numbers.
+/// Aᵀ, of which nothing is copied; not for products of a size up to `NARROW`: they go by axpys, and nalgebra's do not keep
+/// within columns with gaps between their numbers.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))

@@ -29,7 +29,7 @@ pub struct PoseConditions {
 /// The same of a pose whose numbers are kept elsewhere, in a table for instance: fits hold one for each pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseView<'a> {
-    /// As [`PoseConditions::configuration`].
+    /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
     pub configuration: &'a [f64],
     /// Payload \[kg\]; `None`: as the problem declares.
     pub payload: Option<&'a f64>,
@@ -41,14 +41,14 @@ pub struct PoseView<'a> {
     pub time: f64,
     /// Time since the first pose \[s\].
     pub elapsed: f64,
-    /// As [`PoseConditions::approach`].
+    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
     pub approach: Option<&'a [f64]>,
-    /// As [`PoseConditions::covariates`].
+    /// Values of the problem's own covariates, in their order and units; empty: not known.
     pub covariates: &'a [f64],
     /// What was before.
     pub past: PastOf<'a>,
-    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures about y and z [1/m]; `None`: none.
-    /// Most poses have none: a thin reference keeps them small.
+    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures about y and z [1/m]; `None`:
+    /// none. Most poses have none: a thin reference keeps them small.
     pub strains: Option<&'a Vec<[f64; 3]>>,
 }
 

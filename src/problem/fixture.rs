@@ -106,7 +106,7 @@ pub enum Observation {
     /// Tilts of the x and the y axis of a frame against the horizontal: two numbers. Frame 0 is the arm's base, frame i that of joint
     /// i.
     Tilt(usize),
-    /// Distance between two points, without the arm: one number. Their numbers are narrow so that both take the room of one.
+    /// Distance between two points, without the arm: one number. Indices are narrow so that both take the room of one.
     Between(u32, u32),
 }
 

@@ -14,3 +14,4 @@ mod harmonics;
 mod limits;
 mod screening;
 mod selection_rules;
+mod stopped;

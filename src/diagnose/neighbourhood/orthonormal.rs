@@ -22,7 +22,8 @@ pub(super) fn orthonormal(columns: &DMatrix<f64>, lengths: Option<&[f64]>) -> (D
     orthonormal_above(Cow::Borrowed(columns), &[], lengths)
 }
 
-/// The same of columns with rows `below` them of one entry each, its column and its value; in the place of columns that nobody else needs.
+/// The same of columns with rows `below` them of one entry each, its column and its value; in the place of columns that nobody
+/// else needs.
 pub(super) fn orthonormal_above(
     columns: Cow<DMatrix<f64>>,
     below: &[(usize, f64)],
@@ -61,7 +62,8 @@ pub(super) fn orthonormal_above(
     (basis, within)
 }
 
-/// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky factor of theirs, scaled to length one.
+/// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky factor of theirs, scaled to
+/// length one.
 fn independent(gram: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();

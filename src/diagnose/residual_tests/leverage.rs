@@ -75,8 +75,9 @@ impl<'a> Leverage<'a> {
     ///
     /// Directions of a pose that the fit always meets become zero.
     pub fn studentise(&self, residual: &[f64]) -> Vec<Vector3<f64>> {
-        let (poses, _) = residual.as_chunks();
-        poses.iter().zip(&self.whiteners).map(|(&own, whitener)| whitener * Vector3::from(own)).collect()
+        let mut poses = residual.as_chunks().0.to_vec();
+        self.studentise_in_place(&mut poses);
+        poses.into_iter().map(Vector3::from).collect()
     }
 
     /// The same in the place of the residuals.
